@@ -114,8 +114,8 @@ def doubt(part: object, key: str, shown: str, other: str, *, more: str = "", fil
 def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
     """The doubts about units in what is read meanwhile, each once; they are warned of at its end.
 
-    Returns
-    -------
+    Yields
+    ------
     noted : a list that fills while the block runs; warnings of other kinds pass through as before
 
     Notes

@@ -60,7 +60,13 @@ def _check_robot(path: Path) -> None:
 
 
 def check_references(robot: Robot) -> None:
-    """Check a robot's reference sets, and that the documents which its file names are among theirs."""
+    """Check a robot's reference sets, and that the documents which its file names are among theirs.
+
+    Raises
+    ------
+    InputError
+        naming the set's file and row, or the entry of the robot's file
+    """
     sets = [load_references(reference, robot) for reference in robot.references]
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
@@ -218,7 +224,21 @@ def _check_table(path: Path) -> str:
 
 
 def check_study(path: Path) -> Study:
-    """Check a study file and every file that it leads to, before a run starts."""
+    """Check a study file and every file that it leads to, before a run starts.
+
+    Parameters
+    ----------
+    path : of the study; its own paths are relative to the current folder
+
+    Returns
+    -------
+    study : checked, with no stage computed
+
+    Raises
+    ------
+    InputError
+        naming the file and the place in it that can't be used
+    """
     study = load_study(path)
     for name in study.names:
         try:

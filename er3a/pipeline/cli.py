@@ -33,7 +33,15 @@ for _room in (
 
 
 def main() -> None:
-    """Entry point: errors that a user can correct are one line on standard error and exit code 2."""
+    """Run a command and end the process with its exit code.
+
+    Errors that a user can correct are one line on standard error.
+
+    Raises
+    ------
+    SystemExit
+        with the codes at the head of this module; 1 also where the reader of standard output has closed it
+    """
     warnings.showwarning = print_warning
     signal.signal(signal.SIGTERM, _end)
     try:

@@ -20,13 +20,23 @@ _KINDS = (".py", ".j2", ".css", ".js")
 
 @cache
 def numbers_digest() -> str:
-    """SHA-256 over the names and contents of all files that numbers can depend on."""
+    """Digest of the code that numbers can depend on.
+
+    Returns
+    -------
+    digest : SHA-256 over the names and contents of these files, in hex; computed once in a process
+    """
     return _digest(views=False)
 
 
 @cache
 def code_digest() -> str:
-    """SHA-256 over the names and contents of all files that pages and recordings can depend on."""
+    """Digest of the code that pages and recordings can depend on, which is all of it.
+
+    Returns
+    -------
+    digest : SHA-256 over the names and contents of these files, in hex; computed once in a process
+    """
     return _digest(views=True)
 
 

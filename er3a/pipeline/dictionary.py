@@ -19,7 +19,12 @@ as Parquet, and `{CHECKSUMS}`. Units and meanings stand in the files too, as met
 
 
 def data_dictionary() -> str:
-    """All tables of all stages, as Markdown."""
+    """The dictionary of all tables of all stages.
+
+    Returns
+    -------
+    text : Markdown: key figures, then for each table its columns with type, unit and meaning
+    """
     parts = [HEAD]
     for stage in STAGES.values():
         parts.append(f"## {stage.name}\n\nKey figures in `figures`:\n\n{_figures(stage)}")

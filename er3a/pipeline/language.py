@@ -32,16 +32,41 @@ class _AsIs(Formatter):
     """Fills in what is formatted already."""
 
     def format_field(self, value: Any, format_spec: str) -> Any:
+        """A part of a text as it is, since it was written with its format before.
+
+        Parameters
+        ----------
+        value : the part's text
+        format_spec : of the translation, which has none
+        """
         return value
 
 
 def N_(text: str) -> str:
-    """Mark a text for the catalogues without translating it yet: words in a table of constants."""
+    """Mark a text for the catalogues without translating it yet: words in a table of constants.
+
+    Parameters
+    ----------
+    text : in English; :func:`tr` translates it where it is shown
+
+    Returns
+    -------
+    text : unchanged
+    """
     return text
 
 
 def written_title(text: str) -> str:
-    """Mark a title or note that er3a writes into a file, in English; pages show it by :func:`own_title`."""
+    """Mark a title or note that er3a writes into a file, in English.
+
+    Parameters
+    ----------
+    text : pages show it by :func:`own_title`
+
+    Returns
+    -------
+    text : unchanged
+    """
     return text
 
 
@@ -50,7 +75,13 @@ UNITS = (N_("deg"), N_("deg (mm of a prismatic joint)"), N_("deg/s"), N_("µdeg/
 
 
 def use(language: str, own: Mapping[str, str] | None = None) -> None:
-    """Set the language of texts for this process: one of ``LANGUAGES``; ``own``: people's titles in that language."""
+    """Set the language of texts for this process.
+
+    Parameters
+    ----------
+    language : one of ``LANGUAGES``
+    own : people's titles and notes in that language, by the text that they translate
+    """
     global _catalogue, _language, _own
     _language, _own = language, own or {}
     _catalogue = gettext.NullTranslations() if language == "en" else _load(catalogue_file(language))
@@ -58,7 +89,12 @@ def use(language: str, own: Mapping[str, str] | None = None) -> None:
 
 @contextmanager
 def using(language: str) -> Iterator[None]:
-    """Texts in a language for a while."""
+    """Texts in a language for as long as a block runs; then in the language before.
+
+    Parameters
+    ----------
+    language : one of ``LANGUAGES``; within the block people's own titles are not translated
+    """
     global _catalogue, _language, _own
     kept = _catalogue, _language, _own
     use(language)
@@ -74,7 +110,16 @@ def current() -> str:
 
 
 def catalogue_file(language: str) -> Path:
-    """The catalogue of a language other than English."""
+    """The catalogue of a language other than English.
+
+    Parameters
+    ----------
+    language : one of ``LANGUAGES``
+
+    Returns
+    -------
+    path : of the gettext catalogue (``.po``)
+    """
     return CATALOGUES / language / "LC_MESSAGES" / "er3a.po"
 
 
@@ -84,26 +129,59 @@ def translations() -> gettext.NullTranslations:
 
 
 def tr(text: str, /, **parts: Any) -> str:
-    """A text in the language in use, its fields filled in as ``str.format`` does."""
+    """A text in the language in use.
+
+    Parameters
+    ----------
+    text : in English, with fields as ``str.format`` has them
+    parts : values of the fields; numbers are written as :func:`as_number` writes them
+
+    Returns
+    -------
+    text : in English where the catalogue has no translation
+    """
     found = _catalogue.gettext(text) if text else text
     return filled(found, text, parts) if parts else found
 
 
 def filled(text: str, template: str, parts: Mapping[str, Any], written: Callable[[Any, str], str] | None = None) -> str:
-    """A translation of a template, its fields filled in with the formats of the template: translations have none."""
+    """A translation of a template, its fields filled in with the formats of the template: translations have none.
+
+    Parameters
+    ----------
+    text : the translation, such as ``{distance} 毫米``
+    template : in English, such as ``{distance:.1f} mm``
+    parts : values by field
+    written : makes the text of a value by its format; :func:`as_text` by default
+    """
     formats = {name: spec or "" for _, name, spec, _ in Formatter().parse(template) if name}
     write = written or as_text
     return _AsIs().format(text, **{name: write(parts[name], spec) for name, spec in formats.items()})
 
 
 def as_text(part: Any, spec: str = "") -> str:
-    """A part of a text; a number as :func:`as_number` writes it."""
+    """A part of a text; a number as :func:`as_number` writes it.
+
+    Parameters
+    ----------
+    part : of any type
+    spec : its format, as of ``format``
+    """
     text = format(part, spec)
     return as_number(text) if isinstance(part, Real) else text
 
 
 def as_number(text: str) -> str:
-    """A number's text with thin spaces between thousands from five digits on; its minus sign is no hyphen."""
+    """A number's text as pages print it.
+
+    Parameters
+    ----------
+    text : with a decimal point and a hyphen as minus sign
+
+    Returns
+    -------
+    text : with narrow spaces between thousands from five digits on, and a true minus sign
+    """
     whole, point, rest = text.partition(".")
     digits = whole.lstrip("+-")
     if digits.isdecimal() and len(digits) > 4:
@@ -112,14 +190,30 @@ def as_number(text: str) -> str:
 
 
 def alike(values: Iterable[float], most: int = 3) -> list[str]:
-    """Numbers with equally many decimals: as few as show each of them to ``most``."""
+    """Numbers with equally many decimals: as few as show each of them to ``most``.
+
+    Parameters
+    ----------
+    values : in one unit
+    most : decimals that any of them can need
+
+    Returns
+    -------
+    texts : trailing zeros stay where another number needs the digit
+    """
     exact = [f"{value:.{most}f}" for value in values]
     decimals = max((len(text.rstrip("0").partition(".")[2]) for text in exact), default=0)
     return [as_text(float(text) + 0.0, f".{decimals}f") for text in exact]
 
 
 def distinct(values: Iterable[float], decimals: int = 1) -> list[str]:
-    """Numbers with equally many decimals: as few, from ``decimals`` on, as show different ones as different."""
+    """Numbers with equally many decimals: as few as show different ones as different.
+
+    Parameters
+    ----------
+    values : in one unit
+    decimals : to begin with; there are ``MOST_DECIMALS`` at most
+    """
     given = list(values)
     while decimals < MOST_DECIMALS and len({f"{value:.{decimals}f}" for value in given}) < len(set(given)):
         decimals += 1
@@ -127,24 +221,53 @@ def distinct(values: Iterable[float], decimals: int = 1) -> list[str]:
 
 
 def with_unit(value: str, unit: str, gap: str = " ") -> str:
-    """A value with its unit as the language in use writes it: Chinese has ° without a gap."""
+    """A value with its unit as the language in use writes it.
+
+    Parameters
+    ----------
+    value : as text
+    unit : in English; empty for none
+    gap : between both; Chinese has none before °
+    """
     shown = tr(unit)
     return value + ("" if shown.startswith("°") else gap) + shown if shown else value
 
 
 def own_title(text: str) -> str:
-    """A title or note out of a file in the language in use, if the file, or our catalogue for ours, says it."""
+    """A title or note out of a file in the language in use.
+
+    Parameters
+    ----------
+    text : as the file has it
+
+    Returns
+    -------
+    text : the file's own translation, or the catalogue's for titles that er3a wrote; else unchanged
+    """
     return _own[text] if text in _own else _catalogue.pgettext(TITLE, text)
 
 
 def translated(context: str, text: str) -> str:
-    """A text in the language in use, looked up with its context, and without it where the catalogue has none."""
+    """A text in the language in use, looked up with its context.
+
+    Parameters
+    ----------
+    context : of gettext, which separates texts that are alike in English only
+    text : in English; looked up without context where the catalogue has none with it
+    """
     found = _catalogue.pgettext(context, text)
     return found if found != text else _catalogue.gettext(text)
 
 
 def by_key(key: str, english: str, count: int | None = None) -> str:
-    """A text in the language in use, looked up by its key; in English where the catalogue has none."""
+    """A text in the language in use, looked up by its key.
+
+    Parameters
+    ----------
+    key : under which the catalogue has it
+    english : returned where the catalogue has none
+    count : chooses between singular and plural; None for texts without
+    """
     catalogue = _catalogue
     found = catalogue.pgettext(KEYED, key) if count is None else catalogue.npgettext(KEYED, key, key, count)
     return english if found == key else found

@@ -93,14 +93,33 @@ class CheckedFile:
         return worst_of((self.check.level, "caution" if self.missed else "pass"))
 
     def lacks(self, required: Iterable[str]) -> list[str]:
-        """Checks of those required that were not made."""
+        """Checks of those required that were not made.
+
+        Parameters
+        ----------
+        required : names of checks, such as ``scene``
+
+        Returns
+        -------
+        names : in the same order; none of a program that can't be read
+        """
         return [] if self.check is None else [each for each in required if each not in self.check.checked]
 
 
 def checked_file(
     file: Path, robot: Robot, options: CheckOptions, doubts: Sequence[DoubtfulUnit] = (), seconds: float = DAY_S
 ) -> CheckedFile:
-    """Read a program, in limited time, and check it; ``doubts``: about the units of what it is checked by."""
+    """Read a program, in limited time, and check it.
+
+    Parameters
+    ----------
+    doubts : about the units of what it is checked by, such as the robot's file
+    seconds : that reading may take
+
+    Returns
+    -------
+    checked : with the error where the program can't be read, or is not read in time
+    """
     try:
         with noted_doubts() as own, time_limit(seconds):
             program = read_program(file)
@@ -132,7 +151,16 @@ def accepted(baseline: Path) -> frozenset[str]:
 
 
 def without(checked: CheckedFile, silenced: frozenset[str]) -> CheckedFile:
-    """A check without the findings that were accepted, by their fingerprints."""
+    """A check without the findings that were accepted.
+
+    Parameters
+    ----------
+    silenced : fingerprints, as :func:`accepted` reads them
+
+    Returns
+    -------
+    checked : with the level of the findings that are left
+    """
     if checked.check is None or not silenced:
         return checked
     prints = (each["partialFingerprints"][FINGERPRINT] for each in sarif_of([checked])["runs"][0]["results"])
@@ -226,7 +254,16 @@ def _where(place: Place) -> str:
 
 
 def shown(file: Path | None) -> str:
-    """A path as printed: from the folder that the command runs in, where it lies below it."""
+    """A path as it is printed.
+
+    Parameters
+    ----------
+    file : None for a program made in Python
+
+    Returns
+    -------
+    text : from the folder that the command runs in, where the file is below it; else as it was given
+    """
     if file is None:
         return "program"
     near = os.path.relpath(file)
@@ -234,7 +271,12 @@ def shown(file: Path | None) -> str:
 
 
 def scope_line(checked: CheckedFile) -> str:
-    """How many motions pass, for what they were checked, and what was not followed and not checked."""
+    """How many motions pass, for what they were checked, and what was not followed and not checked.
+
+    Returns
+    -------
+    line : one sentence with lines of the program; empty for a program that can't be read
+    """
     check = checked.check
     if check is None:
         return ""
@@ -264,7 +306,13 @@ def _named(check: Check, of: ProgramCheck) -> str:
 
 
 def cycle_line(checked: CheckedFile) -> str:
-    """The cycle time of a program."""
+    """The cycle time of a program, an estimate.
+
+    Returns
+    -------
+    line : s, with zones and, where that differs, with a stop at each target; waits for signals are only counted. Empty
+        for a program that can't be read.
+    """
     if checked.check is None:
         return ""
     cycle = checked.check.cycle
@@ -277,13 +325,31 @@ def cycle_line(checked: CheckedFile) -> str:
 
 
 def shapes_line(robot: Robot) -> str:
-    """On what shapes of the arm collisions rest; empty where a document gives them."""
+    """On what shapes of the arm collisions rest.
+
+    Parameters
+    ----------
+    robot : whose shapes may be assumed
+
+    Returns
+    -------
+    line : empty where a document gives them
+    """
     found = shapes_assumed(robot, CheckOptions.assumed_margin, {})
     return "" if found is None else say(found)
 
 
 def missed_line(missed: tuple[LeftOut, ...]) -> str:
-    """What was not examined of all motions; empty where nothing is missing."""
+    """What was not examined of all motions.
+
+    Parameters
+    ----------
+    missed : what no check of a program sees
+
+    Returns
+    -------
+    line : one sentence; empty where nothing is missing
+    """
     return say(NoPass(missed)) if missed else ""
 
 
@@ -299,7 +365,17 @@ def _line_ranges(lines: Iterable[int]) -> str:
 
 
 def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
-    """Everything that was found, as plain data."""
+    """Everything that was found, as plain data for other programs.
+
+    Parameters
+    ----------
+    checked : one for each file
+
+    Returns
+    -------
+    records : with verdicts of motions, findings, cycle time, and what was not checked; paths as URIs. A program that
+        can't be read has an ``error``.
+    """
     found: list[dict[str, Any]] = []
     for each in checked:
         if each.check is None:
@@ -348,7 +424,12 @@ def _finding_record(each: LocatedFinding) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """Plain data with None for numbers that JSON does not have."""
+    """Plain data with None for numbers that JSON does not have.
+
+    Parameters
+    ----------
+    value : dicts, lists and plain values; a NaN or infinite number is replaced
+    """
     if isinstance(value, dict):
         return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list):
@@ -368,7 +449,16 @@ FINGERPRINT = "primaryLocationLineHash"
 
 
 def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
-    """A SARIF log [1]_: paths relative to the folder that the command runs in, fingerprints that lines leave alone."""
+    """Findings as a SARIF log [1]_, which code hosts and editors read.
+
+    Parameters
+    ----------
+    checked : one for each file
+
+    Returns
+    -------
+    log : one run; paths relative to the folder that the command runs in. Fingerprints do not change with line numbers.
+    """
     results, rules = [], {}
     seen: dict[str, int] = {}
     for each in checked:

@@ -43,7 +43,12 @@ def shown_work(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def work_clock() -> float:
-    """Seconds of a clock that stops while kernels are compiled, as they are once on a machine."""
+    """A clock of the work itself: it stops while kernels are compiled, as they are once on a machine.
+
+    Returns
+    -------
+    t : s, from an arbitrary moment on; only differences mean anything
+    """
     from er3a.numerics.jit import compile_seconds  # numba only where work is timed: all commands load this file
 
     return time.monotonic() - compile_seconds()
@@ -55,7 +60,17 @@ class TimeOverError(Exception):
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise :class:`TimeOverError` in a block that goes on for longer; only in the main thread, and not on Windows."""
+    """Limit the time of a block.
+
+    Parameters
+    ----------
+    seconds : after which the block is interrupted, wherever it is
+
+    Raises
+    ------
+    TimeOverError
+        in the block, once the time is over; only in the main thread, and not on Windows
+    """
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return

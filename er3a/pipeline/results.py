@@ -76,15 +76,42 @@ class Verdict(Generic[FindingT]):
         return (self.finding, *unexamined, *missed, *((self.shapes,) if self.shapes else ()))
 
     def short_of(self, missed: tuple[LeftOut, ...]) -> Verdict[FindingT]:
-        """The verdict where something that may turn it was not examined: no pass, if there is anything."""
+        """The verdict where something that may turn it was not examined.
+
+        Parameters
+        ----------
+        missed : what was not examined
+
+        Returns
+        -------
+        verdict : a caution in place of a pass, if there is anything
+        """
         return self._lowered(bool(missed), missed=missed)
 
     def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
-        """The verdict where collisions of some pairs were not looked at: no pass, if there are any."""
+        """The verdict where collisions of some pairs were not looked at.
+
+        Parameters
+        ----------
+        unexamined : pairs of bodies
+
+        Returns
+        -------
+        verdict : a caution in place of a pass, if there are any
+        """
         return self._lowered(bool(unexamined), unexamined=unexamined)
 
     def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
-        """The verdict where shapes of the arm are assumed: no pass, if anything comes too near to them."""
+        """The verdict where shapes of the arm are assumed.
+
+        Parameters
+        ----------
+        shapes : with what comes too near to them; None where a document gives them
+
+        Returns
+        -------
+        verdict : a caution in place of a pass, if anything comes too near
+        """
         return self._lowered(bool(shapes and shapes.near), shapes=shapes)
 
     def _lowered(self, doubtful: bool, **beside: Any) -> Verdict[FindingT]:
@@ -364,7 +391,16 @@ def write_results(
 ) -> None:
     """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
 
-    ``read``: the inputs as they were before it was computed, as one may be edited meanwhile; by default as they are.
+    Parameters
+    ----------
+    read : the inputs as they were before it was computed, as one may be edited meanwhile; by default as they are
+
+    Raises
+    ------
+    ResultError
+        if what was written can't be read back
+    WriteError
+        if the disk is full or permission is missing
     """
     kind = AbsentResults if isinstance(results, AbsentResults) else type(results)
     for name, table in table_types(stage.module("model").RESULTS).items():
@@ -414,7 +450,16 @@ def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
 
 
 def is_computed(folder: Path) -> bool:
-    """Whether a folder holds a stage's results, be they that it could not be computed."""
+    """Whether a folder holds a stage's results.
+
+    Parameters
+    ----------
+    folder : such as ``results/er3_600/inverse``
+
+    Returns
+    -------
+    computed : True also for the result that the stage could not be computed
+    """
     return (folder / SUMMARY).is_file()
 
 
@@ -459,13 +504,36 @@ def _record(folder: Path) -> dict[str, Any]:
 
 
 def read_status(folder: Path) -> Status:
-    """The status of a stage's verdict; :class:`ResultError` as :func:`read_stage`."""
+    """The status of a stage's verdict, without its tables.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+
+    Raises
+    ------
+    ResultError
+        as :func:`read_stage`
+    """
     return _status(folder, _record(folder))
 
 
 def read_foundation(folder: Path) -> Foundation:
-    """What the validation stage's verdict is for the stages that rest on it; :class:`ResultError` as
-    :func:`read_stage`."""
+    """What the validation stage's verdict is for the stages that rest on it.
+
+    Parameters
+    ----------
+    folder : of the validation stage's results
+
+    Returns
+    -------
+    foundation : its status; ``unsettled`` for a caution about a table of which documents settle no part at all
+
+    Raises
+    ------
+    ResultError
+        as :func:`read_stage`
+    """
     record = _record(folder)
     parts = record["verdict"].get("params", {}).get("parts", ())
     unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
@@ -482,7 +550,22 @@ def _status(folder: Path, record: dict[str, Any]) -> Status:
 
 
 def read_verdict(folder: Path, stage: Stage) -> tuple[Verdict[Any], tuple[LeftOut, ...]]:
-    """A stage's verdict, and what it leaves out; :class:`ResultError` as :func:`read_stage`."""
+    """A stage's verdict, and what it leaves out.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+
+    Returns
+    -------
+    verdict : ``not_computed`` with the reason, if the stage could not be computed
+    left_out : what settings, inputs and limits leave out of it
+
+    Raises
+    ------
+    ResultError
+        as :func:`read_stage`
+    """
     record = _record(folder)
     if _status(folder, record) == "not_computed":
         return Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()
@@ -505,14 +588,33 @@ def check_results(folder: Path) -> None:
 
 
 def write_checksums(folder: Path) -> None:
-    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads."""
+    """Write the checksums of a stage's files, in the form that ``sha256sum --check`` reads.
+
+    Parameters
+    ----------
+    folder : whose files are listed by name; hidden ones are left out
+    """
     files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
     sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
     write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
 
 
 def checksums(folder: Path) -> dict[str, str]:
-    """The checksums that a stage wrote, by file name; :class:`ResultError` if they can't be read."""
+    """The checksums that a stage wrote.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+
+    Returns
+    -------
+    checksums : SHA-256 in hex, by file name
+
+    Raises
+    ------
+    ResultError
+        if the list is missing or damaged
+    """
     path = folder / CHECKSUMS
     try:
         lines = read_bytes(path).decode("ascii").removesuffix("\n").split("\n")
@@ -527,12 +629,36 @@ def _compare(path: Path, content: bytes, sums: dict[str, str]) -> None:
 
 
 def input_records(files: Iterable[Path]) -> tuple[Input, ...]:
-    """What provenance says of input files."""
+    """What provenance says of input files.
+
+    Parameters
+    ----------
+    files : that exist
+
+    Returns
+    -------
+    records : path from the project's root, checksum, and the grades of the values in the file
+    """
     return tuple(Input(shown_path(file), sha256(file), grades_in(file)) for file in files)
 
 
 def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[str, ...]:
-    """What a stage's results rest on otherwise than it is now: files by their content, the settings, the code."""
+    """What a stage's results rest on that is otherwise now.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+    study : as it is now
+
+    Returns
+    -------
+    names : paths of files with another content, ``THE_SETTINGS`` and ``THE_CODE``; none if the results are up to date
+
+    Raises
+    ------
+    ResultError
+        as :func:`read_stage`
+    """
     stored = _record(folder)["provenance"]
     then = {each["path"]: each["sha256"] for each in stored["inputs"]}
     now = {shown_path(file): sha256(file) for file in study.inputs(robot, stage) if file.is_file()}
@@ -546,13 +672,33 @@ def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[s
 
 
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
-    """What provenance says of the results of robots: their lists of checksums, and the checksum of each."""
+    """What provenance says of the results of robots that a page shows.
+
+    Parameters
+    ----------
+    results : the folder of all results
+    robots : names of those shown
+
+    Returns
+    -------
+    records : the list of checksums of each stage that is there, and the checksum of that list
+    """
     files = [results / robot / stage / CHECKSUMS for robot in robots for stage in STAGES]
     return tuple(Input(file.as_posix(), sha256(file), {}) for file in files if file.is_file())
 
 
 def summary_type(kind: type[Results[Any]]) -> type[Summary]:
-    """The summary of a stage's results."""
+    """The class of the summary of a stage's results.
+
+    Parameters
+    ----------
+    kind : the stage's class of results, which names its summary as a type argument
+
+    Raises
+    ------
+    TypeError
+        if it names none
+    """
     for base in kind.__orig_bases__:  # type: ignore[attr-defined]
         if get_origin(base) is Results:
             return get_args(base)[0]
@@ -560,7 +706,16 @@ def summary_type(kind: type[Results[Any]]) -> type[Summary]:
 
 
 def plain(value: Any) -> Any:
-    """Dataclasses, arrays and numpy's numbers as JSON has them."""
+    """A value as JSON has it.
+
+    Parameters
+    ----------
+    value : dataclasses, dicts, lists, arrays and numpy's numbers, however deep
+
+    Returns
+    -------
+    value : dicts, lists and plain values; a NaN stays
+    """
     if is_dataclass(value) and not isinstance(value, type):
         return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
     if isinstance(value, dict):
@@ -601,13 +756,28 @@ OVERALL = ("index.html", JUNIT)
 
 
 def write_checksum(path: Path) -> None:
-    """Write the checksum of a finished view beside it."""
+    """Write the checksum of a finished page or recording into a hidden file in its folder.
+
+    Parameters
+    ----------
+    path : of the page or recording
+    """
     checksum = sha256(path)
     write_atomically(checksum_file(path), lambda file: file.write_text(checksum, encoding="ascii"))
 
 
 def check_checksum(path: Path) -> None:
-    """Raise :class:`ResultError` if a view is not as it was written."""
+    """Check that a page or recording is as it was written.
+
+    Parameters
+    ----------
+    path : of the page or recording
+
+    Raises
+    ------
+    ResultError
+        if it was changed, or no checksum of it was kept
+    """
     try:
         kept = checksum_file(path).read_bytes()
     except OSError:
@@ -617,5 +787,14 @@ def check_checksum(path: Path) -> None:
 
 
 def checksum_file(path: Path) -> Path:
-    """Where a view's checksum is kept."""
+    """Where a page's or recording's checksum is kept.
+
+    Parameters
+    ----------
+    path : of the page or recording
+
+    Returns
+    -------
+    path : a hidden file in the same folder
+    """
     return path.with_name(f".{path.name}.sha256")

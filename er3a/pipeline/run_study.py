@@ -110,7 +110,16 @@ class RunLog(LogHandlerBase):
         self._killed: dict[str, int] = {}
 
     def emit(self, record: LogRecord) -> None:
-        """Show what a record says to a person, if anything."""
+        """Show what a record of Snakemake says to a person, if anything.
+
+        Parameters
+        ----------
+        record : of an event of the run, or a message
+
+        Notes
+        -----
+        A job that a signal killed gets a line in its own log, where reasons are looked for when the run has ended.
+        """
         event = getattr(record, "event", None)
         if event == LogEvent.RUN_INFO:
             self._left = record.__dict__["stats"]["total"]
@@ -240,6 +249,13 @@ _BODY = re.compile(rb"<html lang=\"(\w+).*?<body[^>]*>", re.DOTALL)
 def mark_pages(reports: Path, problem: str | None) -> None:
     """Say on each page that is there how the last run ended badly; without a problem, take that off again.
 
+    Parameters
+    ----------
+    reports : folder of all pages
+    problem : what went wrong; None after a good run
+
+    Notes
+    -----
     The pages' times and checksums stay: no page is made again for it.
     """
     for page in reports.rglob("*.html"):
@@ -305,9 +321,15 @@ def _of_er3a(study_file: Path, asked: Namespace) -> list[str]:
 
 
 def asked_stages(targets: Iterable[str] | None) -> list[str]:
-    """The stages that a run is asked for, and those that their pages show the verdict of; none where it may be all.
+    """The stages that a run is asked for, and those whose verdict their pages show.
 
-    A target names a stage, or a file of a stage such as ``reports/er3_600/inverse.html``.
+    Parameters
+    ----------
+    targets : each names a stage, or a file of a stage such as ``reports/er3_600/inverse.html``
+
+    Returns
+    -------
+    stages : in their order; none where it may be all of them
     """
     asked: list[str] = []
     for target in targets or ():
@@ -330,7 +352,17 @@ def _one_at_first() -> list[str]:
 
 
 def parsed(words: Sequence[str]) -> Namespace:
-    """What words request of Snakemake, such as ``-np`` or ``--dry-run``."""
+    """What a user's words request of Snakemake.
+
+    Parameters
+    ----------
+    words : options and targets, such as ``-np`` or ``--dry-run``
+
+    Raises
+    ------
+    RunError
+        for words that Snakemake does not know, or less than one core or job
+    """
     from snakemake.cli import get_argument_parser
     from snakemake.exceptions import CliException
 

@@ -164,19 +164,47 @@ class StudyBase(InputFile):
         return [*self.robots, *self.variants]
 
     def stages(self, name: str) -> tuple[str, ...]:
-        """The stages that a robot goes through."""
+        """The stages that a robot goes through, in their order.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        stages : those that its entry names, or all, as far as the study configures them for it
+        """
         variant = self.variants.get(name)
         named = self.robots[name].stages if variant is None else self.sweeps[variant.sweep].stages
         asked = STAGES if named is None else tuple(named)
         return tuple(stage for stage in asked if REGISTRY[stage].is_configured(self, name))
 
     def pages(self, name: str) -> tuple[str, ...]:
-        """The pages of a robot: its stages', and the teach panel of one that is no variant."""
+        """The pages of a robot.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        pages : those of its stages, and the teach panel of a robot that is no variant
+        """
         pages = tuple(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views)
         return pages if name in self.variants else (*pages, "teach")
 
     def entry(self, name: str) -> RobotEntry:
-        """The study's entry for a robot, for a variant that of its base; :class:`InputError` if it has none."""
+        """The study's entry for a robot, for a variant that of its base.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Raises
+        ------
+        InputError
+            if the study has no such robot; it lists those that it has
+        """
         base = self._base(name)
         if base not in self.robots:
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
@@ -187,7 +215,17 @@ class StudyBase(InputFile):
         return variant.base if variant else name
 
     def robot_file(self, name: str) -> Path:
-        """The file of a robot, or of a variant's base; :class:`InputError` naming the entry if there is none."""
+        """The file of a robot, or of a variant's base.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Raises
+        ------
+        InputError
+            naming the study's entry, if there is no such file
+        """
         base = self._base(name)
         try:
             return robot_path(self.entry(name).file or base)
@@ -195,13 +233,41 @@ class StudyBase(InputFile):
             raise InputError(error.file, error.field or f"robots.{base}", error.problem, error.remedy) from None
 
     def table(self, name: str) -> RobotFile:
-        """What the robot's file holds, with a variant's title and varied entry."""
+        """What the robot's file holds, with a variant's title and varied entry.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        content : mm and deg, as in the file
+
+        Raises
+        ------
+        InputError
+            if the file can't be used, or the varied entry is not in it
+        """
         content = read_robot(self.robot_file(name))
         variant = self.variants.get(name)
         return variant.table(content) if variant else content
 
     def robot(self, name: str) -> Robot:
-        """The robot with the study's base and tool."""
+        """The robot with the study's base and tool, which take precedence over those of its file.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        robot : m and rad, under this name
+
+        Raises
+        ------
+        InputError
+            naming file and field that can't be used
+        """
         entry, content = self.entry(name), self.table(name)
         self._doubt(name, "base", "tool")
         base, tool = entry.base or content.base, entry.tool or content.tool
@@ -210,7 +276,16 @@ class StudyBase(InputFile):
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
     def loads(self, name: str) -> list[LoadFields]:
-        """What hangs on the flange: the tool, then the payload, as far as the study says."""
+        """What hangs on the flange: the tool, then the payload, as far as the study says.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        loads : none, one or two; kg and mm, in the flange's frame
+        """
         entry = self.entry(name)
         self._doubt(name, "tool_load", "payload")
         return [load for load in (entry.tool_load, entry.payload) if load]
@@ -226,33 +301,88 @@ class StudyBase(InputFile):
             warnings.warn(each, stacklevel=4)
 
     def assumed_margin(self, name: str) -> float:
-        """The distance (m) from a robot's shapes within which nothing is settled if they are assumed; the study's, for
-        all of its robots alike."""
+        """The distance from a robot's shapes within which nothing is settled if they are assumed.
+
+        Parameters
+        ----------
+        name : of a robot or a variant; the margin is the same for all
+
+        Returns
+        -------
+        margin : m
+        """
         self.entry(name)
         return self.section(TrajectorySettings).assumed_margin_mm / 1000
 
     def references(self, name: str) -> list[str]:
-        """The reference sets that a robot's file names."""
+        """The reference sets that a robot's file names.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        names : of folders below ``data/manual_refs``
+        """
         return read_robot(self.robot_file(name)).references
 
     def other_tables(self, name: str) -> list[str]:
-        """Other robots of the study, with validation, that one of this robot's reference sets is about."""
+        """Other robots of the study, with validation, that one of this robot's reference sets is about.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        names : of robots; a set is about the robot of its own name
+        """
         others = [other for other in self.references(name) if other != name and other in self.robots]
         return [other for other in others if "validation" in self.stages(other)]
 
     def inputs(self, name: str, stage: str) -> list[Path]:
-        """The files that a stage, or the teach panel, reads for a robot."""
+        """The files that a stage, or the teach panel, reads for a robot.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+        stage : its name, or ``teach``
+
+        Returns
+        -------
+        files : the robot's file first, then shapes that it names, then those of the stage; they may be missing
+        """
         more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")
         robot = self.robot_file(name)
         return [robot, *shapes_named_in(robot), *more]
 
     def inputs_digest(self, name: str, stage: str) -> str:
-        """One checksum of the files that a stage reads for a robot, by their names and contents."""
+        """One checksum of the files that a stage reads for a robot, by their names and contents.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        digest : SHA-256 in hex; files that are missing do not count
+        """
         read = sorted((shown_path(file), sha256(file)) for file in self.inputs(name, stage) if file.is_file())
         return hashlib.sha256(repr(read).encode()).hexdigest()
 
     def section(self, kind: type[SettingsT]) -> SettingsT:
-        """The resolved settings of one kind, such as ``InverseSettings``."""
+        """The resolved settings of one kind, with a warning of units in them that are in doubt.
+
+        Parameters
+        ----------
+        kind : class of the settings, such as ``InverseSettings``
+
+        Raises
+        ------
+        KeyError
+            if no stage has such settings
+        """
         for stage in REGISTRY.values():
             for key, model in stage.settings.items():
                 if model is kind:
@@ -261,14 +391,33 @@ class StudyBase(InputFile):
         raise KeyError(kind.__name__)
 
     def computed_from(self, name: str, stage: str) -> dict[str, Any]:
-        """The resolved parts of the study that a stage's results depend on; plain data."""
+        """The resolved parts of the study that a stage's results depend on.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        settings : plain data, kept with the results and compared to see whether these are up to date
+        """
         found: dict[str, Any] = {}
         for key in REGISTRY[stage].settings:
             found |= self.settings(name, key)
         return found
 
     def settings(self, name: str, key: str) -> dict[str, Any]:
-        """What of the study concerns one of its keys, for a robot; of a key without settings seed and robot alone."""
+        """What of the study concerns one of its keys, for a robot.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+        key : of settings, such as ``trajectory``; of a key without settings seed and robot alone
+
+        Returns
+        -------
+        settings : plain data: seed, the robot's entry without its files, and the key's settings
+        """
         not_counted = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=not_counted, exclude_none=True)
         if variant := self.variants.get(name):
@@ -297,30 +446,84 @@ class StudyBase(InputFile):
         return translations_in(sorted(self._input_files()), self.report.language)
 
     def own_catalogues(self, language: LanguageCode) -> list[Path]:
-        """The catalogues of people's texts, beside the input files, that pages in a language show."""
+        """The catalogues of people's texts that pages in a language show.
+
+        Parameters
+        ----------
+        language : of the pages
+
+        Returns
+        -------
+        files : in the folders of the input files
+        """
         return catalogues_beside(self._input_files(), language)
 
     def _input_files(self) -> set[Path]:
         return {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
 
     def scenes(self, name: str, stage: str) -> list[Path]:
-        """The file of :meth:`scene`, and those of convex pieces that it names; empty in open space."""
+        """The file of :meth:`scene`, and those of convex pieces that it names.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+        stage : or another key of the study with a scene
+
+        Returns
+        -------
+        files : empty in open space
+        """
         scene = self.scene_file(name, stage)
         return [scene, *shapes_named_in(scene)] if scene else []
 
     def scene(self, name: str, stage: str) -> Scene | None:
-        """The solids that a robot may not touch in a stage; None in open space."""
+        """The solids that a robot may not touch in a stage.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+        stage : or another key of the study with a scene
+
+        Returns
+        -------
+        scene : m; None in open space
+
+        Raises
+        ------
+        InputError
+            naming file and field that can't be used
+        """
         file = self.scene_file(name, stage)
         return load_scene(file) if file else None
 
     def scene_file(self, name: str, stage: str) -> Path | None:
-        """The file of :meth:`scene`."""
+        """The file of :meth:`scene`: the robot's own, else the stage's.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+        stage : or another key of the study with a scene
+
+        Returns
+        -------
+        path : None in open space
+        """
         scene = self.entry(name).scene or getattr(self, stage).scene
         return Path(scene) if scene else None
 
 
 def shapes_named_in(path: Path) -> list[Path]:
-    """Files of shapes that a robot or scene file names; the file itself is checked elsewhere."""
+    """Files of shapes that a robot or scene file names.
+
+    Parameters
+    ----------
+    path : of the file, which is checked elsewhere
+
+    Returns
+    -------
+    files : pieces relative to the study's folder, STL files relative to the file; each once, none of a file that can't
+        be read
+    """
 
     def named(part: Any) -> Iterator[Path]:
         if isinstance(part, dict) and isinstance(part.get("pieces"), str):
@@ -353,7 +556,17 @@ else:
 
 
 def load_study(path: str | Path) -> Study:
-    """Read and check a study file; the files it names are checked by the stages that read them."""
+    """Read and check a study file; the files it names are checked by the stages that read them.
+
+    Returns
+    -------
+    study : it keeps what is in doubt about units, for those who rest on it
+
+    Raises
+    ------
+    InputError
+        naming the place in the file that can't be used
+    """
     with noted_doubts() as doubts:
         study = load(Study, path)
     study._file, study._doubts = Path(path), tuple(doubts)

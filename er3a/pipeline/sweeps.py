@@ -95,6 +95,15 @@ class Variant:
         """A robot's file with the variant's title and the varied joint entry (a varied tool is not part of it).
 
         Capsules that the file gives for its own link lengths don't fit others: a varied D-H entry leaves the default.
+
+        Returns
+        -------
+        content : mm and deg; the group's source says that the study varies it, and its grade is inferred
+
+        Raises
+        ------
+        InputError
+            if the file has no such group or joint, or refuses the value
         """
         entry, title = self.entry, f"{content.title[:1000]}, {self.title}"
         if entry.joint is None:
@@ -115,7 +124,17 @@ class Variant:
             raise self._refusal(f"{error.field}: {error.problem}", error.remedy) from None
 
     def tool(self, tool: Placement | None) -> Placement | None:
-        """The tool with the varied entry; a varied joint does not change it."""
+        """The tool with the varied entry; a varied joint does not change it.
+
+        Parameters
+        ----------
+        tool : mm and deg; None for none
+
+        Raises
+        ------
+        InputError
+            for a tool that is too far away
+        """
         entry = self.entry
         if entry.joint is not None:
             return tool
@@ -182,12 +201,30 @@ class Sweep(StrictModel):
         return np.linspace(self.first, self.to, self.steps).round(DECIMALS).tolist()
 
     def variants(self, name: str) -> Iterator[Variant]:
-        """The variants of the sweep of this name."""
+        """The variants of the sweep, one for each value.
+
+        Parameters
+        ----------
+        name : of the sweep in the study
+
+        Returns
+        -------
+        variants : named ROBOT-SWEEP-01 and so on, in the order of the values
+        """
         for number, value in enumerate(self.resolved, start=1):
             yield Variant(f"{self.robot}-{name}-{number:02d}", self.robot, name, self.vary, value)
 
 
 def entry_label(entry: VariedEntry) -> str:
-    """An entry in words, in the language in use."""
+    """An entry in words, in the language in use.
+
+    Parameters
+    ----------
+    entry : of a joint or of the tool
+
+    Returns
+    -------
+    label : such as ``J3 a`` or ``tool z``, without unit
+    """
     label = tr(entry.label)
     return tr("tool {axis}", axis=label) if entry.joint is None else f"J{entry.joint} {label}"

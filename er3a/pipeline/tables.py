@@ -77,8 +77,17 @@ class Column:
         return "{}" in self.pattern
 
     def names(self, width: int, slides: tuple[bool, ...] = ()) -> list[str]:
-        """Names in the file, of a group with so many columns; ``slides`` marks prismatic joints, whose values are
-        distances."""
+        """Names of the column in the file.
+
+        Parameters
+        ----------
+        width : how many columns a group has
+        slides : marks prismatic joints, whose values are distances
+
+        Returns
+        -------
+        names : one, or as many as the group has, such as ``q1_deg``, ``q2_deg``, ``q3_mm``
+        """
         if not self.is_group:
             return [self.pattern]
         if self.parts or not any(slides):
@@ -91,7 +100,16 @@ class Column:
         return self.pattern.replace("_deg", "_mm")
 
     def found_in(self, names: Iterable[str]) -> list[str]:
-        """Those names of a file that belong to this column, in order."""
+        """Those names of a file that belong to this column.
+
+        Parameters
+        ----------
+        names : of all columns of the file
+
+        Returns
+        -------
+        names : in order of their numbers, with deg or mm for a group of joints; none if the file lacks the column
+        """
         present = set(names)
         if not self.is_group or self.parts:
             return [name for name in self.names(0) if name in present]
@@ -102,27 +120,62 @@ class Column:
 
 
 def column(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -> Any:
-    """A column (rows,); ``name`` in the file is the attribute's where it is left out."""
+    """Declare a column of one value per row.
+
+    Parameters
+    ----------
+    meaning : for the dictionary of results
+    unit : where the name's ending does not say it
+    name : in the file; by default the attribute's
+    heading : at an axis of a figure; by default the meaning
+    """
     return _declared(name, meaning, unit, heading=heading)
 
 
 def findings(meaning: str, kind: Any) -> Any:
-    """A column (rows,) of findings, or None; ``kind`` says which ones they can be."""
+    """Declare a column of findings, or None, which is kept as JSON texts.
+
+    Parameters
+    ----------
+    meaning : for the dictionary of results
+    kind : union of the classes of findings that it can hold
+    """
     return _declared("", meaning, kind=kind)
 
 
 def per_joint(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -> Any:
-    """One column for each joint, (rows, n): ``q_deg`` is written as ``q1_deg ... qn_deg``."""
+    """Declare one column for each joint, (rows, n): ``q_deg`` is written as ``q1_deg ... qn_deg``.
+
+    Parameters
+    ----------
+    meaning : for the dictionary of results
+    unit : where the name's ending does not say it
+    name : in the file, if it is not the attribute's
+    heading : at an axis of a figure; by default the meaning
+    """
     return _declared(_numbered(name) if name else PER_JOINT, meaning, unit, heading=heading)
 
 
 def vector(pattern: str, meaning: str, unit: str = "", *, parts: Iterable[str] = "xyz") -> Any:
-    """Columns that belong together, (rows, len(parts)): ``"{}_mm"`` is written as ``x_mm, y_mm, z_mm``."""
+    """Declare columns that belong together, (rows, len(parts)).
+
+    Parameters
+    ----------
+    pattern : of the names in the file; ``"{}_mm"`` is written as ``x_mm, y_mm, z_mm``
+    meaning : for the dictionary of results
+    parts : what replaces ``{}``
+    """
     return _declared(pattern, meaning, unit, parts=tuple(parts))
 
 
 def lists(meaning: str, unit: str = "") -> Any:
-    """A column (rows,) with a list of real numbers in each row."""
+    """Declare a column with a list of real numbers in each row.
+
+    Parameters
+    ----------
+    meaning : for the dictionary of results
+    unit : of the numbers, where the name's ending does not say it
+    """
     return _declared("", meaning, unit, lists=True)
 
 
@@ -177,8 +230,16 @@ class Table(ByValue):
             object.__setattr__(self, name, array)
 
     def of_joints(self, slides: Iterable[bool]) -> Self:
-        """The same table, of an arm whose joints are prismatic where ``slides`` (n,); one without rows gets n
-        columns."""
+        """The same table, of an arm some of whose joints are prismatic.
+
+        Parameters
+        ----------
+        slides : (n,), whether each joint slides; its columns are then named and written in mm
+
+        Returns
+        -------
+        table : one without rows gets n columns per joint group
+        """
         flags = tuple(bool(each) for each in slides)
         groups = {name for name, spec in self.columns().items() if spec.is_group and not spec.parts}
         if len(self) or not groups:
@@ -212,7 +273,16 @@ class Table(ByValue):
 
     @classmethod
     def stacked(cls, tables: Iterable[Self]) -> Self:
-        """The rows of several tables, one after another."""
+        """The rows of several tables, one after another.
+
+        Parameters
+        ----------
+        tables : with equally many joints
+
+        Returns
+        -------
+        table : without rows if there are none; which joints slide is not taken over (:meth:`of_joints`)
+        """
         parts = list(tables)
         if not parts:
             return cls.empty()
@@ -225,7 +295,16 @@ class Table(ByValue):
 
     @classmethod
     def of_rows(cls, rows: Iterable[tuple[Any, ...]]) -> Self:
-        """A table from rows in the order of the attributes."""
+        """A table from rows.
+
+        Parameters
+        ----------
+        rows : each with the values in the order of the attributes
+
+        Returns
+        -------
+        table : without rows if there are none
+        """
         listed = list(rows)
         return cls(**dict(zip(cls.columns(), zip(*listed)))) if listed else cls.empty()
 
@@ -233,7 +312,16 @@ class Table(ByValue):
         return len(getattr(self, fields(self)[0].name))
 
     def take(self, rows: NDArray[Any]) -> Self:
-        """The chosen rows: a mask (rows,) or row numbers."""
+        """Some rows of the table.
+
+        Parameters
+        ----------
+        rows : a mask (rows,), or row numbers
+
+        Returns
+        -------
+        table : of the same arm
+        """
         taken = type(self)(**{name: getattr(self, name)[rows] for name in self.columns()})
         if self.slides:
             object.__setattr__(taken, "slides", self.slides)
@@ -264,7 +352,12 @@ class Table(ByValue):
                 yield part_name, _coded(part) if spec.kind else part, spec
 
     def write(self, file: Path) -> None:
-        """Write a Parquet file; equal tables give equal bytes."""
+        """Write a Parquet file, with unit and meaning of each column; equal tables give equal bytes.
+
+        Parameters
+        ----------
+        file : which is replaced
+        """
         schema, arrays = [], []
         for name, values, spec in self._flat():
             schema.append(pa.field(name, spec.arrow_type, metadata=self._described(name, spec)))
@@ -273,7 +366,17 @@ class Table(ByValue):
 
     @classmethod
     def read(cls, content: bytes) -> Self:
-        """Read what :meth:`write` wrote; ``KeyError`` naming a column that is missing."""
+        """Read what :meth:`write` wrote.
+
+        Parameters
+        ----------
+        content : of a Parquet file; columns that the table does not declare are passed over
+
+        Raises
+        ------
+        KeyError
+            naming a column that is missing
+        """
         stored = pq.ParquetFile(pa.BufferReader(content)).read()
         arrays: dict[str, Any] = {}
         slides: tuple[bool, ...] = ()
@@ -353,11 +456,29 @@ def _decoded(kind: Any, text: str | None) -> Any:
 
 @cache
 def adapter(kind: Any) -> TypeAdapter[Any]:
-    """What checks and reads values of a type, made once."""
+    """What checks and reads values of a type, made once.
+
+    Parameters
+    ----------
+    kind : a type, or a union of types, that pydantic knows
+
+    Returns
+    -------
+    adapter : the same object for the same type
+    """
     return TypeAdapter(kind)
 
 
 def table_types(results: type) -> dict[str, type[Table]]:
-    """The tables of a stage's results, by attribute, which is the name of their file."""
+    """The tables of a stage's results.
+
+    Parameters
+    ----------
+    results : the stage's class of results
+
+    Returns
+    -------
+    types : by attribute, which is the name of their file
+    """
     hints = get_type_hints(results)
     return {name: hint for name, hint in hints.items() if isinstance(hint, type) and issubclass(hint, Table)}

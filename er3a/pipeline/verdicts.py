@@ -139,7 +139,13 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
 
 
 def write_junit_error(problem: str, output: Path) -> None:
-    """Write a report of a run that did not end well: one case, an error, in place of all verdicts."""
+    """Write a JUnit report of a run that did not end well: one case, an error, in place of all verdicts.
+
+    Parameters
+    ----------
+    problem : what went wrong; letters that XML does not have are replaced
+    output : file, which is replaced
+    """
     counts = {"tests": "1", "failures": "0", "errors": "1"}
     root = ElementTree.Element("testsuites", {"name": "er3a"} | counts)
     suite = ElementTree.SubElement(root, "testsuite", {"name": "er3a", "skipped": "0"} | counts)
