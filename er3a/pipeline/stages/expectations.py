@@ -45,34 +45,77 @@ class Judged(Protocol):
     """
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """By which its file calls it."""
+        ...
 
     @property
-    def expect(self) -> Outcome | tuple[Outcome, ...] | None: ...
+    def expect(self) -> Outcome | tuple[Outcome, ...] | None:
+        """What its file says that it is to come to; None or empty where nothing is said."""
+        ...
 
     @property
-    def outcome(self) -> Outcome: ...
+    def outcome(self) -> Outcome:
+        """What it came to, of several outcomes the gravest."""
+        ...
 
 
 def came_to(judged: Judged) -> tuple[Outcome, ...]:
-    """All that one came to, the first first."""
+    """All that one came to.
+
+    Parameters
+    ----------
+    judged : of kinds with a single outcome, that one
+
+    Returns
+    -------
+    outcomes : the first first
+    """
     found: tuple[Outcome, ...] = getattr(judged, "outcomes", (judged.outcome,))
     return found
 
 
 def expected_of(judged: Judged) -> tuple[Outcome, ...]:
-    """All that one is said to come to; empty where its file says nothing."""
+    """All that one is said to come to.
+
+    Parameters
+    ----------
+    judged : with one expectation, several or none
+
+    Returns
+    -------
+    outcomes : empty where its file says nothing
+    """
     expect = judged.expect
     return expect if isinstance(expect, tuple) else () if expect is None else (expect,)
 
 
 def is_met(judged: Judged) -> bool:
-    """Whether one came to what its file expects, to nothing less and to nothing more."""
+    """Whether one came to what its file expects, to nothing less and to nothing more.
+
+    Parameters
+    ----------
+    judged : one without expectation has no outcome to meet, so it is not met
+
+    Returns
+    -------
+    met : the order of outcomes does not count
+    """
     return set(expected_of(judged)) == set(came_to(judged))
 
 
 def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -> ExpectationsUnmet | None:
-    """The expectations that are not met, with what else is not ``sound``; None if all are met."""
+    """The expectations that are not met.
+
+    Parameters
+    ----------
+    judged : all of a stage
+    sound : the outcome that is no fault; others without expectation are named too. None names none of these.
+
+    Returns
+    -------
+    finding : None if all expectations are met
+    """
     all_judged = list(judged)
     expected = [each for each in all_judged if expected_of(each)]
     unmet = tuple(
@@ -84,10 +127,29 @@ def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -
 
 
 def pass_of(asked: Collection[Judged]) -> Status:
-    """What a stage comes to whose ``asked`` are all sound: no pass where there are demonstrations alone."""
+    """The status of a stage that found no fault in what is to be sound.
+
+    Parameters
+    ----------
+    asked : what is to be sound
+
+    Returns
+    -------
+    status : ``no_reference`` where there are demonstrations alone
+    """
     return "pass" if asked else "no_reference"
 
 
 def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:
-    """What fails as it is meant to; ``sound``: what counts as no failure."""
+    """What fails as it is meant to.
+
+    Parameters
+    ----------
+    judged : all of a stage
+    sound : the outcome that counts as no failure
+
+    Returns
+    -------
+    found : with all that each came to
+    """
     return tuple(Demonstration(each.name, came_to(each)) for each in judged if is_met(each) and each.outcome != sound)

@@ -78,7 +78,16 @@ def left_out_of_collisions(
 
 
 def guessed_pairs(bodies: Iterable[Bodies]) -> tuple[str, ...]:
-    """Pairs of links of which guessed shapes show nothing, of an arm or with any of its tools."""
+    """Pairs of links of which guessed shapes show nothing.
+
+    Parameters
+    ----------
+    bodies : of an arm, or of it with each of its tools
+
+    Returns
+    -------
+    pairs : as text, each once
+    """
     return tuple(dict.fromkeys(pair.label for each in bodies for pair in each.guessed))
 
 
@@ -86,7 +95,16 @@ NAMED_DOUBTS = 20
 
 
 def left_out_of_units(doubts: Sequence[DoubtfulUnit]) -> tuple[LeftOut, ...]:
-    """Numbers of input files whose unit is in doubt, each with its file and place; of many how many more."""
+    """Numbers of input files whose unit is in doubt.
+
+    Parameters
+    ----------
+    doubts : as they were noted while files were read
+
+    Returns
+    -------
+    left_out : one entry that names ``NAMED_DOUBTS`` places at most, and how many more there are; none without doubts
+    """
     files = [shown_path(Path(each.file)) if each.file else "" for each in doubts]
     places = [": ".join(filter(None, (file, each.key, each.shown))) for file, each in zip(files, doubts)]
     rest = len(places) - NAMED_DOUBTS
@@ -95,7 +113,16 @@ def left_out_of_units(doubts: Sequence[DoubtfulUnit]) -> tuple[LeftOut, ...]:
 
 
 def left_out_of_limits(robot: Robot) -> tuple[LeftOut, ...]:
-    """That limits of joints are assumed, with what the robot's file says of them."""
+    """That limits of joints are assumed.
+
+    Parameters
+    ----------
+    robot : whose file grades its limits
+
+    Returns
+    -------
+    left_out : with what the file says of their source; none for limits of a better grade than inferred
+    """
     found = robot.sources.get("limits")
     return (LeftOut("own_limits", (found.source,)),) if found and found.grade == "inferred" else ()
 
@@ -104,14 +131,32 @@ OWN_VALUES = ("dh", "zero", "speeds", "coupling", "base", "flange", "tool")
 
 
 def left_out_of_values(robot: Robot, replaced: Collection[str]) -> tuple[LeftOut, ...]:
-    """Other groups of the robot's file that are assumed, without those that the study has ``replaced``."""
+    """Groups of the robot's file, other than limits, that are assumed.
+
+    Parameters
+    ----------
+    replaced : groups that the study gives values of its own
+
+    Returns
+    -------
+    left_out : one entry with their names; none if nothing is assumed
+    """
     assumed = [group for group in OWN_VALUES if group in robot.sources and robot.sources[group].grade == "inferred"]
     names = tuple(group for group in assumed if group not in replaced)
     return (LeftOut("own_values", names),) if names else ()
 
 
 def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, float]]) -> tuple[LeftOut, ...]:
-    """Places, by name, whose point (3,), m, of the world is in a solid, and deeper than it may be sunk, m."""
+    """Places of the tool that are inside a solid of the scene, where no check of the arm looks.
+
+    Parameters
+    ----------
+    places : name, point (3,) in m in the world frame, and how deep it may be sunk, m
+
+    Returns
+    -------
+    left_out : one entry with place and solid for each; none in open space
+    """
     found = [
         f"{name}: {solid.name}"
         for name, point, sunk in places
@@ -122,7 +167,16 @@ def left_out_in_solids(scene: Scene | None, places: Iterable[tuple[str, Reals, f
 
 
 def left_out_without_tool(robot: Robot) -> tuple[LeftOut, ...]:
-    """That the flange's centre stands for a tool's tip, if the robot's file gives no tool."""
+    """That the flange's centre was taken for a tool's tip.
+
+    Parameters
+    ----------
+    robot : with the tool that the study gives it
+
+    Returns
+    -------
+    left_out : none if the file, or the study, gives a tool
+    """
     return () if "tool" in robot.sources or not np.array_equal(robot.tool, np.eye(4)) else (LeftOut("tool"),)
 
 
@@ -130,9 +184,17 @@ ORIENTATION_OFF_DEG = 0.1  # of what an arm of few joints can't set; poses with 
 
 
 def left_out_of_orientations(robot: Robot, asked: Iterable[tuple[str, Reals, Reals]]) -> tuple[LeftOut, ...]:
-    """Targets and paths, by name, whose poses (..., 4, 4) the joints (..., n) keep but for how the tool is turned.
+    """Targets and paths whose poses the joints keep but for how the tool is turned.
 
     An arm of few joints sets only part of it.
+
+    Parameters
+    ----------
+    asked : name, the poses (..., 4, 4) asked for, and joints (..., n), rad or m; rows of NaN do not count
+
+    Returns
+    -------
+    left_out : one entry with the names, and the largest turn in deg; none below ``ORIENTATION_OFF_DEG``
     """
     angles = {name: np.degrees(rotation_angle(forward(robot, q)[..., :3, :3], T[..., :3, :3])) for name, T, q in asked}
     off = {name: float(np.nanmax(each)) for name, each in angles.items() if np.nanmax(each) > ORIENTATION_OFF_DEG}
@@ -140,7 +202,18 @@ def left_out_of_orientations(robot: Robot, asked: Iterable[tuple[str, Reals, Rea
 
 
 def left_out_of_rates(speed_known: Flags, acceleration: bool, jerk: bool) -> tuple[LeftOut, ...]:
-    """What is not known of joints: speeds that no document gives (n,), accelerations, and jerk without bound."""
+    """What is not known of the joints' rates.
+
+    Parameters
+    ----------
+    speed_known : (n,), whether a document gives the joint's speed
+    acceleration : whether accelerations are given
+    jerk : whether jerk is bounded
+
+    Returns
+    -------
+    left_out : one entry for each that is missing, speeds with their joints
+    """
     assumed = tuple(f"J{joint}" for joint in (np.flatnonzero(~speed_known) + 1).tolist())
     speeds = (LeftOut("own_speeds", assumed),) if assumed else ()
     accelerations = () if acceleration else (LeftOut("own_accelerations"),)
@@ -148,8 +221,16 @@ def left_out_of_rates(speed_known: Flags, acceleration: bool, jerk: bool) -> tup
 
 
 def missed_of_program(robot: Robot, scene: Scene | None, arms: Iterable[tuple[str, Robot]] = ()) -> tuple[LeftOut, ...]:
-    """What is not examined of any motion of a program without which none passes; ``arms`` with the tools that it sets:
-    for its row in a study, and for ``er3a check-program``."""
+    """What is not examined of any motion of a program, so that none passes.
+
+    Parameters
+    ----------
+    arms : the tools that the program sets, each as the robot with that tool
+
+    Returns
+    -------
+    left_out : for its row in a study, and for ``er3a check-program``
+    """
     found = left_out_of_collisions(robot, bodies_of(robot, scene), scene, arms=arms)
     return (*(each for each in found if each.subject in NEVER_A_PASS), *left_out_of_limits(robot))
 

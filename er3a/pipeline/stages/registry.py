@@ -18,5 +18,10 @@ STAGES: dict[str, Stage] = {
 
 
 def all_messages() -> list[str]:
-    """The modules with the sentences of all stages, for pages that show more than one."""
+    """The modules with the sentences of all stages, for pages that show more than one.
+
+    Returns
+    -------
+    modules : full names, to be imported so that findings have texts
+    """
     return [stage.messages for stage in STAGES.values()]

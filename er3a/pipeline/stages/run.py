@@ -105,7 +105,19 @@ def _computed(stage: Stage, study: Study, robot: str) -> Results[Any]:
 
 
 def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> None:
-    """Write a view of a stage's results: ``record`` or ``report``."""
+    """Write a page or recording of a stage's results.
+
+    Parameters
+    ----------
+    verb : ``record`` or ``report``
+    folder : of the stage's results
+    output : file, written whole or not at all
+
+    Raises
+    ------
+    ResultError
+        if the results are missing, damaged or of another version
+    """
     stage = STAGES[name]
     import_module(stage.messages)
     stored = read_stage(folder, stage)

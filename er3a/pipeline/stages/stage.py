@@ -19,22 +19,44 @@ class RobotFiles(Protocol):
     """The files that a study names for a robot."""
 
     @property
-    def targets(self) -> str: ...
+    def targets(self) -> str:
+        """Path of the file of targets."""
+        ...
+
     @property
-    def paths(self) -> str: ...
+    def paths(self) -> str:
+        """Path of the path file."""
+        ...
+
     @property
-    def programs(self) -> str | None: ...
+    def programs(self) -> str | None:
+        """Path of the file that lists robot programs; None where there are none."""
+        ...
+
     @property
-    def vision(self) -> str | None: ...
+    def vision(self) -> str | None:
+        """Path of the file of what the camera sees; None without a camera."""
+        ...
 
 
 class StudyFiles(Protocol):
     """What a stage asks of a study to name its inputs; :class:`er3a.pipeline.study.StudyBase` says what each gives."""
 
-    def entry(self, name: str) -> RobotFiles: ...
-    def references(self, name: str) -> list[str]: ...
-    def scenes(self, name: str, stage: str) -> list[Path]: ...
-    def loads(self, name: str) -> list[LoadFields]: ...
+    def entry(self, name: str) -> RobotFiles:
+        """The study's entry for a robot."""
+        ...
+
+    def references(self, name: str) -> list[str]:
+        """Names of the reference sets of a robot."""
+        ...
+
+    def scenes(self, name: str, stage: str) -> list[Path]:
+        """Files of the scene of a robot in a stage; empty in open space."""
+        ...
+
+    def loads(self, name: str) -> list[LoadFields]:
+        """What hangs on a robot's flange, as far as the study says."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -80,7 +102,12 @@ class Stage:
     may_run: bool = False
 
     def module(self, name: str) -> Any:
-        """A module of the stage's folder, imported when it is needed."""
+        """A module of the stage's folder, imported when it is needed.
+
+        Parameters
+        ----------
+        name : such as ``compute`` or ``page.report``
+        """
         return import_module(f"{self.package}.{name}")
 
     @property
@@ -100,6 +127,15 @@ class Stage:
 
 
 def program_files(path: Path) -> tuple[Path, ...]:
-    """A program's file and those that belong to it; by name, as all pages import the stages, and few read programs."""
+    """A program's file and those that belong to it.
+
+    Parameters
+    ----------
+    path : of the program
+
+    Notes
+    -----
+    The module is imported by its name here, as all pages import the stages, and few read programs.
+    """
     files: tuple[Path, ...] = import_module("er3a.programs.languages").files_of(path)
     return files

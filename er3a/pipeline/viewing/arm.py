@@ -39,7 +39,12 @@ Shape = rr.Boxes3D | rr.Cylinders3D | rr.Ellipsoids3D | rr.Capsules3D | rr.Mesh3
 
 
 def seconds(times: Reals) -> rr.TimeColumn:
-    """A time column (s) for ``send_columns``."""
+    """A time column of a recording, for ``send_columns``.
+
+    Parameters
+    ----------
+    times : (N,), s on the recording's timeline
+    """
     return rr.TimeColumn(TIMELINE, duration=np.asarray(times, dtype=float))
 
 
@@ -122,7 +127,15 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
 def send_motion(
     stream: rr.RecordingStream, robot: Robot, times: np.ndarray, q: np.ndarray, entity: str = "arm"
 ) -> None:
-    """Animate the arm: times (N,) in s, joint angles (N, 6) in rad without NaN."""
+    """Animate the arm in a recording.
+
+    Parameters
+    ----------
+    stream : of the recording, into which the arm's shapes have been logged
+    times : (N,), s on the recording's timeline
+    q : (N, n), rad or m, without NaN
+    entity : below which the arm's links are
+    """
     poses = frames(robot, q)
     for k, path in enumerate(_moving_entities(robot, entity)):
         T = poses[:, k]
@@ -173,7 +186,15 @@ def _log_segments(
 def capsules(
     starts: np.ndarray, vectors: np.ndarray, radius: float, colour: tuple[int, ...], solid: bool
 ) -> rr.Capsules3D:
-    """Rods with round ends from starts (n, 3) along vectors (n, 3), none of them zero, all in m."""
+    """Rods with round ends.
+
+    Parameters
+    ----------
+    starts, vectors : (n, 3), m; no vector is zero
+    radius : m
+    colour : red, green, blue and perhaps alpha, 0 to 255
+    solid : whether they are filled, or seen through
+    """
     lengths = np.linalg.norm(vectors, axis=1)
     x, y, z = (vectors / lengths[:, None]).T
     # The shortest turn from z to the vector; straight down it is half a turn about x.
@@ -190,7 +211,14 @@ def capsules(
 
 
 def body_shape(body: Body, colour: tuple[int, ...], solid: bool = False) -> Shape:
-    """A body of an arm, as a child of its link; ``colour`` with alpha."""
+    """A body of an arm, as it is measured for collisions, in the frame of its link.
+
+    Parameters
+    ----------
+    body : a surface of triangles, a ball, a rod, or a convex hull; m
+    colour : red, green, blue and alpha, 0 to 255
+    solid : whether a rod is filled, or seen through
+    """
     if body.tree is not None:
         corners = body.tree.corner.reshape(-1, 3)
         return _mesh(corners, np.arange(len(corners)).reshape(-1, 3), colour)
@@ -204,7 +232,18 @@ def body_shape(body: Body, colour: tuple[int, ...], solid: bool = False) -> Shap
 def solid_shapes(
     solids: Sequence[Solid], robot: Robot, colour: tuple[int, ...], solid: bool = False
 ) -> Iterator[tuple[str, rr.Transform3D, Shape]]:
-    """Name, place and shape of solids; of planes a square near the base."""
+    """Shapes of the solids of a scene.
+
+    Parameters
+    ----------
+    robot : whose size and base decide how much of a plane is shown
+    colour : red, green, blue and alpha, 0 to 255
+    solid : whether they are filled, or seen through
+
+    Yields
+    ------
+    name, place, shape : one for each solid, in the world frame, m; a plane is a square near the base
+    """
     fill: Any = "solid" if solid else "transparentfillmajorwireframe"
     style: dict[str, Any] = {"colors": [colour], "fill_mode": fill}
     size = 3 * size_of(robot)
@@ -226,7 +265,13 @@ def solid_shapes(
 
 
 def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
-    """Convex pieces (k, 3) each, m, as one mesh."""
+    """Convex pieces as one mesh.
+
+    Parameters
+    ----------
+    pieces : corners (k, 3) of each, m
+    colour : red, green, blue and perhaps alpha, 0 to 255
+    """
     starts = np.cumsum([0, *(len(piece) for piece in pieces)])
     triangles = [start + hull_faces(piece) for start, piece in zip(starts, pieces)]
     return _mesh(np.concatenate(pieces), np.concatenate(triangles), colour)

@@ -64,7 +64,16 @@ class MeasuredErrors:
     lines: Sequence[int]
 
     def distances_mm(self, model: str) -> Reals:
-        """Over what was measured, (P,)."""
+        """How far a model is off at each measured position.
+
+        Parameters
+        ----------
+        model : ``before``, ``table`` or ``model``
+
+        Returns
+        -------
+        distances : (P,), mm; coordinates that were not measured do not count
+        """
         found: Reals = np.sqrt(np.nansum(self.differences_mm[model] ** 2, axis=1))
         return found
 
@@ -75,7 +84,18 @@ class MeasuredErrors:
 
 
 def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Calibration) -> MeasuredErrors:
-    """Differences by the table before, the corrected one, and the model with terms if there are any."""
+    """Differences between measured positions and models of the arm, before and after a calibration.
+
+    Parameters
+    ----------
+    robot : with the table before
+    measurements : positions from which the calibration was made
+    found : the calibration
+
+    Returns
+    -------
+    errors : mm, by the table before, the corrected one, and the model with terms if there are any; joints in deg or mm
+    """
     seen = observed(measurements, robot)
     assert isinstance(seen, PointObservations)
     nothing = found.without_terms()

@@ -34,8 +34,16 @@ def write_comparison(
     tolerances: tuple[float, float],
     doubts: Sequence[str] = (),
 ) -> None:
-    """Render a comparison as a page; ``one`` and ``other``: as they were named on the command line, and read;
-    ``doubts``: about units in them."""
+    """Write the page of a comparison of two arms.
+
+    Parameters
+    ----------
+    one, other : as they were named on the command line, and read
+    found : their comparison
+    output : the page, written whole or not at all
+    tolerances : mm and deg, with which they were compared
+    doubts : about units in them, in words
+    """
     corrected = found.corrected
     slips = found.units.causes if found.units else ()
     text = "" if corrected is None else robot_text(robot_file(corrected))

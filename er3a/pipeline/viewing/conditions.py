@@ -20,16 +20,38 @@ WARNED_OF: frozenset[LeftOutSubject] = NEVER_A_PASS | {
 
 
 def condition_of(validated: Path | None) -> str:
-    """What of a table has to be confirmed before anything is run on the arm, by validation's results in a folder, if
-    there are any; empty where all of it is."""
+    """What of a table has to be confirmed before anything is run on the arm.
+
+    Parameters
+    ----------
+    validated : folder of the validation stage's results; None where there are none
+
+    Returns
+    -------
+    text : empty where documents settle all of the table that has to be settled
+
+    Raises
+    ------
+    ResultError
+        if the results are damaged or of another version
+    """
     summary = read_stage(validated, STAGES["validation"]).results.summary if validated else None
     evidence, finding = getattr(summary, "evidence", None), summary and summary.verdict.finding
     return condition(evidence.parts if evidence else (), getattr(finding, "unbounded", ()))
 
 
 def program_head(validated: Path | None, not_examined: Iterable[LeftOut] = ()) -> list[str]:
-    """What a robot program begins with, in English: what has to be confirmed, as :func:`condition_of` says it, and what
-    was not checked."""
+    """What a robot program begins with, in English.
+
+    Parameters
+    ----------
+    validated : folder of the validation stage's results; None where there are none
+    not_examined : what the checks of the motion leave out
+
+    Returns
+    -------
+    lines : what has to be confirmed, as :func:`condition_of` says it, and what was not checked (``WARNED_OF``)
+    """
     with language.using("en"):
         missed = [f"not checked: {left_out_text(each)}" for each in not_examined if each.subject in WARNED_OF]
         return [line for line in (condition_of(validated), *missed) if line]

@@ -42,7 +42,12 @@ NUMBER = re.compile(r"[-−]?[\d.]*(e\d+)?")
 
 
 def name_parts(figure: Figure) -> None:
-    """Name the curves of a figure that is about to be drawn, so that they can be found in the drawing."""
+    """Name the curves of a figure that is about to be drawn, so that the page's script can find them in the drawing.
+
+    Parameters
+    ----------
+    figure : whose lines get an id ``curve-AXES-NUMBER``
+    """
     for i, ax in enumerate(figure.axes):
         for k, line in enumerate(_curves(ax)):
             line.set_gid(f"curve-{i}-{k}")
@@ -204,6 +209,10 @@ def house_style() -> Iterator[None]:
     """The look of all figures of the pages, in the language of the pages, for what is drawn within it.
 
     A ``matplotlibrc`` counts for nothing: one in the study's folder could have LaTeX write the texts.
+
+    Yields
+    ------
+    nothing : at the end the settings of before are back
     """
     chinese = []
     if language.current() == "zh":
@@ -216,7 +225,18 @@ def house_style() -> Iterator[None]:
 
 
 def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: float = 4.5, **subplots):
-    """A figure and its axes (as ``Figure.subplots`` returns them); sizes in inches."""
+    """A figure and its axes.
+
+    Parameters
+    ----------
+    rows, columns : of axes
+    width, height : in inches
+    subplots : further arguments of ``Figure.subplots``
+
+    Returns
+    -------
+    figure, axes : the latter as ``Figure.subplots`` returns them: one, or an array of them
+    """
     figure = Figure(figsize=(width, height))
     return figure, figure.subplots(rows, columns, **subplots)
 
@@ -239,7 +259,14 @@ def row_of_panels(
 
 
 def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:
-    """A drawing to scale: equal units on both axes, which fill their place, or are as large as what they show, bare."""
+    """Make a drawing true to scale: equal units on both axes.
+
+    Parameters
+    ----------
+    axes : is changed
+    x_label, y_label : in the page's language
+    fill : whether the axes fill their place, or are as large as what they show, and without grid
+    """
     axes.set_aspect("equal", adjustable="datalim" if fill else "box")
     if not fill:
         axes.grid(False)
@@ -248,15 +275,34 @@ def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> No
 
 
 def axis_label(table: Table | type[Table], attribute: str, unit: str = "") -> str:
-    """What stands at an axis along which a column is drawn: its heading (else its meaning) and its unit; ``unit``: in
-    place of the column's, where an arm's joints settle it."""
+    """The name of an axis along which a column of results is drawn, with its unit.
+
+    Parameters
+    ----------
+    attribute : of the column; its heading is taken, else its meaning
+    unit : in place of the column's, where an arm's joints settle it
+
+    Returns
+    -------
+    label : in the page's language
+    """
     spec = table.columns()[attribute]
     what, unit = tr(spec.heading or spec.meaning), (unit or spec.unit).replace("^2", "²").replace("^3", "³")
     return bracketed(what, tr(unit))
 
 
 def clearance_panels(rows: Any, names: Sequence[str]) -> tuple[Figure, list[tuple[Axes, str]]]:
-    """Least distances over time (``path``, ``t_s``, ``clearance_mm``), a panel for each path, overlaps in red."""
+    """Least distances over time, a panel for each path, overlaps in red.
+
+    Parameters
+    ----------
+    rows : table with ``path``, ``t_s`` and ``clearance_mm``
+    names : of the paths to show
+
+    Returns
+    -------
+    figure, panels : pairs of axes and the path's name
+    """
     lines = -(-len(names) // PANELS)
     figure, axes = new_figure(lines, PANELS, width=11.0, height=1.5 * lines + 0.4, sharey=True, squeeze=False)
     for k, (ax, name) in enumerate(zip(axes.flat, names)):
@@ -275,8 +321,16 @@ def clearance_panels(rows: Any, names: Sequence[str]) -> tuple[Figure, list[tupl
 
 
 def svg_data_uri(figure: Figure) -> Markup:
-    """A figure in the house style as a ``data:`` address of an SVG image (dense clouds rasterised at 160 dpi), fit for
-    an attribute in double quotes."""
+    """A figure in the house style as an image in an address, fit for an attribute in double quotes.
+
+    Parameters
+    ----------
+    figure : dense clouds in it are rasterised at 160 dpi
+
+    Returns
+    -------
+    address : ``data:image/svg+xml,...``; equal figures give equal text
+    """
     buffer = io.BytesIO()
     figure.dpi = 160
     name_parts(figure)

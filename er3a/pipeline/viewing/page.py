@@ -294,7 +294,17 @@ def _figure_text(stage: str, name: str, text: str, assumed: bool) -> str:
 
 
 def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: Sequence[str] | None = None) -> Head:
-    """The head of a stage's page; ``links`` as of :class:`Head`, ``pages``: of the robot."""
+    """The head of a stage's page.
+
+    Parameters
+    ----------
+    links : addresses by words, as of :class:`Head`
+    pages : of the robot; what this stage leaves out may be on one of them
+
+    Returns
+    -------
+    head : verdict and key figures in the page's language
+    """
     verdict, stage = stored.results.summary.verdict, stored.stage
     words = import_module(STAGES[stage].messages).KEY_FIGURES
     shown = tuple(
@@ -377,7 +387,16 @@ def render(
 
 
 def page_environment(*folders: Path) -> jinja2.Environment:
-    """Jinja as pages use it, with the templates of all pages and those of ``folders``."""
+    """Jinja as pages use it.
+
+    Parameters
+    ----------
+    folders : of templates, searched before those that all pages share
+
+    Returns
+    -------
+    environment : undefined names are errors, texts are escaped, and figures are counted anew
+    """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader([*folders, _HERE]),
         autoescape=True,
@@ -458,12 +477,30 @@ BLANKS = re.compile(
 
 
 def closed_up(html: str) -> str:
-    """A page without the blanks that Chinese does not write, and with its own brackets and full stops."""
+    """A page in Chinese without the blanks that Chinese does not write, and with its own brackets and full stops.
+
+    Parameters
+    ----------
+    html : of the whole page
+
+    Returns
+    -------
+    html : text within ``<code>`` keeps its brackets
+    """
     return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
 
 
 def led(text: str) -> tuple[str, str]:
-    """A verdict's text up to the end of a sentence, or else of a clause, and the rest; empty for a short text."""
+    """A verdict's text in two parts, of which a page shows the first large.
+
+    Parameters
+    ----------
+    text : of one or more sentences
+
+    Returns
+    -------
+    first, rest : up to the end of a sentence, or else of a clause; the rest is empty for a short text
+    """
     ends = [[found.end() for found in re.finditer(end, text[:LED])] for end in (r"\.(?= )|。", r";(?= )|；")]
     cut = next((found[-1] for found in ends if found), 0)
     if len(text) <= WHOLE or not cut:
@@ -475,13 +512,28 @@ def led(text: str) -> tuple[str, str]:
 
 
 def first_sentence(text: str) -> tuple[str, str]:
-    """A text up to the end of its first sentence, and the rest."""
+    """A text up to the end of its first sentence, and the rest.
+
+    Parameters
+    ----------
+    text : in English or Chinese
+
+    Returns
+    -------
+    first, rest : the rest is empty for a single sentence
+    """
     end = re.search(r"\.(?= )|。", text)
     return (text[: end.end()], text[end.end() :].strip()) if end else (text, "")
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:
-    """A text in which the first of each of some words leads to an address."""
+    """A text in which the first of each of some words leads to an address.
+
+    Parameters
+    ----------
+    text : plain; it is escaped here
+    links : addresses by word; of words that overlap the longer one counts
+    """
     html, left = escape(text), {str(escape(name)): address for name, address in links.items()}
     names = "|".join(map(re.escape, sorted(left, key=len, reverse=True)))
 
@@ -493,12 +545,30 @@ def linked(text: str, links: Mapping[str, str]) -> Markup:
 
 
 def breakable(name: str) -> Markup:
-    """A name that may go on in the next line behind each of its underscores."""
+    """A name that may go on in the next line after each of its underscores.
+
+    Parameters
+    ----------
+    name : plain; it is escaped here
+
+    Returns
+    -------
+    html : with ``<wbr>``
+    """
     return Markup("_<wbr>").join(name.split("_"))
 
 
 def whole_sentence(finding: str) -> str:
-    """A finding's text as a sentence of its own."""
+    """A finding's text as a sentence of its own.
+
+    Parameters
+    ----------
+    finding : text without a full stop, in the language in use
+
+    Returns
+    -------
+    text : with a full stop and, in other languages than Chinese, a capital letter
+    """
     text = tr("{finding}.", finding=finding)
     return text[:1].upper() + text[1:] if language.current() != "zh" else text
 
@@ -519,12 +589,30 @@ def run_command(study: Study, page: str) -> str | None:
 
 
 def text_address(text: str) -> str:
-    """The data address of a file of text, for a link that saves it."""
+    """The data address of a file of text, for a link that saves it.
+
+    Parameters
+    ----------
+    text : content of the file
+
+    Returns
+    -------
+    address : ``data:text/plain;base64,...``
+    """
     return f"data:text/plain;base64,{base64.b64encode(text.encode()).decode()}"
 
 
 def packed_text(text: str) -> str:
-    """A text for a link's ``data-packed``, which the page's script unpacks to be saved: gzip, in base64."""
+    """A text for a link's ``data-packed``, which the page's script unpacks to be saved.
+
+    Parameters
+    ----------
+    text : content of the file
+
+    Returns
+    -------
+    packed : gzip, in base64; equal texts give equal ones
+    """
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
@@ -535,7 +623,16 @@ def _preview(picture: Path) -> str | None:
 
 
 def status_word(status: str) -> str:
-    """A verdict's status as a page shows it."""
+    """A verdict's status as a page shows it.
+
+    Parameters
+    ----------
+    status : a key of ``VERDICT_WORDS``
+
+    Returns
+    -------
+    word : in the page's language
+    """
     return tr(VERDICT_WORDS[status])
 
 
@@ -567,8 +664,17 @@ def _commit() -> str | None:
 
 
 def alternative_table(study: Study, name: str, results: Path) -> str | None:
-    """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out; None
-    where there is none, or none that was computed."""
+    """A robot of the study that one of this robot's reference sets is about, and that its own evidence bears out.
+
+    Parameters
+    ----------
+    name : of the robot
+    results : folder of all results
+
+    Returns
+    -------
+    name : of the other robot, with a verdict of pass or caution; None where none was computed or bears out
+    """
     for other in study.other_tables(name):
         try:
             status = read_status(results / other / "validation")
@@ -580,18 +686,44 @@ def alternative_table(study: Study, name: str, results: Path) -> str | None:
 
 
 def panel_link(q_deg: Iterable[float], text: str) -> str:
-    """A text that leads to the arm at joint values (deg; mm of prismatic joints) in the teach panel."""
+    """A text that leads to the arm at joint values in the teach panel.
+
+    Parameters
+    ----------
+    q_deg : (n,), deg, or mm of joints that slide
+    text : plain; it is escaped here
+
+    Returns
+    -------
+    html : a link; the values are written with nine digits
+    """
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
 
 
 def stage_head(folder: Path, stage: Stage) -> Head:
-    """The verdict and key figures that a folder holds, in the page's language."""
+    """The verdict and key figures of a stage, in the page's language.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+
+    Raises
+    ------
+    ResultError
+        if the results are damaged or of another version
+    """
     return head_of(read_stage(folder, stage))
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
-    """Write the page of a stage that was not computed: the verdict, and where it comes from."""
+    """Write the page of a stage that was not computed: the verdict, and where it comes from.
+
+    Parameters
+    ----------
+    stored : with the reason
+    output : the page, written whole or not at all
+    """
     render(
         Path(__file__).with_name("absent.html.j2"),
         output,

@@ -34,12 +34,30 @@ VERDICTS = {
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """Red, green and blue (0..255) of a ``#rrggbb`` colour."""
+    """Red, green and blue of a colour.
+
+    Parameters
+    ----------
+    colour : ``#rrggbb``
+
+    Returns
+    -------
+    parts : 0 to 255 each
+    """
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 def link_colour(link: int) -> str:
-    """Of a link that a surface shows: grey, with something of the colour of the joint that moves it."""
+    """The colour of a link that a surface shows: grey, with something of the colour of the joint that moves it.
+
+    Parameters
+    ----------
+    link : from 1; 0 for the base, which is grey alone
+
+    Returns
+    -------
+    colour : ``#rrggbb``, 60 % of the grey
+    """
     shade = zip(rgb(LINK), rgb(JOINTS[link - 1] if link else BODY))
     return "#" + "".join(f"{round(0.6 * grey + 0.4 * own):02x}" for grey, own in shade)
 
@@ -47,6 +65,16 @@ def link_colour(link: int) -> str:
 def legible(colour: str) -> tuple[int, int, int]:
     """A colour of the same hue that can be read on the viewer's dark ground as well as on its light one.
 
+    Parameters
+    ----------
+    colour : ``#rrggbb``
+
+    Returns
+    -------
+    parts : red, green and blue, 0 to 255
+
+    Notes
+    -----
     Its relative luminance (WCAG 2) is scaled to where the contrast with both grounds is the same.
     """
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (part / 255 for part in rgb(colour))]
@@ -60,10 +88,29 @@ SHAPE_COLOURS = ("#4477aa", "#ccbb44", "#228833", "#66ccee")
 
 
 def shape_of(branch: int, label: str) -> int:
-    """Number of the arm shape: two wrist branches of the closed form share one; found arms have one each."""
+    """Number of the arm shape that a solution has, by which it is coloured.
+
+    Parameters
+    ----------
+    branch : number of the solution's branch
+    label : code of the branch; ``found_arm`` for arms without named branches
+
+    Returns
+    -------
+    shape : two wrist branches of the closed form share one; found arms have one each
+    """
     return branch if label == "found_arm" else branch // 2
 
 
 def colour_of(shape: int) -> str:
-    """The shape's colour; beyond four the colours repeat."""
+    """The colour of an arm shape, in figures and recordings alike.
+
+    Parameters
+    ----------
+    shape : of :func:`shape_of`; beyond four the colours repeat
+
+    Returns
+    -------
+    colour : ``#rrggbb``
+    """
     return SHAPE_COLOURS[shape % len(SHAPE_COLOURS)]

@@ -66,7 +66,15 @@ class Curves:
 
     @classmethod
     def of_joints(cls, robot: Robot, entity: str, name: str, per: str = "") -> Curves:
-        """A curve for each joint of an "angle" or "velocity": in deg, of those that slide in mm, ``per`` a time."""
+        """A panel with a curve for each joint.
+
+        Parameters
+        ----------
+        robot : its joints that slide are in mm, and the title says so
+        entity : of the panel, below the stage's curves
+        name : "angle" or "velocity"
+        per : of the unit, such as "/s"
+        """
         if robot.slides.all():
             return cls(entity, f"Joint {'position' if name == 'angle' else name} (mm{per})")
         slides = ", ".join(joint for joint, is_slide in zip(joint_names(robot), robot.slides) if is_slide)
@@ -133,7 +141,18 @@ class Recorded:
 
 
 def write_recording(shown: Recorded, output: Path) -> None:
-    """Write a recording of a stage; it opens at the start of the first run."""
+    """Write a recording of a stage; it opens at the start of the first run.
+
+    Parameters
+    ----------
+    shown : the arm, its runs one after another, and curves
+    output : the recording, written whole or not at all
+
+    Raises
+    ------
+    WriteError
+        if the disk is full or permission is missing
+    """
     robot, stage = shown.robot, shown.stage
     starts = np.cumsum([0.0, *(_end(run) + run.pause_s for run in shown.runs)]).tolist()
     title = f"{robot.title}: {stage}"
@@ -215,7 +234,16 @@ def recording(
 
 
 def escaped(text: str) -> str:
-    """A text from an input file for a Markdown document: shown as it is, on one line, with nothing fetched for it."""
+    """A text from an input file for a Markdown document.
+
+    Parameters
+    ----------
+    text : of any content
+
+    Returns
+    -------
+    text : on one line, shown as it is, with nothing fetched for it
+    """
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
@@ -396,6 +424,12 @@ def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[
 
 
 def record_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:
-    """Write the recording of a stage that was not computed, which holds the reason alone."""
+    """Write the recording of a stage that was not computed, which holds the reason alone.
+
+    Parameters
+    ----------
+    stored : with the reason
+    output : the recording, written whole or not at all
+    """
     with recording(output, stored.robot, stored.stage, _note_view(stored.stage)) as stream:
         _log_text(stream, f"{stored.stage}/note", escaped(say(stored.results.summary.verdict.finding)))

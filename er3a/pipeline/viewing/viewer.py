@@ -38,13 +38,27 @@ LONGEST_S = 120
 
 
 def viewer_command(recordings: Sequence[Path], *words: str) -> list[str]:
-    """The viewer on some recordings; by itself it would listen on all of the machine's addresses."""
+    """The command that opens Rerun's viewer on some recordings.
+
+    Parameters
+    ----------
+    words : further options of the viewer
+
+    Returns
+    -------
+    command : bound to the loopback address; by itself the viewer would listen on all of the machine's addresses
+    """
     viewer = Path(sys.executable).with_name("rerun")
     return [str(viewer), *map(str, recordings), "--bind", LOOPBACK, *words]
 
 
 def free_port() -> int:
-    """A port that nothing listens on."""
+    """A port of the loopback address that nothing listens on.
+
+    Returns
+    -------
+    port : free when it was asked for; another program may take it meanwhile
+    """
     with socket.socket() as probe:
         probe.bind((LOOPBACK, 0))
         return probe.getsockname()[1]
@@ -83,7 +97,12 @@ def viewer_running(
 
 
 def has_display() -> bool:
-    """Whether a window can be opened here."""
+    """Whether a window can be opened here.
+
+    Returns
+    -------
+    display : True on other systems than Linux; there, whether X11 or Wayland is named in the environment
+    """
     return sys.platform != "linux" or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
@@ -114,7 +133,12 @@ SERVER_PATIENCE_S = 30
 
 
 def serve(recordings: Sequence[Path]) -> None:
-    """Serve recordings to a browser on this machine, until Ctrl+C or a request to end (SIGTERM)."""
+    """Serve recordings to a browser on this machine, until Ctrl+C or a request to end (SIGTERM).
+
+    Parameters
+    ----------
+    recordings : read once, when this begins; the address is printed
+    """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with server(recordings) as listening:
         port = listening.server_port
@@ -128,7 +152,16 @@ def serve(recordings: Sequence[Path]) -> None:
 
 
 def server(recordings: Sequence[Path]) -> ThreadingHTTPServer:
-    """A server on a free port of the loopback address, for the viewer's files and recordings."""
+    """A server for the viewer's files and recordings.
+
+    Parameters
+    ----------
+    recordings : read into memory here
+
+    Returns
+    -------
+    server : on a free port of the loopback address; it lets the browser connect to no other address
+    """
     files = _viewer_files() | {_place(path): ("application/octet-stream", path.read_bytes()) for path in recordings}
 
     class Handler(BaseHTTPRequestHandler):
@@ -148,7 +181,16 @@ def server(recordings: Sequence[Path]) -> ThreadingHTTPServer:
 
 
 def address(listening: ThreadingHTTPServer, recordings: Sequence[Path]) -> str:
-    """The address that shows the recordings."""
+    """The address that shows recordings in the browser.
+
+    Parameters
+    ----------
+    listening : of :func:`server`, for the same recordings
+
+    Returns
+    -------
+    address : on the loopback address, with all recordings in its query
+    """
     root = f"http://{LOOPBACK}:{listening.server_port}"
     shown = [("url", root + _place(recording)) for recording in recordings]
     return f"{root}/?{urlencode([('hide_welcome_screen', ''), ('persist', '0'), *shown], safe=':/')}"
@@ -202,7 +244,12 @@ def draw_preview(recording: Path, output: Path) -> str | None:
 
 
 def write_empty(output: Path) -> None:
-    """Write the picture of a recording that is not drawn."""
+    """Write the picture of a recording that is not drawn.
+
+    Parameters
+    ----------
+    output : becomes an empty file, by which pages know that there is no picture
+    """
     write_atomically(output, lambda file: file.write_bytes(b""))
 
 

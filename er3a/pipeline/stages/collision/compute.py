@@ -33,8 +33,24 @@ from er3a.selection.select import refusals_of
 def target_clearances(
     robot: Robot, bodies: Bodies, file: str
 ) -> tuple[model.TargetClearances, list[model.Closest], tuple[model.CollidingTarget, ...]]:
-    """Clearance of all solutions within the limits, of the chosen ones where they are nearest to what, and the targets
-    that none is chosen of, because all collide."""
+    """Clearance of the solutions of all targets.
+
+    Parameters
+    ----------
+    bodies : of the robot, and what it must not meet
+    file : of the targets
+
+    Returns
+    -------
+    rows : one for each solution within the limits, mm; turns are left out of many targets
+    closest : where the chosen solution of each target is nearest to anything
+    blocked : targets of which none is chosen, because all solutions collide
+
+    Raises
+    ------
+    InputError
+        if the targets can't be read
+    """
     tables, closest, blocked = [], [], []
     targets = load_targets(file, robot)
     for target in targets:
@@ -72,7 +88,19 @@ def target_clearances(
 def path_clearances(
     motions: Iterable[ListedMotion], bodies: Bodies, tolerance: float
 ) -> tuple[model.PathClearances, list[model.Closest], dict[str, Pair]]:
-    """Clearance over time of each path, where each is nearest to anything, and what touches first on it."""
+    """Clearance along paths.
+
+    Parameters
+    ----------
+    motions : those without a motion are passed over
+    tolerance : m, overlap that may go unnoticed
+
+    Returns
+    -------
+    rows : clearance over time of each path, s and mm
+    closest : where each path is nearest to anything
+    first : the pair of bodies that touches first, by the path's name
+    """
     tables, closest, first = [], [], dict[str, Pair]()
     for entry in motions:
         motion = entry.motion
@@ -118,7 +146,22 @@ SAMPLES_STREAM, PLACES_STREAM = 0, 1
 
 
 def compute(study: Study, name: str) -> model.CollisionResults:
-    """Work out where a robot of the study is free of collisions."""
+    """Work out where a robot of the study is free of collisions: in joint space, at places, at targets, along paths.
+
+    Parameters
+    ----------
+    study : with the settings of the stage, and the scene
+    name : of a robot or a variant
+
+    Returns
+    -------
+    results : the same on every run with the study's seed
+
+    Raises
+    ------
+    InputError
+        naming file and field that can't be used
+    """
     robot, settings = study.robot(name), study.section(CollisionSettings)
     scene = study.scene(name, STAGE_NAME)
     bodies = Bodies(robot, scene)

@@ -44,7 +44,18 @@ DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | mode
 def drive_uses(
     robot: Robot, paths: tuple[model.PathLoad, ...], holding: tuple[model.HoldingTorque, ...]
 ) -> tuple[model.Use, ...]:
-    """Peak and RMS torques of the paths that count against the drives', holding torques against rated ones."""
+    """Torques that are asked of the drives, against what these allow.
+
+    Parameters
+    ----------
+    paths : of these only those that count
+    holding : greatest torques at rest
+
+    Returns
+    -------
+    uses : N m, or N of joints that slide: peaks against peak torques, RMS and holding torques against rated ones; none
+        of limits that are not known
+    """
     drives, found = drives_of(robot), []
     for path in paths:
         for load in path.joints if path.counts else ():
@@ -64,7 +75,16 @@ def drive_uses(
 
 
 def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[model.DataOpen, ...]:
-    """What the files leave open, with links or joints; ``of_load``: what the study does."""
+    """What the files leave open of masses, drives and wrist.
+
+    Parameters
+    ----------
+    of_load : what the study leaves open of tool and payload
+
+    Returns
+    -------
+    open : each kind of value once, with its joints or links; without numbers if it concerns all
+    """
     drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
     links = tuple(link for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link)))
     open_joints: dict[model.Need, tuple[int, ...]] = {
@@ -97,7 +117,16 @@ def _is_guess(source: Source | LoadFields | None) -> bool:
 
 
 def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
-    """What the study does not say of tool and payload, or guesses; a mass of 0 stands for none."""
+    """What the study does not say of tool and payload, or guesses.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Returns
+    -------
+    parts : ``load`` alone if there is none at all; a mass of 0 says that nothing hangs there
+    """
     entry, loads = study.entry(name), study.loads(name)
     if not loads:
         return ("load",)
@@ -131,9 +160,20 @@ def verdict_of(
     *,
     skipped: tuple[str, ...] = (),
 ) -> DynamicsVerdict:
-    """Fit, marginal, overload; no_reference where there is nothing to compare, or no limit to compare it with.
+    """The stage's answer, by what is asked for against what is allowed.
 
-    It fits only if nothing that the files leave open could change that. ``skipped``: paths that can't be followed.
+    Parameters
+    ----------
+    uses : the tightest first
+    findings : doubts about masses, and links without any
+    unknown : what the files leave open
+    masses : what was used; a guess allows no pass
+    skipped : paths that can't be followed
+
+    Returns
+    -------
+    verdict : fail if something is beyond its limit; no_reference if there is nothing to compare, or no limit to compare
+        it with. It passes only if nothing that the files leave open could change that.
     """
     missing = tuple(found.link for found in findings if isinstance(found, MissingLink))
     doubts = len(findings) - len(missing)
@@ -211,7 +251,16 @@ class LoadedArm:
         return arm_model(self.robot, None, self.gravity)
 
     def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
-        """Half-widths (N, n) of the torques' intervals."""
+        """By how much torques may be off, by the tolerances of links and load.
+
+        Parameters
+        ----------
+        q, qd, qdd : (N, n), rad (m), per s and per s^2
+
+        Returns
+        -------
+        half_width : (N, n), N m, or N of joints that slide
+        """
         return margins.torque_tolerance(self.model, q, qd, qdd, self.links_grade, self.load_grade)
 
 
@@ -244,7 +293,17 @@ class PathJudge:
     limits: JointLimits
 
     def judged(self, motion: Motion) -> tuple[tuple[PathVerdict, ...], bool]:
-        """What a motion came to, and whether it may be run."""
+        """What a motion came to, as the trajectory stage judges it, and whether it may be run.
+
+        Parameters
+        ----------
+        motion : of the arm, with its times
+
+        Returns
+        -------
+        outcomes : the first fault first
+        may_run : whether none of these forbids it, and joint speeds have a bound
+        """
         found = judge(self.robot, motion, self.near, self.limits)
         outcomes = outcomes_of(found, measured(self.surroundings, motion), float(motion.built.duration))
         return outcomes, set(outcomes).isdisjoint(NOT_TO_BE_RUN) and found.speed_bounded
@@ -312,7 +371,16 @@ BEFORE_END = 1e-6  # of a piece, as accelerations step from piece to piece
 
 
 def within_short_pieces(motion: Motion, step: float) -> Reals:
-    """Times in s: begin, middle and end of those pieces of a motion of the joints that steps (s) would pass over."""
+    """Times within pieces of a motion of the joints that evenly spread samples would pass over.
+
+    Parameters
+    ----------
+    step : s, between two samples
+
+    Returns
+    -------
+    t : (k,), s, begin, middle and end of each such piece; none of a path of the tool
+    """
     if motion.followed is not None:
         return np.empty(0)
     starts, spans = motion.curve.times[:-1], np.diff(motion.curve.times)
@@ -389,7 +457,19 @@ UNITS = {"payload": "kg", "moment": "N m", "inertia": "kg m²"}
 def wrist_uses(
     robot: Robot, load: Load | None, grade: Grade, gravity: float, paths: Sequence[PathTorques]
 ) -> tuple[model.Use, ...]:
-    """All that the wrist's data limit, for the study's load; upper ends by the load's tolerances."""
+    """What the study's load asks of the wrist, against what the wrist's data allow.
+
+    Parameters
+    ----------
+    load : tool and payload; None for none
+    grade : of the load, which decides its tolerances
+    gravity : m/s^2
+    paths : with moments from accelerations too, N m
+
+    Returns
+    -------
+    uses : kg, N m or kg m^2; upper ends by the load's tolerances. None if the robot's file gives no data of the wrist.
+    """
     wrist = robot.masses.wrist
     if wrist is None:
         return ()
@@ -413,7 +493,21 @@ NO_FIGURE = Figure("holding_torque", None, "")
 
 
 def compute(study: Study, name: str) -> model.DynamicsResults:
-    """Compute the dynamics stage of a robot."""
+    """Compute the torques of a robot's motors along its paths and at rest, and compare them with drives and wrist.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Returns
+    -------
+    results : without torques if no link has a mass; the verdict is then about the wrist alone, or no_reference
+
+    Raises
+    ------
+    InputError
+        naming file and field that can't be used
+    """
     settings = study.section(DynamicsSettings)
     given, margin = study.robot(name), study.assumed_margin(name)
     robot = with_estimates(given, settings.capsule_density_kg_m3)
@@ -464,7 +558,16 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
 
 
 def with_estimates(robot: Robot, density: float | None) -> Robot:
-    """The robot with guessed masses for links that have none, if a density asks for them; itself if none is missing."""
+    """The robot with guessed masses for links that have none.
+
+    Parameters
+    ----------
+    density : kg/m^3, of the shapes of the links; None asks for no guess
+
+    Returns
+    -------
+    robot : itself if nothing is guessed
+    """
     if density is None:
         return robot
     known = robot.masses.links

@@ -185,7 +185,16 @@ class HoldingTorque:
 
 
 def shared_unit(units: Iterable[Unit]) -> str:
-    """The unit of the torques of several joints, for a heading."""
+    """The unit of the torques of several joints, for a heading.
+
+    Parameters
+    ----------
+    units : of each joint
+
+    Returns
+    -------
+    unit : ``N m`` or ``N`` if all have it, else ``N m or N``
+    """
     found = set(units)
     return found.pop() if len(found) == 1 else EITHER
 
@@ -195,7 +204,16 @@ NOTHING_HELD = 1e-9
 
 
 def hardest_held(holding: tuple[HoldingTorque, ...]) -> HoldingTorque:
-    """The joint that holds most; one that turns if any has something to hold, because N and N m don't compare."""
+    """The joint that holds most at rest.
+
+    Parameters
+    ----------
+    holding : at least one; by its upper bound
+
+    Returns
+    -------
+    held : one that turns if any has something to hold, because N and N m don't compare
+    """
     return max(holding, key=lambda held: (held.unit == TORQUE and held.bound > NOTHING_HELD, held.bound))
 
 

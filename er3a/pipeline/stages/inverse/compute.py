@@ -129,7 +129,16 @@ def solve_target(
 
 
 def collides(rows: model.SolutionRows) -> Flags:
-    """Which rows are refused because something overlaps."""
+    """Which solutions are refused because something overlaps.
+
+    Parameters
+    ----------
+    rows : of one target or several
+
+    Returns
+    -------
+    collides : (rows,); others may be refused for other reasons
+    """
     return np.array([isinstance(why, PairOverlaps) for why in rows.refusal], dtype=bool)
 
 
@@ -256,7 +265,17 @@ SAME_COST = 1e-9
 def rankings(
     robot: Robot, target: Target, solved: SolvedTarget, scene: Scene | None, mix: Mapping[RuleName, float]
 ) -> model.RankingRows:
-    """Place and measure of each branch's best row within the limits, by each rule."""
+    """Place and measure of each branch's best solution within the limits, by each rule.
+
+    Parameters
+    ----------
+    solved : the solutions of this target
+    mix : weights of the rules that make one more
+
+    Returns
+    -------
+    rows : one for each branch and rule, in the rule's unit; solutions that collide have place 0
+    """
     rows = np.flatnonzero(solved.rows.first_of_branch & solved.rows.within_limits)
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
@@ -301,7 +320,18 @@ def sequence(
     solved: list[SolvedTarget],
     acceleration: Reals | None = None,
 ) -> model.VisitOrder | None:
-    """Visiting all targets that are reached, in order: the best rows as a whole, against the greedy ones."""
+    """Visiting all targets that are reached, in their order: the best solutions as a whole, against the greedy ones.
+
+    Parameters
+    ----------
+    targets : of which the first gives the joints to start from
+    solved : one for each target
+    acceleration : (n,), rad/s^2 or m/s^2, for times of moves; None counts speeds alone
+
+    Returns
+    -------
+    order : by time if the speeds are known, else by the joint moves; None for fewer than two targets
+    """
     reached = [one for one in solved if one.result.chosen_deg is not None]
     if len(reached) < 2:
         return None
@@ -332,7 +362,21 @@ ADVICE_STREAM, ROUND_TRIP_STREAM = 0, 1
 
 
 def compute(study: Study, name: str) -> model.InverseResults:
-    """Solve the targets of a robot of the study."""
+    """Solve the targets of a robot of the study, choose among their solutions, and try the solver on random poses.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Returns
+    -------
+    results : the same on every run with the study's seed
+
+    Raises
+    ------
+    InputError
+        naming file and field that can't be used
+    """
     robot = study.robot(name)
     targets = load_targets(study.entry(name).targets, robot)
     settings, motion = study.section(InverseSettings), study.section(TrajectorySettings)

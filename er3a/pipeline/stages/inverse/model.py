@@ -353,7 +353,16 @@ MAX_SHOWN = 32
 
 
 def shown_targets(targets: Sequence[TargetResult]) -> list[TargetResult]:
-    """All targets, in their order; of more than 32 as many of each outcome, taken evenly over the list."""
+    """The targets that a page shows.
+
+    Parameters
+    ----------
+    targets : of the whole stage
+
+    Returns
+    -------
+    targets : all, in their order; of more than ``MAX_SHOWN`` about as many of each outcome, taken evenly over the list
+    """
     if len(targets) <= MAX_SHOWN:
         return list(targets)
     by_outcome: dict[str, list[int]] = {}

@@ -36,7 +36,21 @@ MAX_POINTS = 20_000  # of a program's motion that are kept
 
 
 def compute(study: Study, name: str) -> model.ProgramsResults:
-    """Compute the stage of programs of a robot."""
+    """Read, follow and check every program of a robot.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Returns
+    -------
+    results : with no rows for a robot without programs
+
+    Raises
+    ------
+    InputError
+        naming the file of a program and the line that can't be read, or another file of the study
+    """
     robot = study.robot(name)
     file = study.entry(name).programs
     listed = load_programs(file) if file else ProgramsFile(kind="programs")

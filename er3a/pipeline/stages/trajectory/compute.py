@@ -237,12 +237,31 @@ class _ToolPath:
     motion: Motion
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the time (...,)."""
+        """Poses of the tool along a move of the joints.
+
+        Parameters
+        ----------
+        progress : (...,), share of the time, 0 to 1
+
+        Returns
+        -------
+        T : T_base_tool (..., 4, 4), m
+        """
         return self.motion.tool(np.asarray(progress) * self.motion.built.duration)
 
 
 def speed_ratio(velocity: Reals, limits: JointLimits) -> Reals:
-    """Largest ratio of a joint's speed to its limit (N,), of velocities (N, 6) in rad/s; NaN where unknown."""
+    """How near joints come to their speed limits.
+
+    Parameters
+    ----------
+    velocity : (N, n), rad/s or m/s
+    limits : with speeds (n,) in the same units
+
+    Returns
+    -------
+    ratio : (N,), the largest of all joints; above 1 is too fast, NaN where a velocity is unknown
+    """
     ratio: Reals = np.abs(velocity / limits.speed).max(axis=1)
     return ratio
 
@@ -291,7 +310,19 @@ def path_summary(
     avoided: Avoided,
     limits: JointLimits,
 ) -> model.PathSummary:
-    """All that is known of a path; its verdict is the gravest of its own and "collides"."""
+    """All that is known of a path, for the stage's summary.
+
+    Parameters
+    ----------
+    found : its faults by the joints
+    along : its clearance
+    avoided : what was tried where it is not safe
+    limits : that it was judged by
+
+    Returns
+    -------
+    summary : in mm, deg and s; its verdict is the gravest of its own and "collides"
+    """
     followed, entry = motion.followed, motion.entry
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
@@ -368,7 +399,21 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:
-    """Compute the trajectory stage of a robot."""
+    """Plan and check every path of a robot: singular poses, limits, collisions, reach; and write programs of it.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Returns
+    -------
+    results : the same on every run with the study's seed
+
+    Raises
+    ------
+    InputError
+        naming file and field that can't be used
+    """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
     near, limits = near_singular(settings), limits_of(robot, settings)

@@ -110,8 +110,17 @@ def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVer
 
 
 def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
-    """The faults of the motion's polynomials. Gaps are undecided, but where the path ends, or is singular, they are
-    what that leaves."""
+    """The faults of the motion's polynomials, collisions left out.
+
+    Parameters
+    ----------
+    near : distances below which a pose is near-singular
+    limits : of speeds and accelerations, rad or m
+
+    Returns
+    -------
+    faults : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
+    """
     curve, followed = motion.curve, motion.followed
     events = motion_faults.singular_events(robot, curve, near)
     ends = followed and (followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events))
@@ -133,14 +142,32 @@ class Surroundings:
 
 
 def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
-    """Clearance along a motion, shown at its samples."""
+    """Clearance along a motion, proven between the points that are measured, and given at its samples.
+
+    Parameters
+    ----------
+    surroundings : bodies, and the overlap (m) that may go unnoticed
+
+    Returns
+    -------
+    along : distances in m, negative by the depth of an overlap
+    """
     return clearance_along(
         surroundings.bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, surroundings.tolerance
     )
 
 
 def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.BodiesOverlap]]:
-    """Stretches of overlap."""
+    """Stretches of a motion on which bodies overlap.
+
+    Parameters
+    ----------
+    along : clearance along the motion
+
+    Returns
+    -------
+    stretches : in s, each with its pairs of bodies, and their depths in mm
+    """
     return [
         motion_faults.Interval(
             contact.start,
@@ -154,13 +181,29 @@ def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.Bodie
 
 
 def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
-    """The gravest verdict on a motion, collisions included."""
+    """The gravest verdict on a motion, collisions included.
+
+    Parameters
+    ----------
+    found : its faults by the joints
+    along : its clearance
+    """
     return gravest([found.verdict, "collides"] if along.contacts else [found.verdict])
 
 
 def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tuple[PathVerdict, ...]:
-    """All that a motion of a ``duration`` (s) came to, as :func:`er3a.pipeline.stages.trajectory.model.in_order` names
-    it."""
+    """All that a motion came to, as :func:`er3a.pipeline.stages.trajectory.model.in_order` names it.
+
+    Parameters
+    ----------
+    found : its faults by the joints; speeds beyond assumed limits do not count
+    along : its clearance
+    duration : s, of the motion
+
+    Returns
+    -------
+    outcomes : the first fault first
+    """
     spans: dict[PathVerdict, list[tuple[float, float]]] = {
         "unreachable": [(part.start, part.end) for part in found.beyond],
         "leaves limits": [(part.start, part.end) for part in found.limits],
@@ -171,7 +214,16 @@ def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tup
 
 
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
-    """Where the arm comes nearest to anything; None where nothing could be measured."""
+    """Where the arm comes nearest to anything.
+
+    Parameters
+    ----------
+    along : clearance along the motion
+
+    Returns
+    -------
+    nearest : mm and s; None where nothing could be measured
+    """
     at = along.closest
     if at < 0 or (pair := along.pair[at]) is None:
         return None
@@ -299,6 +351,15 @@ def sound_end(path: model.PathSummary, rows: model.PathChecks, limits: model.Lim
 
 
 def clearance_rows(name: str, along: ClearanceAlong) -> model.Clearances:
-    """One row per time at which the clearance was measured in full; NaN where the path can't be reached."""
+    """One row for each time at which the clearance was measured in full.
+
+    Parameters
+    ----------
+    name : of the path
+
+    Returns
+    -------
+    rows : s and mm; NaN where the path can't be reached
+    """
     between = [pair.label if pair else "" for pair in along.pair]
     return model.Clearances.of(path=name, t_s=along.t, clearance_mm=along.distance * 1000, between=between)

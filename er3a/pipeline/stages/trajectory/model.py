@@ -442,8 +442,16 @@ class PathNotFollowed:
 
 
 def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
-    """Whether nothing is wrong with a path or at the lines of the program that it is of, and it is not as near to
-    assumed ``shapes`` as these may be wrong."""
+    """Whether a path may be run as it is.
+
+    Parameters
+    ----------
+    shapes : assumed shapes of the arm, with the paths that come as near to them as they may be wrong; None if given
+
+    Returns
+    -------
+    safe : whether nothing is wrong with the path, nor at the lines of the program that it is of
+    """
     return path.verdict == "safe" and not path.of_program and not (shapes and path.name in shapes.near)
 
 

@@ -60,7 +60,13 @@ class PartOfProgram:
         return self.part.kind
 
     def command(self, source: CommandSource, robot: Robot) -> Command:
-        """The path in SI units."""
+        """The stretch of the program as a path's command, in SI units.
+
+        Parameters
+        ----------
+        source : what errors about the path name as its place
+        robot : not needed here, unlike for paths of a path file
+        """
         return self.part.command(source)
 
 
@@ -68,7 +74,16 @@ PlannedEntry = PathEntry | PartOfProgram
 
 
 def times_in(entry: PlannedEntry) -> TimesIn:
-    """Where the times of a path stand."""
+    """Where a path's times are given.
+
+    Parameters
+    ----------
+    entry : of a path file, or a stretch of a program
+
+    Returns
+    -------
+    place : ``program``, ``table`` (CSV) or ``path_file``
+    """
     if isinstance(entry, PartOfProgram):
         return "program"
     return "table" if isinstance(entry, TablePath) and entry.duration_s is None else "path_file"
@@ -112,7 +127,13 @@ MISSED_DEG = 0.1  # likewise of joints: about as much at half a metre
 
 
 def corner_misses(robot: Robot, built: Built) -> tuple[float, float]:
-    """By how much rounded corners miss their points at most: mm, and deg of the tool or of the joint that does most."""
+    """By how much rounded corners miss their points at most.
+
+    Returns
+    -------
+    far : mm, of the tool; of a move of the joints, of the joint that slides most
+    turned : deg, of the tool; of a move of the joints, of the joint that turns most. Both 0 without rounded corners.
+    """
     if isinstance(built.tool, SegmentPath):
         return float(1000 * built.tool.misses[0]), float(np.degrees(built.tool.misses[1]))
     if not isinstance(built.joints, JointSequence):
@@ -123,8 +144,14 @@ def corner_misses(robot: Robot, built: Built) -> tuple[float, float]:
 
 
 def missed_points(robot: Robot, built: Built) -> str:
-    """By how much rounded corners pass beside their points, with unit; empty if by little.
+    """By how much rounded corners miss their points, in words.
 
+    Returns
+    -------
+    text : with units; empty below ``MISSED`` (mm) and ``MISSED_DEG``
+
+    Notes
+    -----
     A turn of the tool counts as in :data:`er3a.planning.sequences.TURN_LENGTH`.
     """
     far, turned = corner_misses(robot, built)
@@ -134,12 +161,22 @@ def missed_points(robot: Robot, built: Built) -> str:
 
 
 def rows_missed(robot: Robot, built: Built) -> str:
-    """The same of the rows of a table whose corners nobody asked to be rounded."""
+    """By how much a motion misses rows of its table, whose corners nobody asked to be rounded.
+
+    Returns
+    -------
+    text : as of :func:`missed_points`; empty for other motions
+    """
     return missed_points(robot, built) if built.unasked else ""
 
 
 def misfits(robot: Robot, built: Built) -> tuple[str, ...]:
-    """Rates of a trajectory that do not go together: joint, time, the one and the other."""
+    """Rates of a trajectory that its points contradict.
+
+    Returns
+    -------
+    texts : joint, time in s, the stated rate and the other one with unit; none of motions without stated rates
+    """
     found = built.joints.misfits if isinstance(built.joints, StatedMotion) else ()
     named = []
     for each in found:
@@ -271,7 +308,16 @@ def _planned(task: PlanningTask, entry: PlannedEntry, command: PlanCommand, chec
 
 
 def joints_at(robot: Robot, end: Reals) -> Reals:
-    """Joint angles (k, n) within the limits at joint angles (n,) or a pose (4, 4): as given, or all that reach it."""
+    """Joint vectors within the limits at an end of a motion.
+
+    Parameters
+    ----------
+    end : joints (n,), rad or m, or a pose T_base_tool (4, 4), m
+
+    Returns
+    -------
+    q : (k, n); joints as they are given, or all solutions that reach the pose
+    """
     if end.ndim == 1:
         return end[None]
     solved = inverse(robot, end, self_motion_rows=True)
@@ -316,19 +362,47 @@ def _joint_motion(
 
 
 def near_singular(settings: TrajectorySettings) -> NearSingular:
-    """Where a pose counts as near-singular, for all stages and the teach panel."""
+    """Where a pose counts as near-singular, for all stages and the teach panel.
+
+    Parameters
+    ----------
+    settings : deg and mm
+
+    Returns
+    -------
+    near : rad and m
+    """
     wrist, elbow = np.radians([settings.near_wrist_deg, settings.near_elbow_deg])
     return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
 
 
 def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
-    """How motions are planned; ``bodies`` are what they must not meet, None where nothing can be measured."""
+    """How motions are planned.
+
+    Parameters
+    ----------
+    bodies : what they must not meet; None where nothing can be measured
+    seed : of the planner's random numbers
+
+    Returns
+    -------
+    task : tolerance in m, limits in rad and m
+    """
     tolerance = settings.penetration_tolerance_mm / 1000
     return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), seed)
 
 
 def assumed_speeds(robot: Robot, settings: TrajectorySettings) -> Reals:
-    """Speeds (n,), rad/s or m/s, of joints whose own is unknown; those beyond the study's have the last of them."""
+    """Speeds of joints whose own is unknown, as the study assumes them.
+
+    Parameters
+    ----------
+    settings : deg/s for each joint, and mm/s; joints beyond the list have its last value
+
+    Returns
+    -------
+    speeds : (n,), rad/s, or m/s of joints that slide
+    """
     given = settings.assumed_speed_deg_s
     turning = np.radians([given[min(k, len(given) - 1)] for k in range(robot.joints)])
     return np.where(robot.slides, settings.assumed_speed_mm_s / 1000, turning)
@@ -392,7 +466,16 @@ class ListedMotion:
 
 
 def by_subject(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
-    """What paths leave out, each subject once, with the names of all that it is left out of."""
+    """What paths leave out, each subject once.
+
+    Parameters
+    ----------
+    found : of all paths
+
+    Returns
+    -------
+    left_out : with the names of all that it is left out of, each once
+    """
     names: dict[LeftOutSubject, dict[str, None]] = {}
     for each in found:
         names.setdefault(each.subject, {}).update(dict.fromkeys(each.names))
@@ -400,7 +483,17 @@ def by_subject(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
-    """The motions of a robot of the study, in the scene of its trajectory stage; see :func:`listed_motions`."""
+    """The motions of a robot of the study, in the scene of its trajectory stage.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+    checks_per_sample : points between two samples at which motions are checked, at least
+
+    Returns
+    -------
+    motions : as of :func:`listed_motions`, made one after another
+    """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     bodies = Bodies(robot, study.scene(name, "trajectory"))
     task = planning_of(robot, settings, bodies, study.seed)
@@ -480,7 +573,12 @@ def _chosen(robot: Robot, motion: Motion) -> Iterator[LeftOutSubject]:
 
 
 def at_lines(entry: PartOfProgram) -> list[str]:
-    """The codes of what the program's check finds of a stretch, each with its lines (in ``FILE:LINE`` of others)."""
+    """What the program's check finds of a stretch, as codes with their lines.
+
+    Returns
+    -------
+    texts : each code once, with its lines; those of other files as ``FILE:LINE``
+    """
     own, lines = entry.file.name, dict[str, dict[str, None]]()
     for each in entry.part.found:
         named = lines.setdefault(each.finding.code, {})

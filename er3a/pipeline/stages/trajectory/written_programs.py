@@ -107,14 +107,34 @@ def _of_its_program(motion: Motion) -> list[str]:
 def near_assumed_shapes(
     robot: Robot, name: str, clearance: MinClearance | None, margin: float
 ) -> tuple[WriteFinding, ...]:
-    """The finding that a path passes assumed shapes within ``margin`` (m) of them; empty if it does not."""
+    """The finding that a path passes close to assumed shapes, for the head of its programs.
+
+    Parameters
+    ----------
+    name : of the path
+    clearance : its smallest; None where nothing was measured
+    margin : m, within which nothing is settled
+
+    Returns
+    -------
+    findings : one, or none if the path keeps the margin or the shapes are given
+    """
     if clearance is None or not (shapes := shapes_assumed(robot, margin, {name: clearance.least_mm / 1000})):
         return ()
     return (WrittenNearAssumed(name, clearance.least_mm, 1000 * margin),) if shapes.near else ()
 
 
 def repair_name(path: str) -> str:
-    """Name of the program that holds the motion which repairs a path."""
+    """Name of the program that holds the motion which repairs a path.
+
+    Parameters
+    ----------
+    path : the path's name
+
+    Returns
+    -------
+    name : of ``LONGEST_NAME`` letters at most
+    """
     return program_name(path, LONGEST_NAME - len(REPAIRED)) + REPAIRED
 
 
@@ -129,7 +149,20 @@ def program_files(
     repaired: AvoidanceRows,
     speed: Reals,
 ) -> ProgramFiles:
-    """The path's programs as rows, none where they are refused; with the rows of the motion that repairs it, if any."""
+    """The programs of a path and of the motion that repairs it.
+
+    Parameters
+    ----------
+    verdict : programs of a path that is not safe are refused unless ``write_unsafe``
+    languages : those that can't hold this arm's joints, or round corners nobody asked for, are left out
+    near : as of :func:`near_assumed_shapes`
+    repaired : rows of the motion that repairs the path; none if there is none
+    speed : (n,), rad/s or m/s, in place of greatest joint speeds that nobody states
+
+    Returns
+    -------
+    rows : one for each file
+    """
     rows: list[tuple[str, str, str, str]] = []
     name = program_name(motion.entry.name, LONGEST_NAME)
     allowed = verdict == "safe" or (write_unsafe and np.isfinite(motion.q[0]).all())

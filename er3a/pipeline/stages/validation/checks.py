@@ -50,7 +50,14 @@ def against_itself(
     unit: str = "",
     note: model.NearSingularLeftOut | None = None,
 ) -> model.ModelCheck:
-    """A check that needs no document: ``measured`` should be 0."""
+    """A check that needs no document.
+
+    Parameters
+    ----------
+    measured : should be 0
+    tolerance : in the same unit, at which it still passes
+    note : of what the check leaves out
+    """
     status: Literal["pass", "fail"] = "pass" if abs(measured) <= tolerance else "fail"
     return model.ModelCheck(measured, 0.0, measured, tolerance, unit, model.SelfCheck(quantity), group, status, note)
 
@@ -98,7 +105,17 @@ class _Stated:
         self.size = max(size, *lengths, 0.0)
 
     def check(self, i: int) -> model.Check:
-        """The check of a reference; not judged where the robot's file gives no value."""
+        """The check of one reference.
+
+        Parameters
+        ----------
+        i : its number
+
+        Returns
+        -------
+        check : not judged where the robot's file gives no value, or the source leaves so much open that it decides
+            nothing
+        """
         reference, value, expected = self.references[i], float(self.values[i]), float(self.expected[i])
         if math.isnan(value):
             return _without_value(self.set_name, reference, model.NotInRobotFile())
@@ -207,7 +224,12 @@ GROUP: Literal["round_trips"] = "round_trips"
 
 
 def table_checks(robot: Robot) -> list[model.Check]:
-    """Checks of the table alone: sound numbers in plausible units, and whether a closed-form inverse applies to it."""
+    """Checks of the table alone: sound numbers in plausible units, and whether a closed-form inverse applies to it.
+
+    Returns
+    -------
+    checks : counts of faults, each of which should be 0
+    """
     parts = [robot.a, robot.alpha, robot.d, robot.offset, robot.lower, robot.upper, robot.base]
     limits = np.abs([robot.lower, robot.upper])
     lengths = np.concatenate([np.abs([robot.a, robot.d]).ravel(), limits[:, robot.slides].ravel()])
@@ -242,7 +264,18 @@ def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
 
 
 def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.Check], model.RoundTripErrors | None]:
-    """Round trips as checks, and their errors; None if the arm has no closed form."""
+    """Round trips from random joints to a pose and back, as checks.
+
+    Parameters
+    ----------
+    poses : how many; fewer of an arm without the closed form of spherical wrists
+    seed : of the random joints
+
+    Returns
+    -------
+    checks : counts of poses, and the worst errors in deg and mm
+    errors : None if the arm has no such closed form, or coupled joints
+    """
     missing = wrist_partition_missing(robot)
     if missing or robot.coupling is not None:
         return _class_checks(robot, min(poses, round_trips.MAX_BY_CLASS), seed), None
@@ -264,7 +297,16 @@ OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
 
 
 def parts_found(evidence: Evidence) -> tuple[model.PartFound, ...]:
-    """The parts of a table that its file gives."""
+    """What is known of each part of a table: geometry, zero and directions, and others.
+
+    Parameters
+    ----------
+    evidence : of its entries and their combinations
+
+    Returns
+    -------
+    parts : those that the robot's file gives
+    """
     by_part: dict[PartName, list[EntryEvidence]] = {part: [] for part in PART_OF_GROUP.values()}
     for each in (*evidence.entries, *evidence.combinations):
         group = GROUP_OF.get(column_of(each.entry.split()[0].lstrip("-")))
@@ -303,7 +345,18 @@ def set_summaries(
     poses: model.KeyPoses,
     diagnoses: Mapping[str, model.SetDiagnosis],
 ) -> tuple[model.SetSummary, ...]:
-    """What was found against each reference set; diagnoses by its name, as far as there are any."""
+    """What was found against each reference set.
+
+    Parameters
+    ----------
+    checks : of all sets
+    poses : at which references state a point
+    diagnoses : by the set's name, as far as there are any
+
+    Returns
+    -------
+    summaries : one for each set, in their order
+    """
     found = []
     for references in sets:
         counts = counts_of(check for check in checks if check.reference_set == references.name)
@@ -332,7 +385,20 @@ def verdict_of(
     diagnoses: Mapping[str, model.SetDiagnosis],
     evidence: model.TableEvidence | None,
 ) -> Verdict[model.Validated]:
-    """The stage's answer."""
+    """The stage's answer.
+
+    Parameters
+    ----------
+    checks : of the model itself and against all sets
+    conflicts : what references contradict each other about
+    diagnoses : by the set's name
+    evidence : what documents settle of the table; None where no reference states a value
+
+    Returns
+    -------
+    verdict : fail if the model is unsound or authoritative documents contradict it, no_reference without any of these.
+        It passes only if documents settle all that moves the tool.
+    """
     documented = [check for check in checks if isinstance(check, model.ReferenceCheck) and check.is_authoritative]
     failed = [check for check in documented if check.status == "fail"]
     named = {
@@ -392,14 +458,31 @@ def _next_measurement(evidence: model.TableEvidence | None) -> Proposal | None:
 
 
 def counts_of(checks: Iterable[model.Check]) -> CheckCounts:
-    """Checks against references by what they rest on."""
+    """Checks against references, counted by what they rest on.
+
+    Parameters
+    ----------
+    checks : others than against references do not count
+
+    Returns
+    -------
+    counts : passed, failed and in conflict, of independent checks, those of consistency, and claims
+    """
     referenced = [check for check in checks if isinstance(check, model.ReferenceCheck)]
     return count_checks([check.kind for check in referenced], [check.status for check in referenced])
 
 
 def most_telling(failed: list[model.ReferenceCheck]) -> model.ReferenceCheck:
-    """The failed check to quote: of those not far behind the largest difference in mm, the first of the group that
-    tells most."""
+    """The failed check to quote in a verdict.
+
+    Parameters
+    ----------
+    failed : at least one
+
+    Returns
+    -------
+    check : of those not far behind the largest difference in mm, the first of the group that tells most
+    """
     lengths = [check for check in failed if check.unit == "mm"]
     smallest = TELLING_SHARE * max((abs(check.difference) for check in lengths), default=0.0)
     large = [check for check in lengths if abs(check.difference) >= smallest]
@@ -413,7 +496,18 @@ def key_figures(
     reach: Mapping[str, float],
     trips: model.RoundTripErrors | None,
 ) -> tuple[Figure, ...]:
-    """The stage's key figures; ``reach`` in mm by the figure's name."""
+    """The stage's key figures.
+
+    Parameters
+    ----------
+    axes : stated axes against the model's
+    reach : mm, by the figure's name
+    trips : errors of round trips; None if the arm has no closed form
+
+    Returns
+    -------
+    figures : mm, deg, or counts; only those that there are data for
+    """
     counts = counts_of(checks)
     figures = [
         Figure(name, tally.passed, "", of=tally.total)

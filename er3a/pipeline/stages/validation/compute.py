@@ -44,7 +44,16 @@ from er3a.robots.robot import Robot
 
 
 def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[model.SetDiagnosis, ...]:
-    """Diagnose a table against each reference set."""
+    """Diagnose a table against each reference set.
+
+    Parameters
+    ----------
+    robot : with revolute joints, one for each row
+
+    Returns
+    -------
+    diagnoses : one for each set, in their order
+    """
     return tuple(_set_diagnosis(robot, references, diagnosis_of(robot, references)) for references in sets)
 
 
@@ -64,7 +73,16 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
 
 
 def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
-    """Each stated axis line beside the model's, as its circles show it."""
+    """Each stated axis line against the model's.
+
+    Parameters
+    ----------
+    circles : what the model's points turn about, in the base frame
+
+    Returns
+    -------
+    rows : directions, mm and deg; the model's point is that of its axis nearest to the stated one
+    """
     rows = []
     for references in sets:
         for row in references.of(AxisRow):
@@ -80,7 +98,12 @@ def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
 
 
 def key_poses_table(robot: Robot, sets: list[ReferenceSet]) -> model.KeyPoses:
-    """The poses at which references state a point, with the model's; the zero pose comes first."""
+    """The poses at which references state a point, with the model's point.
+
+    Returns
+    -------
+    rows : the zero pose first; mm in the base frame. A coordinate that is not stated is the model's.
+    """
     rows = []
     for references in sets:
         for row in references.of(PositionRow):
@@ -132,7 +155,21 @@ def _checked(
 
 
 def compute(study: Study, name: str) -> model.ValidationResults:
-    """Check a robot's model, and say what is most likely wrong with it."""
+    """Check a robot's model against its reference sets and against itself, and say what is most likely wrong with it.
+
+    Parameters
+    ----------
+    name : of a robot or a variant; tool and base of the study do not count
+
+    Returns
+    -------
+    results : the same on every run with the study's seed
+
+    Raises
+    ------
+    InputError
+        naming file and row, or field, that can't be used
+    """
     robot = model.model_of(study, name)
     settings = study.section(ValidationSettings)
     sets = [load_references(reference, robot) for reference in robot.references]
@@ -235,7 +272,17 @@ def _left_out_of_places(placed: Robot, robot: Robot) -> Iterator[LeftOut]:
 
 
 def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.TableEvidence | None:
-    """What independent documents settle of the table; None where no reference states a value."""
+    """What independent documents settle of the table, entry by entry.
+
+    Parameters
+    ----------
+    robot : with revolute joints, one for each row
+
+    Returns
+    -------
+    evidence : with another table that documents describe or allow, if one was found; None where no reference states a
+        value
+    """
     references = [reference for own in sets for reference in own.references]
     if not any(reference.expected is not None for reference in references):
         return None
@@ -255,12 +302,22 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.Table
 
 
 def is_turning(robot: Robot) -> bool:
-    """Whether the arm is one of those that diagnosis and evidence are made for: revolute joints, one for each row."""
+    """Whether the arm is one of those that diagnosis and evidence are made for.
+
+    Returns
+    -------
+    turning : whether all joints are revolute, one for each row of the table
+    """
     return not robot.sliding.any() and robot.coupling is None
 
 
 def always_searched(robot: Robot) -> tuple[quantities.AxisDistance, ...]:
-    """The reaches that are searched for whatever the references say; an arm with other joints has no wrist centre."""
+    """The reaches that are searched for whatever the references say.
+
+    Returns
+    -------
+    quantities : distances from axes; those of the wrist centre only of arms with six revolute joints
+    """
     six = robot.rows == SIX and not robot.sliding.any()
     return ALWAYS_SEARCHED if six else tuple(each for each in ALWAYS_SEARCHED if each.point == "flange")
 

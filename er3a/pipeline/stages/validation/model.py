@@ -551,7 +551,16 @@ class Checks(Table):
 
     @classmethod
     def of_records(cls, checks: Iterable[Check]) -> Self:
-        """The table of checks."""
+        """The table of checks.
+
+        Parameters
+        ----------
+        checks : of the summary
+
+        Returns
+        -------
+        table : one row for each, in their order
+        """
         return cls.of_rows(tuple(getattr(check, name) for name in cls.columns()) for check in checks)
 
 
@@ -604,5 +613,15 @@ RESULTS = ValidationResults
 
 
 def model_of(study: Study, name: str) -> Robot:
-    """The robot as its file has it, without tool: references speak of its flange and of the manufacturer's base."""
+    """The robot as its file has it, without tool: references speak of its flange and of the manufacturer's base.
+
+    Parameters
+    ----------
+    name : of a robot or a variant
+
+    Raises
+    ------
+    InputError
+        naming file and field that can't be used
+    """
     return robot_of(study.table(name)).without_tool().replace(name=name)

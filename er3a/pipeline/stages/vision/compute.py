@@ -146,7 +146,19 @@ def calibration_result(
     offset: TimeOffset | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
-    """All that the summary says of a calibration."""
+    """All that the summary says of a calibration.
+
+    Parameters
+    ----------
+    head : the file that describes the recording
+    found : poses and half-widths of their 95 % intervals, m and rad
+    offset : between the clocks of two streams; None for one table
+    images : None for poses given as numbers
+
+    Returns
+    -------
+    result : mm and deg
+    """
     spread, turned = spread_of(found)
     moved, tilted = (None, None) if found.without_suspects is None else found.without_suspects
     boardless = images.boardless if images else ()
@@ -197,7 +209,13 @@ def _touch(found: HandEye) -> model.TouchResult | None:
 
 
 def sample_rows(found: HandEye, robot: Robot) -> model.SampleRows:
-    """One row for each sample."""
+    """One row for each sample: what is left between what the camera saw and what the arm says.
+
+    Returns
+    -------
+    rows : residuals in mm and deg, points in mm; the board's in the base frame for a camera on the flange, else the
+        board by the camera and by the arm. Joints are NaN where none were recorded.
+    """
     samples, count = found.samples, len(found.samples)
     in_hand = samples.setup == "eye_in_hand"
     seen = (samples.flange if in_hand else np.eye(4)) @ found.X @ samples.target
@@ -217,7 +235,16 @@ def sample_rows(found: HandEye, robot: Robot) -> model.SampleRows:
 
 
 def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
-    """One row for each corner in each image."""
+    """One row for each corner of the board in each image.
+
+    Parameters
+    ----------
+    images : None for poses given as numbers
+
+    Returns
+    -------
+    rows : px, as seen, by the board's pose in its image, and by the arm's; none without images
+    """
     if images is None:
         return model.CornerRows.empty()
     predicted = inverted(found.samples.hand @ found.X) @ found.Y
@@ -240,7 +267,21 @@ Found = (
 
 
 def compute(study: Study, name: str) -> model.VisionResults:
-    """Calibrate and plan grasps for a robot of the study."""
+    """Calibrate the camera, place the detected objects, and plan grasps for a robot of the study.
+
+    Parameters
+    ----------
+    name : of a robot with a vision file
+
+    Returns
+    -------
+    results : the same on every run with the study's seed; without grasps if the samples allow no calibration
+
+    Raises
+    ------
+    InputError
+        naming file and row, or field, that can't be used
+    """
     robot, file = study.robot(name), Path(str(study.entry(name).vision))
     task_file = load_vision(file, robot)
     head_path = file.parent / task_file.calibration
@@ -417,8 +458,15 @@ GRASPS_REST_ON = (LeftOut("detections"), LeftOut("gripped_parts"))
 
 
 def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> bool:
-    """Whether touched points show that the calibration is as exact as the gripper needs it; intervals that are wide for
-    another error, as a lens's distortion, contradict no points that are farther off."""
+    """Whether touched points show that the calibration is as exact as the gripper needs it.
+
+    Intervals that are wide for another error, as a lens's distortion, contradict no points that are farther off.
+
+    Parameters
+    ----------
+    touch : None where no points were touched
+    tolerance_mm : within which objects have to be placed; the smallest counts
+    """
     return touch is not None and 1000 * touch.largest <= min(tolerance_mm)
 
 
@@ -543,7 +591,17 @@ def _grasp(robot: Robot, chosen: ChosenGrasp) -> model.GraspResult:
 def verdict_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> Verdict[Found]:
-    """``near``: objects whose grasps come within the margin of assumed shapes, which are not counted as grasped."""
+    """The stage's answer, once the calibration is not in doubt.
+
+    Parameters
+    ----------
+    near : objects whose grasps come within the margin of assumed shapes, which are not counted as grasped
+
+    Returns
+    -------
+    verdict : fail if an expectation is not met, or nothing is grasped of what is to be; caution if some objects are not
+        grasped, or the calibration has warnings
+    """
     if unmet := unmet_expectations(objects, "grasped"):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
@@ -577,6 +635,17 @@ def _least_success(objects: Sequence[model.ObjectResult]) -> float | None:
 def figures_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
 ) -> tuple[Figure, ...]:
+    """The stage's key figures.
+
+    Parameters
+    ----------
+    near : objects whose grasps come within the margin of assumed shapes, which are not counted as grasped
+
+    Returns
+    -------
+    figures : samples used, half-widths of the camera's pose in mm and deg, objects grasped, worst error in mm, and the
+        least share of success in %
+    """
     asked = [each for each in objects if each.expect in (None, "grasped")]
     lowest = _least_success(asked)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)

@@ -16,14 +16,38 @@ from er3a.pipeline.stages.stage import Stage, StudyFiles
 
 
 def vision_files(path: str | Path) -> list[Path]:
-    """A vision file, its calibration set, and the tables and images of that."""
+    """A vision file, its calibration set, and the tables and images of that.
+
+    Parameters
+    ----------
+    path : of the vision file
+
+    Raises
+    ------
+    InputError
+        if it, or its calibration set, is no YAML file
+    """
     own = Path(path)
     calibration = read_yaml(own).get("calibration")
     return [own, *(calibration_files(own.parent / calibration) if isinstance(calibration, str) else [])]
 
 
 def calibration_files(path: str | Path) -> list[Path]:
-    """A calibration set's own file and the tables and images that it names."""
+    """A calibration set's own file, and the tables and images that it names.
+
+    Parameters
+    ----------
+    path : of the calibration set
+
+    Returns
+    -------
+    files : its own first; others may be missing
+
+    Raises
+    ------
+    InputError
+        if it is no YAML file
+    """
     path = Path(path)
     head: dict[str, Any] = read_yaml(path)
     streams = head.get("streams")

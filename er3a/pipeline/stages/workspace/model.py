@@ -171,7 +171,17 @@ Triple = tuple[float, float, float]
 
 
 def triple(values: Iterable[float]) -> Triple:
-    """Three numbers of a vector."""
+    """Three numbers of a vector, as plain floats for a summary.
+
+    Parameters
+    ----------
+    values : exactly three
+
+    Raises
+    ------
+    ValueError
+        for more or fewer
+    """
     x, y, z = (float(value) for value in values)
     return x, y, z
 
@@ -193,7 +203,13 @@ class SectionFrame:
 
 
 def frame_of(R: Reals, origin: Reals) -> SectionFrame:
-    """A frame by the rows of its axes (3, 3) and its origin."""
+    """A frame for the summary.
+
+    Parameters
+    ----------
+    R : (3, 3), its axes x, y, z as rows, in the base frame
+    origin : (3,), m
+    """
     x, y, z = (triple(row) for row in R)
     return SectionFrame((x, y, z), triple(origin))
 
@@ -516,15 +532,32 @@ class CellLookup:
         return (rho // self.cell).astype(np.int64), np.floor((z - self.heights[0]) / self.cell).astype(np.int64), sector
 
     def row(self, rho: Reals, azimuth: Reals, z: Reals) -> NDArray[np.int64]:
-        """Row numbers for points about axis 1 (m, rad, m; any shape) or of bars (m), -1 where nothing is reached."""
+        """Row numbers of the capability's cells that hold some points.
+
+        Parameters
+        ----------
+        rho, azimuth, z : m, rad and m about axis 1, or m of bars; any one shape
+
+        Returns
+        -------
+        rows : of that shape; -1 where nothing is reached
+        """
         index = self._index(rho, azimuth, z)
         inside = np.all([(part >= 0) & (part < size) for part, size in zip(index, self.rows.shape)], axis=0)
         return np.where(inside, self.rows[tuple(np.where(inside, part, 0) for part in index)], -1)
 
 
 def cloud(robot: Robot, q: Reals) -> Cloud:
-    """Tool points of samples (n, joints), rad or m, and their manipulability: of arms with other than six joints the
-    product of the singular values."""
+    """Tool points of samples and their manipulability.
+
+    Parameters
+    ----------
+    q : (n, joints), rad or m
+
+    Returns
+    -------
+    cloud : m in the base frame; |det J|, for other than six joints the product of the singular values
+    """
     J = jacobian(robot, q)
     square = robot.joints == J.shape[-2]
     measure = np.abs(np.linalg.det(J)) if square else np.linalg.svd(J, compute_uv=False).prod(axis=-1)
@@ -532,7 +565,16 @@ def cloud(robot: Robot, q: Reals) -> Cloud:
 
 
 def proof(proven: Proven) -> ProofCells:
-    """All cells of a proof."""
+    """All cells of a proof of the workspace, as a table.
+
+    Parameters
+    ----------
+    proven : rings about axis 1, or bars along a first prismatic joint
+
+    Returns
+    -------
+    cells : m, m^3, and arcs of azimuth in deg
+    """
     found = proven.proof
     return ProofCells.of(
         rho_m=found.cells[:, :2],
@@ -547,7 +589,16 @@ def proof(proven: Proven) -> ProofCells:
 
 
 def border(proven: Proven) -> Border:
-    """Outline of what a proof leaves reachable at some azimuth."""
+    """Outline of what a proof leaves reachable at some azimuth.
+
+    Parameters
+    ----------
+    proven : rings about axis 1
+
+    Returns
+    -------
+    border : closed lines in the section, m, numbered from 1; none for bars
+    """
     found, lines = proven.section, list[Any]()
     if proven.proof.bar == 0:
         high = proven.proof.cells[:, [1, 3]].max(axis=0)
@@ -561,7 +612,16 @@ def border(proven: Proven) -> Border:
 
 
 def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
-    """The surfaces of voids, numbered from 1."""
+    """The surfaces of voids.
+
+    Parameters
+    ----------
+    voids : in the order of the summary
+
+    Returns
+    -------
+    vertices, triangles : m in the base frame, with the number of the void from 1
+    """
     numbered = list(enumerate(voids, start=1))
     return (
         VoidVertices.stacked(VoidVertices.of(point_m=void.vertices, void=n) for n, void in numbered),
@@ -570,8 +630,14 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
 
 
 def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool) -> CapabilityCells:
-    """Reached cells and sectors, in which poses were tried; ``middles`` (n, 2), m, are those of all cells, which are
-    bars or rings."""
+    """Reached cells and sectors, with the random poses tried in each.
+
+    Parameters
+    ----------
+    middles : (n, 2), m, of all cells: distance from axis 1 and height, or of bars
+    tried : one entry for each reached cell and sector
+    bars : whether cells are bars, divided along their length in place of sectors of azimuth
+    """
     cell, sector = np.nonzero(found.reachability)
     return CapabilityCells(
         reached_tries=tried.reached.astype(np.int16),
@@ -587,7 +653,16 @@ def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool)
 
 
 def places(found: Places) -> BoxPlaces:
-    """Positions of the tray."""
+    """Positions of the tray, as a table.
+
+    Parameters
+    ----------
+    found : m and rad; a margin without limit is infinite there
+
+    Returns
+    -------
+    rows : m and deg; that margin is NaN
+    """
     margin = np.where(np.isinf(found.limit_margin), np.nan, found.limit_margin)
     return BoxPlaces.of(found, manipulability_m3=found.manipulability, limit_margin=margin)
 

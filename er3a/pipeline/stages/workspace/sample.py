@@ -12,13 +12,28 @@ from er3a.sampling.tally import Tally, tally_blocks
 
 
 def draw_of(study: Study) -> Draw:
-    """How the study draws its samples."""
+    """How the study draws its samples.
+
+    Returns
+    -------
+    draw : seed, number of samples, blocks, and the rule; samples do not depend on how blocks are grouped into jobs
+    """
     settings = study.section(WorkspaceSettings)
     return Draw(study.seed, settings.samples, settings.blocks, settings.sampling)
 
 
 def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
-    """The tally of some blocks of the study, with progress on standard error."""
+    """The tally of some blocks of the study's samples, with progress on standard error.
+
+    Parameters
+    ----------
+    grid : of the section's cells, m
+    blocks : their numbers, from 0, without gaps
+
+    Returns
+    -------
+    tally : of these blocks alone
+    """
     draw = draw_of(study)
     total = int(draw.sizes[blocks.start : blocks.stop].sum())
     with shown_work(f"{robot.name}: drawing {total:,} samples"):

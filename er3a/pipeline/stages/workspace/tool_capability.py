@@ -90,7 +90,17 @@ class CapabilityPlan:
     coarse: bool
 
     def tries_of(self, reached: int, sectors: int) -> int:
-        """How many poses to try in each of so many reached cells and sectors."""
+        """How many random poses to try in each reached cell and sector.
+
+        Parameters
+        ----------
+        reached : cells and sectors that are reached, of which all together have ``poses`` to try at most
+        sectors : of azimuth; each cell's tries are shared out among them
+
+        Returns
+        -------
+        tries : at least 1
+        """
         tries = max(MIN_TRIES, CELL_TRIES // sectors)
         return tries if self.poses is None else max(1, min(tries, self.poses // max(1, reached)))
 
@@ -378,6 +388,16 @@ def _task(asked: BoxTask) -> Task:
 
 
 def task_summary(asked: BoxTask) -> model.TaskSummary:
+    """What was asked of places for the tray, for the summary.
+
+    Parameters
+    ----------
+    asked : as the study has it
+
+    Returns
+    -------
+    task : mm and deg
+    """
     box, direction = model.triple(asked.box_mm), model.triple(asked.tool_direction)
     return stated(model.TaskSummary, asked, box_mm=box, tool_direction=direction)
 

@@ -135,6 +135,18 @@ def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
 
 
 def place_row(name: str, place: model.PlaceSummary, capability: model.CapabilitySummary) -> list[str]:
+    """A row of the page's table of places for the tray.
+
+    Parameters
+    ----------
+    name : of the place
+    capability : says whether branches have names
+
+    Returns
+    -------
+    cells : name, middle and size in mm, branch, manipulability in % of the largest, margin to limits, clearance in mm
+        with its pair of bodies, and the room around
+    """
     if place.branch is None and capability.arm_angles > 1:
         branch = tr("at several values of what poses leave open")
     elif place.branch is None:
