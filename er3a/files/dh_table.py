@@ -359,6 +359,7 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
         off = [[abs(x * scale - round(x * scale / step) * step) for x in lengths] for step, _, _ in ROUND_MM]
         return any(len(set(lengths)) >= least and max(gaps) < near for gaps, (_, near, least) in zip(off, ROUND_MM))
 
+    # Arms are made in round mm: lengths that are round mm only if they are read as inches are inches.
     metres = max(lengths) < SHORTEST_ARM_MM
     in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
     if in_inches and not (metres and is_round(1000.0)):
@@ -510,6 +511,7 @@ def heading_of(text: str) -> _Heading | None:
     plain = re.sub(r"[\s{}\\]", "", text.lower().translate(_PLAIN))
     unit = next((_UNITS[each] for each in re.findall(r"[(\[/]([^()\[\]/]+)", plain) if each in _UNITS), "")
     name = re.sub(r"[(\[].*?[)\]]|/.*", "", plain)
+    # Without the index, which says only whether the entry belongs to the joint or to the link before it.
     name = re.sub(r"_?[ij]-1$|ᵢ₋₁$|[ᵢⱼ]$|(?<=.)_?[ij]$", "", name)
     if name in _JOINT:
         return _Heading("joint", "", False)

@@ -245,8 +245,8 @@ def check_masses(
     Raises
     ------
     ValueError
-        as ``field: problem | remedy``: repeated or unknown joints, moments about a joint that slides, N m of one that
-        slides or N of one that turns, a peak below the rated value
+        as ``field: problem | remedy``: repeated or unknown joints, moments about a joint that slides, units of the
+        other type of joint, or a peak below the rated value
     """
     rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
     rows.append(("wrist_load", wrist.rows if wrist else []))
@@ -323,6 +323,7 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
     for origin in inertia.origins:
         T = T @ origin.transform()
         stated[origin.joint] = T
+    # Both frames of a link move together, so how they lie to each other with the joints at 0 holds always.
     own = np.linalg.inv(at_zero) @ stated
     return tuple(LinkMass(row.link, moved(row.body, own[row.link])) for row in inertia.links)
 

@@ -81,6 +81,7 @@ def link_mesh(link: int, corners: Reals) -> LinkMesh:
     -------
     mesh : with corners that are equal to single precision in mm joined to one
     """
+    # As an STL holds them, so that what is read back is equal to what was written.
     rounded = (1000 * np.asarray(corners).reshape(-1, 3)).astype(np.float32).astype(float) / 1000
     points, same = np.unique(rounded, axis=0, return_inverse=True)
     return LinkMesh(link, points, same.reshape(-1, 3).astype(np.int64))

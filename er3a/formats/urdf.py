@@ -156,6 +156,8 @@ def _senses(directions: Reals, incoming: Reals, outgoing: Reals) -> Reals:
     z = directions.copy()
     for i in range(len(z)):
         along = directions[i] @ (outgoing[i] - incoming[i])
+        # Parallel to the axis before: equal sense, so alpha is 0 and not 180 deg. Else the sense that makes d positive;
+        # without any d, the one along a positive axis of the base.
         if i and np.linalg.norm(np.cross(z[i - 1], z[i])) < NEARLY_PARALLEL:
             flip = z[i - 1] @ z[i] < 0
         elif abs(along) > SAME_POINT_M:
@@ -314,8 +316,8 @@ def urdf_groups(
 
     Returns
     -------
-    groups : envelopes if a link of the chain has a collision shape, inertia if one has a body, drives if a moving joint
-        has friction, damping or an effort
+    groups : envelopes if a link of the chain has a collision shape, inertia if one has a body. Drives if a moving joint
+        has friction, damping or an effort.
     """
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)

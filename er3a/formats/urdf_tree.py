@@ -227,6 +227,7 @@ class Tree:
             if self.hand_begins(moving, count):
                 found.append(link)
             elif active:
+                # Reversed, because the last is taken first: so links come in the order of the file.
                 todo += [(joint.child, count + joint.independent) for joint in reversed(active)]
             elif count:
                 found.append(self._tail(link))

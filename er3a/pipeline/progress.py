@@ -82,6 +82,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     try:
         yield
     finally:
+        # A limit from outside goes on, with the time that it had left when this one began.
         signal.setitimer(signal.ITIMER_REAL, *rest)
         signal.signal(signal.SIGALRM, before)
 

@@ -420,6 +420,7 @@ def write_results(
     if kind is not AbsentResults:
         _parsed(folder / SUMMARY, json.loads(text), kind)  # what is written can be read
     write_atomically(folder / SUMMARY, lambda file: file.write_text(text, encoding="utf-8"))
+    # Last, so that a folder that was left half-written is not taken for whole.
     write_checksums(folder)
 
 

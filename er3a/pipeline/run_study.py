@@ -361,7 +361,7 @@ def parsed(words: Sequence[str]) -> Namespace:
     Raises
     ------
     RunError
-        for words that Snakemake does not know, or less than one core or job
+        for words that Snakemake does not know, or less than one core or job to run with
     """
     from snakemake.cli import get_argument_parser
     from snakemake.exceptions import CliException

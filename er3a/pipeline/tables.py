@@ -247,6 +247,7 @@ class Table(ByValue):
         else:
             empty = {name: np.empty((0, len(flags)), self.columns()[name].dtype) for name in groups}
             found = replace(self, **empty)
+        # The table is frozen, and the flags are no column: they only decide names and units in the file.
         if any(flags):
             object.__setattr__(found, "slides", flags)
         return found

@@ -113,6 +113,7 @@ class MotionLaw:
         t : (k,), s after the start
         """
         share, ramp = np.asarray(share, float), self.ramp * self.duration
+        # On a ramp the share grows with the square of the time: share = top t^2 / (2 ramp).
         rise = self.top * ramp / 2
         early, late = (
             np.sqrt(2 * ramp * np.clip(share, 0, None) / self.top),
@@ -221,6 +222,7 @@ def law_of(way: float, speed: float, acceleration: float) -> MotionLaw:
     -------
     law : the triangular profile, with half of the time for each ramp, if the way is too short to reach the speed
     """
+    # Each ramp takes speed / acceleration; both together need a way of speed^2 / acceleration.
     if way * acceleration >= speed * speed:
         duration = way / speed + speed / acceleration
         return MotionLaw(duration, speed / acceleration / duration)
@@ -523,9 +525,8 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
 
     Returns
     -------
-    findings : the joint that turns most, if it turns by more than 90 deg while the tool moves less than 50 mm and turns
-        less than half as far; and joints that turn by more than 180 deg, where another turn within the limits is
-        shorter
+    findings : the joint that turns most, if by more than 90 deg, while the tool moves less than 50 mm and turns less
+        than half as far. Also joints that turn by more than 180 deg, where another turn within the limits is shorter.
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[found_in.CheckFinding] = []

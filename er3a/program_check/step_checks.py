@@ -385,6 +385,7 @@ class Obstacles(ByValue):
         parts = np.flatnonzero(owner[:-1] == owner[1:])
         i, j = parts, parts + 1
         while len(i):
+            # Clear between two points if their distances together exceed twice the motion [1]_; touching if both touch.
             moved = self._moved(q[i], q[j])
             apart, touching = d[i] + d[j] - 2 * moved, np.maximum(d[i], d[j]) < 0
             open_ = (apart <= 0) & ~touching & (moved > self.tolerance)
@@ -483,6 +484,7 @@ class Obstacles(ByValue):
             return
         begins, corner = before.at(np.array([1 - min(shares[0], 0.5)]))[0], before.q[-1]
         ends = after.at(np.array([min(shares[1], 0.5)]))[0]
+        # How a controller rounds a corner is not known: looked at are the shortest way and a parabola within the zone.
         s = np.linspace(0, 1, CORNER_POINTS)[:, None]
         chord = begins + s * (ends - begins)
         rounded = (1 - s) ** 2 * begins + 2 * s * (1 - s) * corner + s**2 * ends

@@ -242,6 +242,7 @@ class CodeBuilder:
         self.add(syntax.Assign(place, by, syntax.Constant(1) if step is None else step, text, local=True))
         self._open("for", place)
         self.blocks[-1].subject, self.blocks[-1].step = counter, by
+        # One test for steps of either sign: until the last value is passed, what is left and the step have one sign.
         span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
         self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
 
@@ -310,6 +311,7 @@ class CodeBuilder:
         block = self._innermost(kind, place)
         if kind == "repeat":
             assert until is not None
+            # A ``continue`` goes on at the condition, not after the loop.
             self._patch(block.skips)
             self.add(syntax.Branch(place, until, block.start, text))
         elif block.kind in LOOPS:

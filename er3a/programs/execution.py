@@ -188,6 +188,7 @@ class Execution(ByValue):
         start = None if again is None else sum(i < again for i in kept)
         if start is not None and start >= len(kept):
             start = None
+        # A repetition is noticed one round later; that round is not written twice.
         while start is not None and self._same_round(kept, start):
             length = len(kept) - start
             del kept[start:]

@@ -403,9 +403,11 @@ def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals
     size = float(np.linalg.norm(normal))
     if size <= ON_A_LINE * max(float(a @ a), float(b @ b), 1e-12):
         return None
+    # The circumcentre of a triangle with one corner at the origin and the others at a and b.
     to_centre = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * size * size)
     normal = normal / size
     last = b - to_centre
+    # About this normal the arc meets the second point before the third, however far it turns.
     angle = float(np.arctan2(normal @ np.cross(-to_centre, last), -to_centre @ last) % (2 * np.pi))
     centre: Reals = start + to_centre
     return centre, normal, angle
@@ -428,6 +430,7 @@ def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | No
         return None
     centre, _, angle = circle
     radius = float(np.linalg.norm(start[:3, 3] - centre))
+    # A chord over an angle w leaves its arc by radius (1 - cos(w / 2)).
     widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
     count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
     found = arc_poses(start, via, end, np.arange(1, count + 1) / count)

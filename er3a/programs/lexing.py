@@ -183,6 +183,7 @@ class Words:
             if self._length > LONGEST:
                 raise MisreadError("too long an expression")
             operator = self.take()
+            # One rank higher on the right, because operators of one rank bind from left to right.
             found = Binary(operator, found, self.expression(binds + 1))
         self._depth -= 1
         return found

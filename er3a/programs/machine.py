@@ -207,6 +207,7 @@ class Machine:
             self.budget -= 1
             operation = frame.routine.code[frame.at]
             counts = isinstance(operation, syntax.Branch) and operation.counted
+            # Ways meet where jumps lead to. One in a state in which another has been would only repeat that one.
             if frame.at in self.labels[frame.routine.name] and not (counts and self._is_known(way, operation)):
                 self.budget -= STATE_COST
                 if self.pending and begun:
@@ -552,6 +553,7 @@ def execute(
         bare = robot.without_tool().replace(base=np.eye(4))
 
         def flange(joints: Reals) -> Reals:
+            """T_robot_flange (..., 4, 4), m, of joints (..., n), rad or m."""
             return forward(bare, joints)
 
     known = {name: check_poses(pose, name) for name, pose in (frames or {}).items()}

@@ -795,10 +795,12 @@ def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
     pose : (4, 4), m, of the axes at the centre of mass, in the flange's frame; right-handed
     moments : (3,), kg m^2, by the eigenvectors of the inertia; as they are given if there are no products of inertia
     """
+    # Axes without products of inertia are principal already; ``eigh`` would put them in the order of their moments.
     moments, axes = np.linalg.eigh(load.inertia_matrix)
     if not any(load.inertia[3:]):
         moments, axes = np.array(load.inertia[:3]), np.eye(3)
     pose = np.eye(4)
+    # Eigenvectors have no sign, and a frame is right-handed.
     pose[:3, :3] = axes if np.linalg.det(axes) > 0 else -axes
     pose[:3, 3] = load.centre
     return pose, moments

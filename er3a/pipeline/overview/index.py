@@ -300,6 +300,7 @@ class _TextOfPage(HTMLParser):
         self._parts, self._unexamined = list[str](), False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Begin a block or row; what an image shows counts as text."""
         named = dict(attrs)
         self._between(tag)
         if tag in self._depth:
@@ -310,6 +311,7 @@ class _TextOfPage(HTMLParser):
         self.handle_data(named.get("alt") or "")
 
     def handle_endtag(self, tag: str) -> None:
+        """End a block or row; a heading's text is that of what follows."""
         if tag in self._depth:
             self._depth[tag] -= 1
         if tag in self._heads:
@@ -318,6 +320,7 @@ class _TextOfPage(HTMLParser):
         self._unexamined &= tag != "table"
 
     def handle_data(self, data: str) -> None:
+        """Take text of the main part, but for what is in ``NOT_READ``."""
         if self._depth["main"] and not any(self._depth[tag] for tag in self.NOT_READ):
             self._parts.append(data)
 

@@ -332,6 +332,7 @@ def svg_data_uri(figure: Figure) -> Markup:
     address : ``data:image/svg+xml,...``; equal figures give equal text
     """
     buffer = io.BytesIO()
+    # Of the parts that are rasterised; the rest has no resolution.
     figure.dpi = 160
     name_parts(figure)
     # Not savefig: it would draw a figure with a layout twice.

@@ -77,6 +77,7 @@ def legible(colour: str) -> tuple[int, int, int]:
     -----
     Its relative luminance (WCAG 2) is scaled to where the contrast with both grounds is the same.
     """
+    # From sRGB to linear light, in which luminance is a weighted sum, and back (IEC 61966-2-1).
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (part / 255 for part in rgb(colour))]
     luminance = sum(weight * c for weight, c in zip((0.2126, 0.7152, 0.0722), linear))
     scaled = [min(1.0, c * _BETWEEN_GROUNDS / luminance) for c in linear]

@@ -166,6 +166,7 @@ def server(recordings: Sequence[Path]) -> ThreadingHTTPServer:
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
+            """Answer with a file that is kept in memory, under the policy; 404 for any other path."""
             kind, content = files.get(self.path.partition("?")[0], (None, b""))
             self.send_response(200 if kind else 404)
             self.send_header("Content-Type", kind or "text/plain")

@@ -129,6 +129,7 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
     offset = instructions.pose_of([each or 0.0 for each in given], "kuka")
     if in_tool:
         return instructions.PoseTarget(seen @ offset, external=_external(found))
+    # Along and about the axes of the base, with the tool point as the centre of the turn.
     pose = seen.copy()
     pose[:3, 3] += offset[:3, 3]
     pose[:3, :3] = offset[:3, :3] @ seen[:3, :3]

@@ -114,7 +114,7 @@ class RapidDialect(Dialect):
         return next((each for each in values if isinstance(each, syntax.Unclear)), syntax.Unclear(unclear))
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
-        """The motion of MoveJ, MoveL, MoveC and MoveAbsJ, also of those that set an output besides.
+        """The motion of MoveJ, MoveL, MoveC and MoveAbsJ, also of those that set an output with it.
 
         Returns
         -------

@@ -168,6 +168,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
+    # Some arms can't have all joints at 0: home is as near to it as the limits allow.
     q_home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
     smallest, nearest = bodies.min_distance(q_home[None])
     at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None

@@ -336,6 +336,7 @@ def sequence(
     if len(reached) < 2:
         return None
     rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
+    # A rank of 0 marks what is refused.
     usable = [np.flatnonzero(one.rows.rank) for one in reached]
     sets = [one.solutions.q[rows] for one, rows in zip(reached, usable)]
     found = best_of_sets(robot, sets, targets[0].q_ref, rule, acceleration)

@@ -110,6 +110,7 @@ def key_poses_table(robot: Robot, sets: list[ReferenceSet]) -> model.KeyPoses:
             given = np.array([np.nan if value is None else value for value in row.xyz_mm])
             pose = (*row.pose, *quantities.ZERO_POSE)[: robot.joints]
             modelled = quantities.point_of(frames(robot, meant(robot, np.array(pose))), row.point)
+            # A source may give some coordinates only: the others are the model's, and so make no difference.
             stated = given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
             head = (references.name, row.source, row.grade, row.group, model.NamedPose(row.name), row.point, pose)
             rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))

@@ -213,8 +213,8 @@ def sample_rows(found: HandEye, robot: Robot) -> model.SampleRows:
 
     Returns
     -------
-    rows : residuals in mm and deg, points in mm; the board's in the base frame for a camera on the flange, else the
-        board by the camera and by the arm. Joints are NaN where none were recorded.
+    rows : residuals in mm and deg. Points in mm, in the base frame: the flange, the board as it was seen, and as it was
+        predicted. Joints are NaN where none were recorded.
     """
     samples, count = found.samples, len(found.samples)
     in_hand = samples.setup == "eye_in_hand"

@@ -560,6 +560,7 @@ def cloud(robot: Robot, q: Reals) -> Cloud:
     """
     J = jacobian(robot, q)
     square = robot.joints == J.shape[-2]
+    # For a square Jacobian the product of the singular values is |det J|.
     measure = np.abs(np.linalg.det(J)) if square else np.linalg.svd(J, compute_uv=False).prod(axis=-1)
     return Cloud(forward(robot, q)[:, :3, 3], measure)
 

@@ -144,8 +144,8 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
 
     Returns
     -------
-    cells : name, middle and size in mm, branch, manipulability in % of the largest, margin to limits, clearance in mm
-        with its pair of bodies, and the room around
+    cells : name, middle and size in mm, branch, manipulability in % of the largest, and margin to limits. Then
+        clearance in mm with its pair of bodies, and the room around.
     """
     if place.branch is None and capability.arm_angles > 1:
         branch = tr("at several values of what poses leave open")
