@@ -157,7 +157,7 @@ class StandardDeviations(StrictModel):
         return self
 
     def covariance(self) -> Reals:
-        """(6, 6), m and rad."""
+        """Covariance (6, 6) of a pose, m^2 and rad^2: first the position, then the rotation, about the axes of its frame."""
         position = np.broadcast_to(np.array(self.position_mm) / 1000, 3)
         return np.diag(np.concatenate([position, np.broadcast_to(np.radians(self.rotation_deg), 3)]) ** 2)
 
@@ -188,7 +188,7 @@ class BoardEntry(StrictModel):
         return self
 
     def board(self) -> Board:
-        """In the units of the library."""
+        """The board in the units of the library, lengths in m."""
         return in_si(Board, self)
 
 

@@ -552,7 +552,7 @@ class LineTo(StrictModel):
     half_turn_axis: Triple | None = None
 
     def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units."""
+        """The segment in SI units: its end T_base_tool (4, 4), m."""
         return commands.SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
 
 
@@ -562,7 +562,7 @@ class ArcTo(LineTo):
     via_mm: PositionMm
 
     def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units."""
+        """The segment in SI units: its end T_base_tool (4, 4), and the point (3,) that it passes, m."""
         return replace(super().segment(), via=np.array(self.via_mm) / 1000)
 
 

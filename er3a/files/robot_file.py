@@ -89,7 +89,7 @@ class Placement(StrictModel):
     rpy_deg: Triple = [0.0, 0.0, 0.0]
 
     def transform(self) -> np.ndarray:
-        """(4, 4), m."""
+        """The placement as a transform (4, 4), m."""
         return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
@@ -118,7 +118,7 @@ class BodyFields(StrictModel):
 
     @property
     def body(self) -> MassBody:
-        """In SI units, in the frame of the file."""
+        """The body in SI units (kg, m, kg m^2), in the frame of the file."""
         return in_si(MassBody, self)
 
 
@@ -597,7 +597,17 @@ class LinkVisual(StrictModel):
         return self
 
     def visual(self) -> LinkMesh:
-        """In metres; ``ValueError`` for anything but triangles."""
+        """Unpack the mesh.
+
+        Returns
+        -------
+        visual : corners in m, in the frame of the link's joint
+
+        Raises
+        ------
+        ValueError
+            if what is packed is anything but triangles
+        """
         try:
             points, faces = (
                 np.frombuffer(base64.b64decode(text, validate=True), kind).reshape(-1, 3)

@@ -40,7 +40,7 @@ class Obstacle(StrictModel):
     rpy_deg: RpyDeg = [0.0, 0.0, 0.0]
 
     def place(self) -> np.ndarray:
-        """T_world_solid (4, 4)."""
+        """Where the solid is: T_world_solid (4, 4), m."""
         return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
@@ -56,7 +56,7 @@ class BoxObstacle(Obstacle):
         return values
 
     def solid(self) -> library.Box:
-        """In the units of the library."""
+        """The box in the units of the library: edges (3,) in m."""
         return library.Box(self.name, self.place(), np.array(self.size_mm) / 1000)
 
 
@@ -74,7 +74,7 @@ class CylinderObstacle(Obstacle):
         return self
 
     def solid(self) -> library.Cylinder:
-        """In the units of the library."""
+        """The cylinder in the units of the library: radius and length in m, its axis along z."""
         return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
@@ -101,7 +101,7 @@ class SphereObstacle(StrictModel):
         return value
 
     def solid(self) -> library.Sphere:
-        """In the units of the library."""
+        """The sphere in the units of the library: radius in m."""
         return library.Sphere(self.name, transform(np.array(self.xyz_mm) / 1000, np.zeros(3)), self.radius_mm / 1000)
 
 

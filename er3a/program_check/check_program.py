@@ -184,7 +184,12 @@ class ProgramCheck(ByValue):
 
     @property
     def arms(self) -> tuple[tuple[str, Robot], ...]:
-        """The robot with each tool that motions have, and the name that the program gives the tool."""
+        """The tools that motions of the program have, each on the robot.
+
+        Returns
+        -------
+        arms : pairs of the tool's name in the program and the robot with that tool
+        """
         return tuple({id(each.arm): (each.motion.tool.name, each.arm) for each in self.motions.values()}.values())
 
 

@@ -175,12 +175,12 @@ class MotionPath(ByValue):
 
     @property
     def t(self) -> Reals:
-        """Times (N,) of the points, s."""
+        """Times (N,) of the points, s after the motion's start."""
         return self.law.times(self.share)
 
     @property
     def end(self) -> Reals | None:
-        """Joints (n,) at the end; None where that is not come to."""
+        """Joints (n,) at the end, rad or m; None where that is not come to."""
         return self.q[-1] if self.stop is None else None
 
     def at(self, share: Reals) -> Reals:
@@ -526,7 +526,7 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
     Returns
     -------
     findings : the joint that turns most, if by more than 90 deg, while the tool moves less than 50 mm and turns less
-        than half as far. Also joints that turn by more than 180 deg, where another turn within the limits is shorter.
+        than half as far. Joints that turn by more than 180 deg, where another turn within the limits is shorter.
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[found_in.CheckFinding] = []

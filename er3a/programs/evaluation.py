@@ -128,7 +128,12 @@ class Position:
         return found
 
     def key(self) -> tuple[bytes, ...]:
-        """A key that is equal for equal positions."""
+        """A key that is equal for equal positions, by which states of a program are compared.
+
+        Returns
+        -------
+        key : bytes of joints, pose and frames; frames count only where the pose is known
+        """
         frames = (self.tool, self.base) if self.pose is not None else ()
         parts = (self.joints, self.pose, *(frame.pose for frame in frames))
         words = tuple(frame.name.encode() for frame in frames)
@@ -390,7 +395,12 @@ class ProgramMemory:
         self.kept: dict[object, object] = {}
 
     def copy(self) -> ProgramMemory:
-        """An independent copy."""
+        """An independent copy, for a way that goes on by itself.
+
+        Returns
+        -------
+        memory : values are copied; types and the cell, which do not differ between ways, are shared
+        """
         other = ProgramMemory(self.functions, self.cell)
         other.here, other.types = self.here, self.types
         other.shared, other.local = dict(self.shared), dict(self.local)

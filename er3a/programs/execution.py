@@ -148,7 +148,12 @@ class Execution(ByValue):
         return tuple(reversed(found))
 
     def main(self) -> Ending:
-        """The way from the program's beginning with the most motions; the first of them if there are several."""
+        """The way from the program's beginning with the most motions; the first of them if there are several.
+
+        Returns
+        -------
+        ending : with which that way ends, to be given to :meth:`way` or :meth:`listing`
+        """
         moves = [0] * (len(self.steps) + 1)
         for i, step in enumerate(self.steps):
             moves[i] = moves[step.before] + isinstance(step.instruction, ArmMotion)

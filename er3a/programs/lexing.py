@@ -119,13 +119,25 @@ class Words:
             raise MisreadError(f"'{word}' expected before '{self.next}'")
 
     def name(self) -> str:
-        """A name, which is passed."""
+        """A name, which is passed.
+
+        Raises
+        ------
+        MisreadError
+            if the next word is none
+        """
         if self.kind != "name":
             raise MisreadError(f"a name expected before '{self.next}'")
         return self.take()
 
     def finish(self) -> None:
-        """Nothing may follow."""
+        """Check that nothing follows in the statement.
+
+        Raises
+        ------
+        MisreadError
+            naming what follows
+        """
         if self.kind != "end":
             raise MisreadError(f"'{self.next}' not expected")
 
@@ -225,7 +237,12 @@ class Words:
         return tuple(placed), tuple(named)
 
     def special(self) -> Expression | None:
-        """An expression that this language alone has; None if none begins here."""
+        """An expression that this language alone has, such as an aggregate.
+
+        Returns
+        -------
+        expression : None, with nothing passed, if none begins here
+        """
         return None
 
     def reference(self) -> Expression:

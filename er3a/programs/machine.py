@@ -79,7 +79,12 @@ class Way:
         return self.memory.shared, *(frame.local for frame in self.frames)
 
     def fork(self) -> Way:
-        """Another that goes its own way from here."""
+        """Another way that goes on from here by itself, as on the other side of a branch.
+
+        Returns
+        -------
+        way : with copies of the values; what was carried out so far is shared
+        """
         memory = self.memory.copy()
         frames = [replace(frame, local=dict(frame.local)) for frame in self.frames]
         memory.local = frames[-1].local
@@ -125,7 +130,13 @@ class Machine:
         self.fixed: set[str] = set()  # variables that nothing changes, or that nothing depends on
 
     def run(self) -> Execution:
-        """Follow all ways from the program's beginning, then from that of each routine that was not come to."""
+        """Follow all ways from the program's beginning, then from that of each routine that was not come to.
+
+        Returns
+        -------
+        execution : all steps, each with the one before it, and how each way ends. What a limit cut off is named in
+            ``open``.
+        """
         start = ProgramMemory(self.dialect, self.cell)
         for each in self.program.data:
             self._assign(start, each)

@@ -354,7 +354,13 @@ class Writer(ABC):
         self.own = listing.language in self.languages
 
     def write(self) -> WrittenProgram:
-        """The files."""
+        """Write the whole sequence.
+
+        Returns
+        -------
+        program : texts of the files, and findings on what the language could not hold. The head of the file says these
+            too.
+        """
         framed = [with_default_frames(each, self.robot) for each in self.listing.instructions]
         ready = [self.resolver.ready(each) if isinstance(each, instructions.ArmMotion) else each for each in framed]
         for i, instruction in enumerate(ready):
@@ -423,7 +429,10 @@ class Writer(ABC):
             self.line(line)
 
     def begin_loop(self) -> None:
-        """What follows is done for ever; what was set before does not count within."""
+        """Begin what is done for ever, to the end of the sequence.
+
+        What was set before does not count within, because the next round begins with what was set last.
+        """
         self.line(self.loop[0])
         self.settings.clear()
 

@@ -97,6 +97,11 @@ class ControllerFiles:
 
     @property
     def companions(self) -> tuple[Path, ...]:
-        """The modules that it calls, the points of each, the controller's own data."""
+        """The files that belong to the program.
+
+        Returns
+        -------
+        files : modules that it calls, the data (.dat) of each and of the program, and the controller's $config.dat
+        """
         data = (data_file_of(module, ".dat") for module in (self.path, *self.modules))
         return tuple(file for file in (*self.modules, *data, self.config) if file is not None)

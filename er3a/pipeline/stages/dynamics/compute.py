@@ -235,19 +235,19 @@ class LoadedArm:
 
     @cached_property
     def model(self) -> ArmModel:
-        """With its load."""
+        """The arm's model of its motion, with its load."""
         return arm_model(self.robot, self.load, self.gravity)
 
     @cached_property
     def with_unit(self) -> ArmModel:
-        """With its load and 1 kg more."""
+        """The arm's model with its load and 1 kg more, at the place of the payload."""
         bodies = [body for body in (self.load, self.unit_payload) if body]
         whole = together(bodies)
         return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.gravity)
 
     @cached_property
     def bare(self) -> ArmModel:
-        """Without its load."""
+        """The arm's model without its load."""
         return arm_model(self.robot, None, self.gravity)
 
     def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:

@@ -170,7 +170,7 @@ class BodiesOverlap(Finding):
 
     @property
     def depth_mm(self) -> float:
-        """The largest overlap of all."""
+        """The largest overlap of all pairs, mm."""
         return max(each.depth_mm for each in self.touches)
 
 
@@ -348,7 +348,7 @@ class PathSummary:
 
     @property
     def singular_times_s(self) -> list[float]:
-        """When a path of the tool crosses singular poses, or the arm jumps."""
+        """When a path of the tool crosses singular poses, or the arm jumps, s after its start."""
         crossed = [] if self.in_joint_space else [event.t_s for event in self.singularities if event.crossing]
         return [*crossed, *(jump.t_s for jump in self.jumps)]
 

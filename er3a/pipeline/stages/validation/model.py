@@ -582,7 +582,7 @@ class Axes(Table):
 
     @property
     def is_off(self) -> Flags:
-        """Which lines the model misses by more than their uncertainty."""
+        """Which lines (rows,) the model misses by more than their uncertainty, in direction or place."""
         return (self.distance_mm > self.uncertainty_mm) | (self.angle_deg > self.uncertainty_deg)
 
 
