@@ -63,7 +63,16 @@ class ArmAngleLaw:
     margin: float
 
     def at(self, share: Reals) -> Reals:
-        """Arm angles (N, 1) at shares (N,) of the path."""
+        """Arm angles along the path, by the quadratic through the three values.
+
+        Parameters
+        ----------
+        share : (N,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        angles : (N, 1), rad
+        """
         return _quadratic(self.values, share)[:, None]
 
 
@@ -105,19 +114,47 @@ class _LawSearch:
     start: Reals | None
 
     def rows(self, angles: Reals) -> Reals:
-        """Joints (K, A, s, n) of all poses at all arm angles (A,); NaN where there are none."""
+        """Joint solutions of all poses at all arm angles.
+
+        Parameters
+        ----------
+        angles : (A,), rad
+
+        Returns
+        -------
+        q : (K, A, s, n), rad or m; NaN where there is none
+        """
         count = len(angles)
         q = class_rows(self.robot, np.repeat(self.T, count, axis=0), np.tile(angles, len(self.T))[:, None]).q
         return q.reshape(len(self.T), count, *q.shape[1:])[:, :, self.slots]
 
     def on_grid(self, laws: Reals) -> Reals:
-        """About the margins (L, s) of laws (L, 3), by the nearest of ``ANGLES`` arm angles."""
+        """About the margins of laws, by the nearest of ``ANGLES`` arm angles.
+
+        Parameters
+        ----------
+        laws : (L, 3), rad, arm angles at the start, halfway and at the end
+
+        Returns
+        -------
+        margins : (L, s), rad or m, as :class:`ArmAngleLaw` has them
+        """
         angles = _quadratic(laws.T[:, None], self.share[:, None])
         place = np.round((angles + np.pi) * ANGLES / TURN).astype(np.int64) % ANGLES
         return self._margins(self.rows(-np.pi + TURN * np.arange(ANGLES) / ANGLES), place)
 
     def margin(self, angles: Reals, s: int) -> float:
-        """The margin of arm angles (K,) by the slot of this number, as :class:`ArmAngleLaw` has it."""
+        """Smallest distance from the joint limits that a slot keeps at given arm angles.
+
+        Parameters
+        ----------
+        angles : (K,), rad, one for each pose
+        s : number of the slot among ``slots``
+
+        Returns
+        -------
+        margin : rad or m; negative where a joint jumps, -inf where a pose is not reached
+        """
         q = class_rows(self.robot, self.T, angles[:, None]).q
         return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
 
@@ -214,7 +251,16 @@ class PathEndsError(Er3aError):
 
 
 def follows_tool_paths(robot: Robot) -> bool:
-    """Whether paths of the tool are followed: by arms with all solutions at a pose, or with an arm angle to choose."""
+    """Whether tool paths can be followed: by arms with all solutions at a pose, or with an arm angle to choose.
+
+    Parameters
+    ----------
+    robot : any arm
+
+    Returns
+    -------
+    follows : False for arms that only iteration solves, and for other redundant arms
+    """
     solver = arm_solver(robot).chain
     by_class = not (isinstance(solver, Unsolved) or solver.parameters)
     return by_class or solver.code == "arm_angle" or wrist_partition_missing(robot) is None

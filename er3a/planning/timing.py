@@ -113,31 +113,40 @@ class Timed:
 
     @property
     def t(self) -> Reals:
-        """See above."""
+        """(N,), s, rising from 0: where the pieces meet."""
         return self.curve.times
 
     @property
     def q(self) -> Reals:
-        """See above."""
+        """(N, n), rad, at the times ``t``."""
         return self._rates[0]
 
     @property
     def velocity(self) -> Reals:
-        """See above."""
+        """(N, n), rad/s, at the times ``t``."""
         return self._rates[1]
 
     @property
     def acceleration(self) -> Reals:
-        """See above."""
+        """(N, n), rad/s^2, at the times ``t``."""
         return self._rates[2]
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration, s."""
         return self.curve.duration
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
-        """Largest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
+        """Largest ratios of rates to their limits, over all joints and the whole curve.
+
+        Parameters
+        ----------
+        limits : of speed (rad/s) and acceleration (rad/s^2), each (n,)
+
+        Returns
+        -------
+        speed, acceleration : 1 for a joint that is as fast as its limit
+        """
         speed, acceleration = self.max_rates
         return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
 
@@ -241,7 +250,17 @@ def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> Timed:
-    """A motion, evenly slowed down if it exceeds a limit of speed or acceleration anywhere, or takes less than s."""
+    """A motion, evenly slowed down where it exceeds a limit or is too short.
+
+    Parameters
+    ----------
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
+    smallest : s, the duration at least
+
+    Returns
+    -------
+    motion : the curve as it is if it keeps both, else in as little time as they allow
+    """
     motion = Timed(curve)
     speed, acceleration = motion.ratios(limits)
     factor = max(speed, np.sqrt(acceleration), smallest / motion.duration)
@@ -249,7 +268,19 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float =
 
 
 def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
-    """The path run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
+    """The path run at given speeds at its nodes, evenly accelerated between them.
+
+    Parameters
+    ----------
+    s : (N,), path parameter at the nodes, rising
+    spline : joints (n,), rad, over the path parameter
+    speed : (N,), of the path parameter, per s
+    t : (N,), s, when it is at the nodes
+
+    Returns
+    -------
+    rates : from times (...,) in s to angles, velocities and accelerations, each (..., n)
+    """
     pull = np.diff(speed**2) / (2 * np.diff(s))
 
     def rates(at: Reals) -> Rates:
@@ -264,18 +295,48 @@ def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: 
 
 
 def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
-    """The fastest synchronised joint move between two joint vectors (6,) in rad, from rest to rest."""
+    """The fastest synchronised joint move between two joint vectors, from rest to rest.
+
+    Parameters
+    ----------
+    start, end : (n,), rad
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
+
+    Raises
+    ------
+    TimingError
+        if there is no such time law
+    """
     return fastest(np.linspace(start, end, STRAIGHT_NODES), limits)
 
 
 def standing(q: Reals, duration: float) -> Timed:
-    """Rest at joint angles (n,)."""
+    """Rest at joint angles.
+
+    Parameters
+    ----------
+    q : (n,), rad
+    duration : s
+
+    Returns
+    -------
+    motion : one piece with all rates 0
+    """
     still = np.zeros((1, 1, len(q)))
     return Timed(PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still))
 
 
 def joined(parts: list[Timed]) -> Timed:
-    """Motions one after another, each starting at rest where the one before ended at rest."""
+    """Motions one after another, each starting at rest where the one before ended at rest.
+
+    Parameters
+    ----------
+    parts : at least one; those without duration are left out
+
+    Returns
+    -------
+    motion : its duration is the sum of theirs, s
+    """
     curves = [part.curve for part in parts if part.duration > 0] or [parts[-1].curve]
     starts = np.concatenate([[0.0], np.cumsum([curve.duration for curve in curves])])
     times = np.concatenate([[0.0], *(curve.times[1:] + start for curve, start in zip(curves, starts))])
@@ -310,7 +371,18 @@ def toppra_library() -> Any:
 
 
 def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
-    """The path as toppra takes it; a joint whose slope is no more than ``at_rest`` is at rest and has no friction."""
+    """The path in the form that toppra takes.
+
+    Parameters
+    ----------
+    s : (N,), path parameter at the nodes, rising
+    spline : joints (n,), rad, over the path parameter
+    at_rest : slope, rad per unit of s, up to which a joint counts as at rest and has no friction
+
+    Returns
+    -------
+    path : an ``AbstractGeometricPath`` of toppra
+    """
     count: int = spline.c.shape[-1]
 
     class Path(toppra_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
@@ -329,9 +401,11 @@ def _programmed_speed(cap: Reals, joints: int) -> Any:
 
     class Programme(toppra_library().constraint.LinearConstraint):  # type: ignore[misc]
         def get_dof(self) -> int:
+            """Number of joints."""
             return joints
 
         def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
+            """What toppra asks for: a, b, c, F, g, bounds of u and bounds of x, the squared speed along the path."""
             return None, None, None, None, None, None, np.stack([np.zeros_like(cap), cap**2], axis=1)
 
     return Programme()

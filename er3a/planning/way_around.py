@@ -129,7 +129,20 @@ class PlanningTask:
 
 
 def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWayAround:
-    """Find a motion from joint angles (n,) to (n,) in rad."""
+    """Find a motion between two joint vectors that is proven clear.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+
+    Returns
+    -------
+    found : the timed motion with its proven clearance, or why there is none
+
+    References
+    ----------
+    RRT-Connect [1]_ as OMPL has it [2]_.
+    """
     if task.bodies is None:
         return NothingMeasured()
     ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
@@ -172,20 +185,48 @@ class PlannedMove:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration, s."""
         return self.curve.duration
 
     def joints(self, t: Reals) -> Rates:
-        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., n)."""
+        """Angles, velocities and accelerations at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., n), rad, rad/s and rad/s^2
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.curve.rates(t)
 
     def polynomials(self) -> PiecewiseMotion:
-        """The motion itself."""
+        """The motion itself, piece by piece.
+
+        Returns
+        -------
+        motion : rad and s
+        """
         return self.curve
 
 
 def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | NoWayAround:
-    """The motion between the nearest pair of starts (k, n) and ends (m, n) in rad between which one is found."""
+    """The motion between the nearest start and end for which one is found.
+
+    Parameters
+    ----------
+    starts, ends : (k, n) and (m, n), rad or m: joint solutions of the two poses
+
+    Returns
+    -------
+    found : of the ``MAX_PAIRS`` nearest pairs the first with a motion; else why the last one has none
+    """
     pairs = sorted(
         (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
     )
@@ -212,11 +253,29 @@ class _Moves:
         self.levers = reach + np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
 
     def clear(self, q: Reals) -> float:
-        """Smallest distance of an arm, m."""
+        """Smallest distance of an arm from itself and the scene.
+
+        Parameters
+        ----------
+        q : (n,), rad or m
+
+        Returns
+        -------
+        distance : m, negative by the depth of overlap
+        """
         return float(self.bodies.min_distance(q[None])[0][0])
 
     def free(self, a: Reals, b: Reals) -> bool:
-        """Whether the move from a to b (n,) keeps the margin."""
+        """Whether the straight joint move between two arms keeps the margin, by conservative advancement.
+
+        Parameters
+        ----------
+        a, b : (n,), rad or m
+
+        Returns
+        -------
+        free : steps are no shorter than ``SHORTEST_STEP``, so that a thin violation may pass; the final proof sees it
+        """
         turn, of_rows = np.abs(b - a), np.abs(self.coupling @ (b - a))
         swing, smallest = float(self.levers @ of_rows), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
         if any(self.clear(a + share * (b - a)) < self.margin for share in LIKELY):
@@ -253,6 +312,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
 
     class Advancement(base.MotionValidator):  # type: ignore[misc]
         def checkMotion(self, first: Any, second: Any) -> bool:
+            """Whether the straight move between two states of OMPL keeps the margin."""
             return moves.free(joints(first), joints(second))
 
     info.setStateValidityChecker(lambda state: moves.clear(joints(state)) >= moves.margin)
