@@ -127,7 +127,7 @@ class _Motion:
 
     @cached_property
     def lever(self) -> float:
-        """No point of a body is farther from a joint's axis that moves it, m, within the limits of rows that slide."""
+        """How far a point of a body can be from the axis of a joint that moves it, m, sliding rows at their limits."""
         robot = self.bodies.robot
         T = link_frames(robot, np.zeros(robot.joints))
         links = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).sum()
@@ -137,12 +137,30 @@ class _Motion:
         return float(links + slides + own)
 
     def of_rows(self, sizes: Reals) -> Reals:
-        """What rows (..., m) move by at most where joints move by up to ``sizes`` (..., n)."""
+        """What rows of the table move by at most, by the coupling of the joints.
+
+        Parameters
+        ----------
+        sizes : (..., n), rad or m, sizes of the joints' moves
+
+        Returns
+        -------
+        sizes : (..., m), of the rows
+        """
         coupling = self.bodies.robot.coupling
         return sizes if coupling is None else np.asarray(sizes @ np.abs(coupling).T)
 
     def acceleration(self, start: Reals, end: Reals) -> Reals:
-        """Bounds (k,) of the ends' accelerations between times (k,) and (k,), m/s^2; infinite where there are none."""
+        """Bounds of the accelerations of the capsules' ends between times.
+
+        Parameters
+        ----------
+        start, end : (k,), s
+
+        Returns
+        -------
+        bounds : (k,), m/s^2; infinite where the joints' rates are unknown
+        """
         sliding = self.bodies.robot.sliding
         speed, acceleration = self.rates(start, end)
         known = np.asarray(np.isfinite(speed + acceleration).all(axis=1, keepdims=True))
@@ -153,7 +171,16 @@ class _Motion:
         return np.where(known[:, 0], found, np.inf)
 
     def tracked(self, q: Reals) -> Reals:
-        """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
+        """End points whose paths count: of links in other links' frames, then of capsules in space.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m
+
+        Returns
+        -------
+        points : (..., tracks, k, 3), m; k is the largest number of points of a body
+        """
         bodies, ends = self.bodies, self.bodies.ends(q)
         links = [bodies.capsules[i].link for i in bodies.first[self._own]]
         T = link_frames(bodies.robot, q)[..., links, :, :]
@@ -161,7 +188,18 @@ class _Motion:
         return np.concatenate([from_link @ T[..., :3, :3], ends[..., self._moving, :, :]], axis=-3)
 
     def measure(self, t: float, q: Reals, pairs: Integers) -> Reals:
-        """Distances (P,) at a time, those of ``pairs`` known, the others perhaps NaN."""
+        """Distances at a time, measured where they are not known yet.
+
+        Parameters
+        ----------
+        t : s, by which they are remembered
+        q : (n,), rad or m, the arm at that time
+        pairs : (k,), numbers of pairs that are needed
+
+        Returns
+        -------
+        distances : (P,), m, negative by the depth; NaN for pairs that were never asked for at that time
+        """
         found = self.known.setdefault(t, np.full(len(self.bodies.pairs), np.nan))
         missing = pairs[np.isnan(found[pairs])]
         if missing.size:
@@ -369,7 +407,16 @@ class Clearance:
 
 @lru_cache(maxsize=8)
 def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
-    """The bodies of an arm and a scene; the eight used last are kept."""
+    """The bodies of an arm and a scene; the eight used last are kept.
+
+    Parameters
+    ----------
+    scene : None for the arm alone
+
+    Returns
+    -------
+    bodies : with the pairs that can meet
+    """
     return Bodies(robot, scene)
 
 

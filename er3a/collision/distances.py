@@ -153,15 +153,31 @@ def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
 
 @kernel
 def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
-    """Room for what :func:`place` finds."""
+    """Room for what :func:`place` finds.
+
+    Parameters
+    ----------
+    layout : an arm of m rows with B bodies of P points
+
+    Returns
+    -------
+    T, world, middle : (m + 2, 4, 4), (P, 3) and (B, 3), not filled
+    """
     rows = layout.links.shape[0] + 1
     return np.empty((rows, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
 
 
 @kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
-    """Frames ``T`` (m + 2, 4, 4) of base and links at joint values (n,), the last that of the world; points (P, 3) and
-    middles (B, 3) in space."""
+    """Place base, links and bodies at joint values.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    T : (m + 2, 4, 4), gets the frames of base and links, and last that of the world, m
+    world : (P, 3), gets the bodies' points in space, m
+    middle : (B, 3), gets the middles of the balls around the bodies, m
+    """
     _place_frames(layout, q, T)
     for b in range(layout.link.shape[0]):
         _place_middle(layout, T, b, middle)
@@ -213,7 +229,16 @@ def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
 
 @kernel
 def some_distances(layout: Layout, q: Reals, pairs: Integers, found: Reals, deep: Flags, near: Reals) -> None:
-    """Distances (m,) of some pairs of bodies at joint values (n,); ``near`` is (m, 2, 3)."""
+    """Distances of some pairs of bodies in one arm pose.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    pairs : (k,), numbers of pairs
+    found : (k,), gets the distances, m, as of :func:`pair_distance`
+    deep : (k,) bool, gets whether the cores overlap, so that a depth has to be added
+    near : (k, 2, 3), gets the closest points of the cores, m
+    """
     room, (T, w, middle) = np.empty((ROOM, 3)), unplaced(layout)
     place(layout, q, T, w, middle)
     for row in range(len(pairs)):

@@ -45,12 +45,12 @@ class Share:
 
     @property
     def value(self) -> float:
-        """The share that was counted."""
+        """The share that was counted, 0 to 1."""
         return self.count / self.of
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval [1]_."""
+        """95 % interval of the share, 0 to 1, after Wilson [1]_."""
         n, p = self.of, self.value
         middle = (p + Z_95**2 / (2 * n)) / (1 + Z_95**2 / n)
         half = Z_95 / (1 + Z_95**2 / n) * float(np.sqrt(p * (1 - p) / n + Z_95**2 / (4 * n**2)))
@@ -76,7 +76,16 @@ class JointSpace:
     overlaps: Flags
 
     def count(self, pairs: list[int]) -> int:
-        """Vectors in which any of some pairs overlaps."""
+        """Number of joint vectors in which any of some pairs overlaps.
+
+        Parameters
+        ----------
+        pairs : their numbers, columns of ``overlaps``
+
+        Returns
+        -------
+        count : 0 to N
+        """
         return int(self.overlaps[:, pairs].any(axis=1).sum())
 
 
@@ -107,7 +116,18 @@ class ClearPlaces:
 
 
 def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator) -> JointSpace:
-    """Try random joint vectors, uniform within the limits."""
+    """Try random joint vectors, uniform within the limits.
+
+    Parameters
+    ----------
+    bodies : of the arm and a scene
+    samples : N, how many
+    random : generator that draws them
+
+    Returns
+    -------
+    space : the vectors (N, n), rad or m, and which pairs overlap in them
+    """
     robot = bodies.robot
     q = random.uniform(robot.lower, robot.upper, (samples, robot.joints))
     own = bodies.second >= 0

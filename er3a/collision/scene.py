@@ -148,7 +148,12 @@ class Scene(ByValue, Displayed):
     pair_rules: tuple[PairRule, ...] = ()
 
     def sheet(self) -> Sheet:
-        """A row for each solid."""
+        """What the notebook shows: a row for each solid, measures in mm.
+
+        Returns
+        -------
+        sheet : its first rows, and how many are left out
+        """
         rows = ((solid.name, type(solid).__name__.lower(), solid.measures) for solid in self.solids)
         shown, left_out = first_rows(rows, len(self.solids))
         return Sheet(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), shown, left_out)
