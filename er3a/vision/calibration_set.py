@@ -80,7 +80,12 @@ class CalibrationSet(ByValue, Displayed):
         return len(self.flange)
 
     def sheet(self) -> Sheet:
-        """Where flange and board were, in mm."""
+        """What the notebook shows: where flange and board were, in mm.
+
+        Returns
+        -------
+        sheet : a row for each sample
+        """
         rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
         columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
         return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows, len(self))
@@ -101,8 +106,18 @@ class CalibrationSet(ByValue, Displayed):
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)
 
     def open_frames(self, simulated: bool) -> tuple[OpenFrame, ...]:
-        """Of which frames recorded poses may be others, as nothing is compared with them: joint values say which flange
-        and base are meant, touched points where the base is; simulated poses are known."""
+        """Frames in which recorded poses may be meant, as nothing is compared with them.
+
+        Joint values say which flange and base are meant, touched points where the base is; simulated poses are known.
+
+        Parameters
+        ----------
+        simulated : whether the samples were made by a simulation
+
+        Returns
+        -------
+        frames : empty if nothing is open
+        """
         if simulated or self.states_joints:
             return ()
         return ("flange_poses", "base_poses") if self.touched is None else ("flange_poses",)
@@ -113,7 +128,16 @@ class CalibrationSet(ByValue, Displayed):
         return self.of_joints or self.q is not None
 
     def take(self, rows: Flags | Integers) -> CalibrationSet:
-        """The chosen samples: a mask (N,) or numbers."""
+        """The chosen samples, with all that belongs to them; touched points stay.
+
+        Parameters
+        ----------
+        rows : a mask (N,), or numbers from 0 in any order
+
+        Returns
+        -------
+        samples : in the order of the numbers
+        """
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         covariance = self.camera_covariance
         return replace(

@@ -57,13 +57,33 @@ class GraspLeg:
     T_end: Reals | None = None
 
     def sampled(self, count: int) -> tuple[Reals, Reals]:
-        """Times (count,) in s from 0, and joints (count, n) in rad."""
+        """The leg at even times, both ends included.
+
+        Parameters
+        ----------
+        count : how many times
+
+        Returns
+        -------
+        t, q : (count,), s from 0, and (count, n), rad or m
+        """
         times = np.linspace(0.0, self.duration, count)
         return times, self.joints(times)
 
 
 def joint_legs(part: Part, corners: Reals, limits: JointLimits) -> tuple[GraspLeg, ...]:
-    """Straight moves of all joints from corner to corner (k, n), rad, as fast as their limits allow on quintics."""
+    """Straight moves of all joints from corner to corner, on quintics from rest to rest.
+
+    Parameters
+    ----------
+    part : of the grasp's way that the legs belong to
+    corners : (k, n), rad or m
+    limits : of speed and acceleration, which the legs use as far as they allow
+
+    Returns
+    -------
+    legs : k - 1
+    """
     return tuple(_joint_leg(part, a, b, limits) for a, b in pairwise(corners))
 
 
@@ -137,9 +157,17 @@ def tool_leg(
 
 
 def min_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:
-    """What the arm is proven to keep clear by along legs, m (below 0 where it overlaps), and what is nearest there.
+    """What the arm is proven to keep clear by along legs, and what is nearest there.
 
-    None where nothing can meet.
+    Parameters
+    ----------
+    bodies : of the arm and the scene
+    legs : one after another
+
+    Returns
+    -------
+    clearance, pair : m, below 0 where it overlaps, less the ``DEPTH`` that the proof leaves open
+        None in place of both where nothing can meet
     """
     smallest: tuple[float, Pair] | None = None
     for leg in legs:

@@ -78,12 +78,31 @@ class AngleCheck(ByValue):
 
 
 def angles_between(R: Reals) -> Reals:
-    """Angles (N, N) in rad between rotations (N, 3, 3)."""
+    """Angles between all pairs of rotations.
+
+    Parameters
+    ----------
+    R : (N, 3, 3)
+
+    Returns
+    -------
+    angles : (N, N), rad, 0 to pi
+    """
     return rotation_angle(R[:, None], R[None])
 
 
 def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
-    """Find samples whose turning angles contradict the others'."""
+    """Find samples whose turning angles contradict the others': hand and board turn by equal angles [1]_.
+
+    Parameters
+    ----------
+    samples : N of them
+
+    Returns
+    -------
+    check : mismatch of all pairs in rad, the samples that agree, and a finding for each other one; if no more than half
+        agree, all are used and a warning says so
+    """
     hand, eye = samples.flange[:, :3, :3], samples.target[:, :3, :3]
     turned = angles_between(hand)
     mismatch = np.abs(turned - angles_between(transposed(eye)))
@@ -235,7 +254,20 @@ CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
 def other_conventions(
     samples: calibration_set.CalibrationSet, residual: Reals
 ) -> tuple[vision_findings.OtherConvention, ...]:
-    """The conventions by which the samples fit much better than with residuals (N, 6), all that fit equally well."""
+    """Conventions by which the samples fit much better than as they were read, all that fit equally well.
+
+    Parameters
+    ----------
+    residual : (N, 6), m and rad, of the samples as they were read
+
+    Returns
+    -------
+    findings : empty where the samples fit as they were read, or no better otherwise
+
+    Notes
+    -----
+    Each reading is judged by the residuals of Park's closed form (:mod:`er3a.vision.classic_methods`).
+    """
     given, *rms = _misfit(residual)
     if given < MISREAD:
         return ()
@@ -290,7 +322,7 @@ class TouchCheck(ByValue):
 
     @property
     def contradiction(self) -> vision_findings.TouchContradicts | None:
-        """That the points contradict the calibration, if they do."""
+        """The finding that the points contradict the calibration; None if they don't."""
         if self.probability >= CONTRADICTED:
             return None
         return vision_findings.TouchContradicts(len(self.difference), 1000 * self.largest, self.probability)
@@ -345,7 +377,12 @@ class HandEye(ByValue, Displayed):
         return tuple(each.sample for each in self.suspects)
 
     def sheet(self) -> Sheet:
-        """The twelve numbers with half their 95 % intervals."""
+        """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
+
+        Returns
+        -------
+        sheet : a row for each axis of both poses, and the first findings
+        """
         in_hand = self.samples.setup == "eye_in_hand"
         poses = ("T_flange_camera", "T_base_board") if in_hand else ("T_base_camera", "T_flange_board")
         rows = [
@@ -572,13 +609,31 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
 
 
 def board_poses(found: HandEye) -> Reals:
-    """Where each sample puts the board: F X B (N, 4, 4), all equal to Y without errors."""
+    """Where each sample puts the board: F X B, all equal to Y without errors.
+
+    Parameters
+    ----------
+    found : a calibration of N samples
+
+    Returns
+    -------
+    T : (N, 4, 4), m, T_base_board for a camera on the flange, else T_flange_board
+    """
     poses: Reals = found.samples.hand @ found.X @ found.samples.target
     return poses
 
 
 def spread_of(found: HandEye) -> tuple[float, float]:
-    """Root mean square distance (m) and angle (rad) of the samples' board poses from their mean, of those used."""
+    """How much the used samples' board poses scatter about their mean.
+
+    Parameters
+    ----------
+    found : a calibration
+
+    Returns
+    -------
+    distance, angle : root mean squares, m and rad
+    """
     poses = board_poses(found)[found.used]
     step = step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]

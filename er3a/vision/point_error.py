@@ -58,12 +58,22 @@ class SeenPoseError:
 
     @property
     def whole(self) -> Reals:
-        """All parts together."""
+        """All parts together, (..., 6, 6), m and rad in the base frame."""
         return self.camera + self.calibration + self.repeatability + self.table
 
 
 def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
-    """Covariance (..., 6, 6) of T_base_tool at joint angles (..., n) from independent errors of the table's entries."""
+    """Covariance of the tool's pose from independent errors of the table's entries, to first order.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    accuracy : with standard deviations of lengths (m) and angles (rad)
+
+    Returns
+    -------
+    covariance : (..., 6, 6), position (m) and rotation (rad) of T_base_tool by the base's axes
+    """
     at = forward(robot, q)
     out = np.zeros((*at.shape[:-2], 6, 6))
     for name, deviation in (
@@ -81,12 +91,31 @@ def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
 
 
 def repeatability_covariance(accuracy: ArmAccuracy) -> Reals:
-    """Covariance (6, 6) of the position that comes back; ISO 9283 states RP of position, so rotation has none here."""
+    """Covariance of the pose to which an arm comes back.
+
+    Parameters
+    ----------
+    accuracy : with RP of position after ISO 9283, m
+
+    Returns
+    -------
+    covariance : (6, 6), m^2; 0 for the rotation, of which RP of position says nothing
+    """
     return np.diag([accuracy.position_deviation**2] * 3 + [0.0] * 3)
 
 
 def seen_pose(found: HandEye, T_camera_object: Reals, T_base_flange: Reals | None = None) -> Reals:
-    """T_base_object (..., 4, 4); where the picture is taken from is needed with the camera on the flange."""
+    """Pose of an object in the base frame, from where the camera sees it.
+
+    Parameters
+    ----------
+    T_camera_object : (..., 4, 4), m
+    T_base_flange : (..., 4, 4), m, where the picture is taken, for a camera on the flange; None for a fixed one
+
+    Returns
+    -------
+    T : (..., 4, 4), m, T_base_object
+    """
     placed: Reals = found.X @ T_camera_object
     return placed if T_base_flange is None else T_base_flange @ placed
 
@@ -148,7 +177,16 @@ def _normals() -> Reals:
 
 
 def draws(covariance: Reals) -> Reals:
-    """Normal errors (4000, ..., 6) of covariances (..., 6, 6); from the same numbers always, for equal bytes."""
+    """Normal errors of given covariances, from the same random numbers always, for equal bytes.
+
+    Parameters
+    ----------
+    covariance : (..., 6, 6), m and rad
+
+    Returns
+    -------
+    errors : (4000, ..., 6), m and rad
+    """
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
     found: Reals = np.einsum("...ij,kj->k...i", root, _normals())
@@ -156,7 +194,16 @@ def draws(covariance: Reals) -> Reals:
 
 
 def error_sizes(covariance: Reals) -> tuple[Reals, Reals]:
-    """Distances (m) and angles (rad), each (...,), below which 95 % of errors of a covariance (..., 6, 6) stay."""
+    """Sizes below which 95 % of errors of a covariance stay, by the draws of :func:`draws`.
+
+    Parameters
+    ----------
+    covariance : (..., 6, 6), m and rad
+
+    Returns
+    -------
+    distance, angle : (...,), m and rad
+    """
     drawn = draws(covariance)
     square = drawn**2
     distance, angle = (np.sqrt(square[..., part].sum(axis=-1)) for part in (slice(3), slice(3, 6)))

@@ -73,7 +73,17 @@ class TypicalCause:
     applied: Callable[[Reals], tuple[Reals, Reals]]
 
     def at(self, X: Reals, Y: Reals, values: Reals) -> tuple[Reals, Reals]:
-        """Residuals and their derivatives, as :data:`er3a.vision.likelihood.Model`."""
+        """Residuals and their derivatives, as :data:`er3a.vision.likelihood.Model`.
+
+        Parameters
+        ----------
+        X, Y : (4, 4), m, hand-eye and board pose
+        values : (count,), of the cause's numbers
+
+        Returns
+        -------
+        residual, derivative : (N, 6), m and rad, and (N, 6, 12 + count); by the numbers from central differences
+        """
 
         def raw(values: Reals) -> tuple[Reals, Reals]:
             return residuals(*self.applied(values), X, Y)
@@ -84,12 +94,31 @@ class TypicalCause:
         return here, np.concatenate([J, np.stack(own, axis=2)], axis=2)
 
     def fitted(self, samples: CalibrationSet, start: Refined, W: Reals) -> Refined:
-        """The fit of both poses and the numbers, with weights W (N, 6, 6)."""
+        """The fit of both poses and the cause's numbers.
+
+        Parameters
+        ----------
+        start : a fit of the poses alone, whose poses are the start
+        W : (N, 6, 6), weights to keep, 1/m and 1/rad
+
+        Raises
+        ------
+        LinAlgError
+            where the samples leave some of the unknowns open
+        """
         return refine(PoseObservations.of(samples), start.X, start.Y, self.at, self.count, W)
 
     def drop(self, refined: Refined) -> float | None:
-        """By how much the numbers lower the sum of squares of a fit, to first order; None where the samples don't tell
-        them from the two poses."""
+        """By how much the numbers lower the sum of squares of a fit, to first order.
+
+        Parameters
+        ----------
+        refined : the fit of the poses alone, with its whitened residuals
+
+        Returns
+        -------
+        drop : None where the samples can't distinguish the numbers from the two poses
+        """
         J = (refined.W @ self.at(refined.X, refined.Y, np.zeros(self.count))[1]).reshape(-1, UNKNOWNS + self.count)
         poses, own = J[:, :UNKNOWNS], J[:, UNKNOWNS:]
         rest = own - poses @ np.linalg.lstsq(poses, own, rcond=None)[0]
@@ -184,8 +213,17 @@ def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
 
 
 def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
-    """Half the 95 % intervals of a value: by its samples, and by intrinsics estimated from the same images: a focal
-    length that is estimated from them scales all distances."""
+    """Half the 95 % intervals of a distance error, by its two sources.
+
+    Parameters
+    ----------
+    refined : the fit of the poses alone
+    fit : the fit with the distance error
+
+    Returns
+    -------
+    own, shared : shares of 1, by the samples, and by intrinsics estimated from the same images, which all share
+    """
     own = float(fit.half_width[UNKNOWNS])
     if samples.shared is None:
         return own, 0.0
@@ -195,7 +233,17 @@ def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, 
 
 
 def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refined) -> Refined:
-    """The fit with an error of distances."""
+    """The fit of both poses with an error of distances.
+
+    Parameters
+    ----------
+    name : what is wrong: the board's size, the focal length, or the principal point
+    refined : the fit of the poses alone, where it starts
+
+    Returns
+    -------
+    fit : ``values`` (1,), by what share distances are wrong
+    """
 
     def applied(values: Reals) -> tuple[Reals, Reals]:
         B = samples.target.copy()

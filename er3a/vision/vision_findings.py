@@ -185,7 +185,16 @@ _GRAVE = (
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:
-    """Those with which no calibration can be used."""
+    """Warnings with which no calibration can be used.
+
+    Parameters
+    ----------
+    warnings : of a calibration
+
+    Returns
+    -------
+    grave : in the given order; more scatter than stated is one above ``MUCH_SCATTER``
+    """
     return tuple(
         each
         for each in warnings
