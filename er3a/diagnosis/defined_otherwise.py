@@ -163,8 +163,17 @@ def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer:
 
 
 def described_by(robot: Robot, references: Sequence[Reference]) -> Robot | None:
-    """The table corrected by comparison with the arm whose axes references state, with its base moved to theirs; None
-    if they don't state all axes."""
+    """The table corrected by comparison with the arm whose axes references state.
+
+    Parameters
+    ----------
+    references : those that do not depend on the table are left out
+
+    Returns
+    -------
+    robot : with its base moved to the stated one
+        None if they don't state all axes, or for arms with coupled or sliding joints
+    """
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = None if robot.coupling is not None or robot.rows != robot.joints else _lines(stated, robot.joints)
     return _matched(robot, stated, lines, lines[-1])[1] if lines and not robot.sliding.any() else None

@@ -30,7 +30,16 @@ ANGLES = ("alpha", "offset")
 
 
 def free_numbers(joints: int) -> tuple[Entry, ...]:
-    """All free numbers of a table; the scale first, so that it is applied before a length is set."""
+    """All free numbers of a table; the scale first, so that it is applied before a length is set.
+
+    Parameters
+    ----------
+    joints : number of rows
+
+    Returns
+    -------
+    entries : the scale, then each column from row 1 on
+    """
     return (Entry("scale"), *(Entry(column, joint) for column in COLUMNS for joint in range(1, joints + 1)))
 
 
@@ -86,7 +95,17 @@ class Fits:
         return Fits(self.start[rows], self.which[rows], self.amounts[rows], self.left[rows])
 
     def with_rows(self, rows: Integers, better: Fits) -> Fits:
-        """A copy with some rows replaced."""
+        """A copy with some rows replaced.
+
+        Parameters
+        ----------
+        rows : (R,), numbers
+        better : R fits, of the same free numbers
+
+        Returns
+        -------
+        fits : with their amounts and residuals
+        """
         amounts, left = self.amounts.copy(), self.left.copy()
         amounts[rows], left[rows] = better.amounts, better.left
         return Fits(self.start, self.which, amounts, left)
@@ -113,12 +132,32 @@ class Search:
     residual: Residual
 
     def at(self, start: Integers, which: Integers, amounts: Reals) -> Fits:
-        """Free numbers with given values."""
+        """Tables with amounts added to free numbers, and their residuals.
+
+        Parameters
+        ----------
+        start : (B,), numbers of start tables
+        which : (B, k), places in ``numbers``
+        amounts : (B, k), m or rad; for the scale, the factor's share beyond 1
+
+        Returns
+        -------
+        fits : with residuals (B, n) in half-widths
+        """
         tables = moved(self.starts[start], self.numbers, which, amounts)
         return Fits(start, which, amounts, self.residual(tables))
 
     def of(self, fits: Fits) -> Model:
-        """Residuals of the rows of fits with other amounts."""
+        """Residuals as a function of the amounts, for solvers.
+
+        Parameters
+        ----------
+        fits : B of them, whose start tables and free numbers are kept
+
+        Returns
+        -------
+        model : from amounts (R, k) and rows (R,) of the fits to residuals (R, n)
+        """
         return lambda amounts, rows: self.at(fits.start[rows], fits.which[rows], amounts).left
 
 
@@ -127,7 +166,19 @@ Model = Callable[[Reals, Integers], Reals]
 
 
 def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers | None = None) -> Reals:
-    """Derivatives (R, n, k) of residuals (R, n) with respect to amounts (R, k)."""
+    """Derivatives of residuals by one-sided differences.
+
+    Parameters
+    ----------
+    model : of amounts and rows
+    amounts : (R, k), m or rad
+    left : (R, n), residuals there
+    rows : (R,), which the amounts belong to; None for 0 to R - 1
+
+    Returns
+    -------
+    slopes : (R, n, k), half-widths per m or rad
+    """
     rows, k = np.arange(len(amounts)) if rows is None else rows, amounts.shape[1]
     ahead = (amounts[:, None] + PROBE * np.eye(k)).reshape(-1, k)
     beside = model(ahead, np.repeat(rows, k)).reshape(len(rows), k, -1)
@@ -181,14 +232,35 @@ def lowered(
 
 
 def descend(search: Search, fits: Fits, passes: int) -> Fits:
-    """Smallest sum of squares from where ``fits`` are; no row gets worse."""
+    """Smallest sum of squares from where fits are, by damped least squares [1]_.
+
+    Parameters
+    ----------
+    fits : B of them
+    passes : how many steps at most
+
+    Returns
+    -------
+    fits : no row is worse than before
+    """
     if not len(fits):
         return fits
     return Fits(fits.start, fits.which, *lowered(search.of(fits), fits.amounts, passes=passes))
 
 
 def meet(search: Search, fits: Fits) -> Fits:
-    """Minimax residual, where some reference is missed although the sum of squares leaves open that none is."""
+    """Smallest greatest residual, by Lawson's weights [2]_.
+
+    Only where some reference is missed although the sum of squares leaves open that none is.
+
+    Parameters
+    ----------
+    fits : B of them, at least sums of squares
+
+    Returns
+    -------
+    fits : no row's greatest residual is larger than before
+    """
     for _ in range(ROUNDS):
         open_rows = np.flatnonzero((fits.greatest > MEETS) & (fits.squares <= CURVED * fits.left.shape[1]))
         if not len(open_rows):
@@ -264,7 +336,17 @@ DENSE = ScanGrid(24, (-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.03, 0.1, 0.25, 0.5,
 
 
 def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanGrid) -> Fits:
-    """The lowest places of the grid, for every start table and every combination of as many free numbers."""
+    """The lowest places of a grid, for every start table and every combination of free numbers.
+
+    Parameters
+    ----------
+    combinations : places in ``search.numbers``, of equally many each
+    grid : how finely to look
+
+    Returns
+    -------
+    fits : up to ``grid.basins`` for each start table and combination
+    """
     reach, starts = arm_lengths(search.starts), len(search.starts)
     amounts, which, sizes = list[Reals](), list[Integers](), list[tuple[int, ...]]()
     for combination in combinations:
@@ -287,14 +369,33 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
 
 
 def grid_of(number: Entry, grid: ScanGrid) -> Reals:
-    """Amounts to try: rad, or in units of the arm's length."""
+    """Amounts of a free number to try.
+
+    Parameters
+    ----------
+    number : an angle, a length, or the scale
+    grid : how finely to look
+
+    Returns
+    -------
+    amounts : (k,), rad over a whole turn, or lengths in units of the arm's length; 0 alone for the scale
+    """
     if number.column in ANGLES:
         return 2 * np.pi * np.arange(grid.angles) / grid.angles
     return np.array(grid.lengths if number.joint else (0.0,))
 
 
 def arm_lengths(tables: Tables) -> Reals:
-    """Sum (m) of all lengths of each table, (H,)."""
+    """Sum of the sizes of all lengths a and d of each table.
+
+    Parameters
+    ----------
+    tables : H of them
+
+    Returns
+    -------
+    lengths : (H,), m; 1 for a table whose lengths are all 0
+    """
     lengths: Reals = np.abs(tables.a).sum(axis=1) + np.abs(tables.d).sum(axis=1)
     return np.where(lengths > 0, lengths, 1.0)
 
