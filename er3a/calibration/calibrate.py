@@ -256,17 +256,17 @@ class Estimate:
 
     @property
     def name(self) -> str:
-        """Such as d4."""
+        """Name of the entry, such as ``d4``."""
         return self.parameter.name
 
     @property
     def unit(self) -> Literal["mm", "deg"]:
-        """Of the numbers."""
+        """Unit of the numbers, mm or deg."""
         return "mm" if self.parameter.unit == "mm" else "deg"
 
     @property
     def half_width(self) -> float:
-        """Half-width of the 95 % interval."""
+        """Half-width of the correction's 95 % interval, mm or deg."""
         return self.quantile * self.standard_error
 
 
@@ -416,12 +416,25 @@ class Calibration(ByValue, Displayed):
         return self.beyond or CorrectedModel(self.robot, JointErrors(self.robot, (), np.empty(0)))
 
     def forward(self, q: Reals) -> Reals:
-        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m, by the model; without terms
-        as ``er3a.forward(found.robot, q)``."""
+        """Pose of the tool by the model; without terms as ``er3a.forward(found.robot, q)``.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m, commanded joint values
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         return self.model.forward(q)
 
     def without_terms(self) -> Calibration:
-        """The same with what a robot file holds: the table, and ratios."""
+        """The same calibration with what a robot file holds: the table, and ratios of joints.
+
+        Returns
+        -------
+        calibration : whose :attr:`model` has no terms beyond the table
+        """
         return replace(self, beyond=None)
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
@@ -435,7 +448,12 @@ class Calibration(ByValue, Displayed):
         return self.model.distances_mm(measurements)
 
     def sheet(self) -> Sheet:
-        """A row for each estimated entry."""
+        """What the notebook shows: a row for each estimated entry, in mm and deg, with its 95 % interval.
+
+        Returns
+        -------
+        sheet : with the conclusion, and why other entries were held
+        """
         rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
         shown, left = first_rows(rows, len(self.estimates))
         rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"

@@ -86,8 +86,17 @@ class Subspace:
 def jacobian(
     robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
 ) -> Reals:
-    """Derivative (n, p) of observed values (mm) by parameters (m, rad), where amounts (p,) are added to the robot's, by
-    central differences; exact to about 1e-8."""
+    """Derivatives of observed values by parameters, by central differences; exact to about 1e-8.
+
+    Parameters
+    ----------
+    parameters : p entries of table, base and tool
+    amounts : (p,), m or rad, added to the robot's values, where the derivatives are taken
+
+    Returns
+    -------
+    J : (n, p), mm per m or rad
+    """
     count = len(parameters)
     steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
     values = observations.predict(robot, parameters, steps)
@@ -134,8 +143,16 @@ def subspace(
 
 
 def left_of_touched(robot: Robot, observations: PointObservations) -> float:
-    """What a table leaves where points touch something, apart from what base and tool can take up: root mean square, in
-    standard deviations; 0 where nothing is touched."""
+    """What a table leaves where points touch something, and base and tool can't take it up.
+
+    Parameters
+    ----------
+    observations : with places or planes that were touched
+
+    Returns
+    -------
+    left : root mean square, in standard deviations; 0 where nothing is touched
+    """
     if not observations.dropped:
         return 0.0
     off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
@@ -147,8 +164,17 @@ def left_of_touched(robot: Robot, observations: PointObservations) -> float:
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
-    """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates were measured, or joints have slid while a place or plane was touched."""
+    """The longest length of the table that moves the points as nothing else does, which sets the scale.
+
+    Parameters
+    ----------
+    observations : if only places and planes were touched, nothing in them sets the scale
+
+    Returns
+    -------
+    entry : to be taken as it is; None where coordinates were measured, or joints have slid while a place or plane was
+        touched
+    """
     if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
@@ -182,12 +208,30 @@ def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObse
 
 
 def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Entry, ...]:
-    """Those that can be estimated beside a length that sets the scale, if one does."""
+    """Parameters that can still be estimated if a length sets the scale.
+
+    Parameters
+    ----------
+    scale : as of :func:`scale_of`
+
+    Returns
+    -------
+    parameters : all if nothing sets the scale
+    """
     return tuple(each for each in parameters if scale is None or each not in (scale, TURNS_ALL))
 
 
 def held_with(scale: Entry | None) -> tuple[Held, ...]:
-    """Why the others can't."""
+    """Why parameters are held if a length sets the scale.
+
+    Parameters
+    ----------
+    scale : as of :func:`scale_of`
+
+    Returns
+    -------
+    held : empty if nothing sets the scale
+    """
     return (MovesNothing(TURNS_ALL.name), SetsScale(scale.name)) if scale else ()
 
 
@@ -281,9 +325,22 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
 
 
 def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
-    """Place and turn (4, 4) that bring points (P, 3) nearest to measured ones [Kabsch, Acta Cryst. A 32 (1976)]; how
-    many times as far apart the measured ones are (NaN if all are at one place), and the share of their squares that is
-    left beside such a scale."""
+    """Rigid transform that brings points nearest to measured ones, in the least squares (Kabsch).
+
+    Parameters
+    ----------
+    points, measured : (P, 3), m
+
+    Returns
+    -------
+    S : (4, 4), m, places the points at the measured ones
+    scale : how many times as large the measured figure is; NaN if all points of one are at one place
+    share : of the squares, what remains after such a scale, 0 to 1
+
+    References
+    ----------
+    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A 32, 1976.
+    """
     S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
     U, sizes, V = np.linalg.svd((measured - centre).T @ (points - at))
     signs = np.array([1.0, 1.0, np.linalg.det(U @ V)])
@@ -355,8 +412,16 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
 
 
 def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservations) -> Reals:
-    """Amounts (k,) to start from: 0, unless other places of base and tool bring the table's points much nearer to the
-    measured ones."""
+    """Amounts to start a fit from.
+
+    Parameters
+    ----------
+    kept : k entries that are fitted, with those of base and tool
+
+    Returns
+    -------
+    amounts : (k,), m or rad; 0, unless other places of base and tool bring the points much nearer to the measured ones
+    """
     amounts, none = np.zeros(len(kept)), np.zeros(len(kept))
     rough, used = rough_places(robot, observations)
     by_name = dict(zip(placements_of(observations.free), rough.tolist()))
