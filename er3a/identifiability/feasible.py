@@ -33,7 +33,16 @@ FOLLOWED = 8  # times that extremes are sought afresh
 
 
 def largest_length(table: Tables) -> float:
-    """Search range in m around the table's length: all its lengths together, at least a metre."""
+    """How far lengths are searched around the table's.
+
+    Parameters
+    ----------
+    table : a batch of one
+
+    Returns
+    -------
+    length : m, all its lengths together, at least ``MIN_M``
+    """
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()), MIN_M)
 
 
@@ -52,7 +61,17 @@ class Region:
         self.scale = np.array([each.scale for each in entries])
 
     def tables(self, direction: Reals, amounts: Reals) -> Tables:
-        """Tables with directions (R, n), and amounts (R, k), m and rad, added."""
+        """Tables with directions, and with amounts added to the region's entries.
+
+        Parameters
+        ----------
+        direction : (R, n), +1 or -1
+        amounts : (R, k), m or rad
+
+        Returns
+        -------
+        tables : R
+        """
         return shifted(self.table, self.entries, amounts).with_column("direction", slice(None), direction)
 
     def reached(
@@ -90,12 +109,33 @@ class Region:
         return found, (self.asked.excess(off) <= MET) & (chi2 <= self.chi2 + PROFILE**2 * (1 + MET) + MET)
 
     def meets(self, direction: Reals, amounts: Reals) -> bool:
-        """Whether a table, by its directions (n,) and amounts (k,), meets what is asked but for extremes."""
+        """Whether a table meets what is asked but for extremes.
+
+        Parameters
+        ----------
+        direction : (n,), +1 or -1
+        amounts : (k,), m or rad
+
+        Returns
+        -------
+        meets : within half-widths, and ``NEAR`` more; what has a standard deviation does not count
+        """
         off = self.asked.plain_off(self.tables(direction[None], amounts[None]))
         return bool(self.asked.excess(off)[0] <= NEAR)
 
     def confirmed(self, direction: Reals, amounts: Reals, held: Flags | None = None) -> Reals | None:
-        """Amounts (k,) near others that meet what is asked, with extremes sought afresh; None if none were found."""
+        """A table near another one that meets what is asked, with extremes sought afresh.
+
+        Parameters
+        ----------
+        direction : (n,), +1 or -1
+        amounts : (k,), m or rad
+        held : (k,) bool, entries that keep their amounts; None for none
+
+        Returns
+        -------
+        amounts : (k,), m or rad; None if none were found in ``FOLLOWED`` rounds
+        """
         for _ in range(FOLLOWED if self.asked.extreme else 0):
             table = self.tables(direction[None], amounts[None])
             if all(float(self.asked.excess(self.asked.off(table, afresh))) <= NEAR for afresh in (False, True)):
