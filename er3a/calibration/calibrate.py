@@ -137,8 +137,18 @@ class Level:
 
 
 def choose_level(robot: Robot, observations: PointObservations) -> Level:
-    """The fullest level that the observations determine as far as positions of these points ever can, with numbers to
-    spare; at each, base and tool are tried with the table first.
+    """The fullest level that the observations determine.
+
+    They have to determine it as far as positions of these points ever can, with numbers to spare. At each level, base
+    and tool are tried with the table first.
+
+    Parameters
+    ----------
+    robot : the table to start from
+
+    Returns
+    -------
+    level : with what more observations would settle
 
     Raises
     ------
@@ -438,7 +448,15 @@ class Calibration(ByValue, Displayed):
         return replace(self, beyond=None)
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """How far the model is from other measurements, (P,): over their measured coordinates.
+        """How far the model is from other measurements, over their measured coordinates.
+
+        Parameters
+        ----------
+        measurements : P of them
+
+        Returns
+        -------
+        distances : (P,), mm
 
         Raises
         ------
@@ -478,8 +496,13 @@ def calibrate(
     Parameters
     ----------
     robot : the table to start from
+    measurements : in mm, and joint values in deg, or mm of joints that slide
     fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken from the robot's file; the tool is fixed unless its point
         was measured
+
+    Returns
+    -------
+    calibration : the corrected robot, with intervals in mm and deg
 
     Raises
     ------

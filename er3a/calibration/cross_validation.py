@@ -233,14 +233,20 @@ def choose_terms(
     observations: PointObservations,
     ways: Sequence[Sequence[TermKind]] = FOR_ALL_JOINTS,
 ) -> ChosenTerms:
-    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it; one that
-    stood for others is dropped when these are there.
+    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it.
+
+    One that was taken in place of others is dropped when these are there.
 
     Parameters
     ----------
     robot : the table to start from; here : corrected without terms
+    kept : entries that are fitted with the terms
     ways : kinds that are tried, by the first for which there are coordinates enough; none if there is no such, or if
         the table leaves nothing but rounding
+
+    Returns
+    -------
+    chosen : the terms taken, and what was tried
     """
     rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm

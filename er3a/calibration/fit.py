@@ -111,14 +111,20 @@ def subspace(
     left: float | None = None,
     dependent: float = DEPENDENT,
 ) -> Subspace:
-    """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to ``dependent`` of its length) is held. So is one that does no more
-    to points which touch something than to turn or shrink what the table leaves of them: all of these could be brought
-    to one.
+    """The identifiable part of the parameters.
+
+    Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
+    ``dependent`` of its length) is held. So is one that only turns or shrinks what the table leaves of points which
+    touch something: all of these could be brought to one.
 
     Parameters
     ----------
+    parameters : p entries, the preferred ones first
     left : of a point that touches something, in standard deviations; what the table leaves, unless given
+
+    Returns
+    -------
+    subspace : places of the parameters kept, why others are held, and singular values (per mm or mrad)
     """
     rows = observations.independent(robot)[0]
     J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
@@ -294,10 +300,23 @@ class Fit:
 
 
 def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
-    """Covariance (k + c, k + c) of the estimates from the residuals themselves, pose by pose: right also where what
-    remains is no white noise of one size, but what a model misses at poses that could have been others; and how many
-    degrees of freedom (k + c,) each variance rests on, few where few poses settle a number.
+    """Covariance of the estimates from the residuals themselves, pose by pose.
 
+    It is right also where what remains is no white noise of one size, but what a model misses at poses that could have
+    been others. Degrees of freedom are few where few poses settle a number.
+
+    Parameters
+    ----------
+    found : a fit of k numbers and c coefficients
+    pose_of : (m,), the pose of each independent coordinate
+
+    Returns
+    -------
+    covariance : (k + c, k + c), m and rad
+    freedom : (k + c,), degrees of freedom that each variance rests on, one at least
+
+    Notes
+    -----
     Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``, so that those which the fit has
     drawn to itself count in full; degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
@@ -353,16 +372,20 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
 
 
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
-    """Amounts of what is free of base and tool, by the table as it is and points that were measured whole: the
-    tracker's frame may be anywhere, and the tool's place a guess.
+    """Rough places of base and tool, by the table as it is and points that were measured whole.
 
-    With points x and flanges turned by R, as the table has them, a base S and a tool moved by t put the measured ones
-    at ``m = S (x + R t)``. So ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may
-    be any matrix. From the rotation nearest to that, t for a base and the base for a t are found by turns.
+    The tracker's frame may be anywhere, and the tool's place a guess. With points x and flanges turned by R, as the
+    table has them, a base S and a tool moved by t put the measured ones at ``m = S (x + R t)``. So
+    ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may be any matrix. From the
+    rotation nearest to that, t for a base and the base for a t are found by turns.
+
+    Parameters
+    ----------
+    observations : of P points
 
     Returns
     -------
-    amounts : as of :func:`placements_of`, 0 where too few points say something
+    amounts : as of :func:`placements_of`, m and rad, 0 where too few points say something
     used : (P,), points without those that are far out, by the median of all
     """
     whole = np.flatnonzero(observations.seen.all(axis=1) & (observations.touched < 0))
@@ -439,11 +462,20 @@ def fit(
     terms: Sequence[JointTerm] = (),
     most_steps: int = MAX_STEPS,
 ) -> Fit:
-    """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
+    """Corrections, and coefficients of terms, that meet the observations best, by weighted least squares [1]_.
 
     Points that touch something may be met best by quite another arm, if they settle little or some are outliers. If the
     steps don't end, or end there, corrections are taken to be small (``PLAUSIBLE``), and none of them is settled.
-    ``most_steps``: where only small corrections are of interest, a few are enough.
+
+    Parameters
+    ----------
+    kept : k entries to correct
+    terms : of measured points only
+    most_steps : where only small corrections are of interest, a few are enough
+
+    Returns
+    -------
+    fit : amounts in m and rad
 
     Raises
     ------

@@ -208,6 +208,10 @@ class PointObservations:
     def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
         """What is observed without what drops out, in standard deviations, near to a robot's table.
 
+        Parameters
+        ----------
+        robot : whose table says where the points are
+
         Returns
         -------
         rows : (c, n), orthonormal; they take n observed values to as many as are independent of each other
@@ -510,7 +514,12 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
 
     Parameters
     ----------
+    measurements : in mm, and joint values in deg, or mm of joints that slide
     fixed : what of base and tool is where the robot's file has it; the tool is free only if its point was measured
+
+    Returns
+    -------
+    observations : one point for each measurement
 
     Raises
     ------

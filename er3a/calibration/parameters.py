@@ -25,10 +25,18 @@ DEPENDENT = 1e-3
 
 
 def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
-    """The entries of a level, in the order in which they are preferred where some can't be told apart.
+    """The entries of a level, in the order in which they are preferred where some have the same effect.
 
-    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta beside alpha wherever neighbouring axes are
+    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta with alpha wherever neighbouring axes are
     parallel: their common normal, on which the other four entries rest, is undefined there.
+
+    Parameters
+    ----------
+    level : one of ``LEVELS``
+
+    Returns
+    -------
+    entries : of the table; base and tool are not among them
     """
     joints = range(1, robot.rows + 1)
     lengths = [Entry(column, j) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]

@@ -61,12 +61,16 @@ class JointTerm:
         return 2 if self.kind in ("once", "twice", "ripple") else 1
 
     def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
-        """(P, count), what the coefficients are multiplied by.
+        """What the coefficients are multiplied by.
 
         Parameters
         ----------
-        x : (P, m), what the rows are meant to move by
+        x : (P, m), rad or m, what the rows are meant to move by
         climb, own_climb : (P, m), derivative of the measured point's height by it, and of the centre of mass's
+
+        Returns
+        -------
+        shapes : (P, count)
         """
         own = x[:, (self.by or self.joint) - 1]
         if self.kind in IN_ROBOT_FILE:

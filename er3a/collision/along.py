@@ -210,7 +210,7 @@ class _Motion:
 def clearance_along(
     bodies: Bodies, joints: Joints, rates: RateBounds, t: Reals, shown: Reals, depth: float
 ) -> ClearanceAlong:
-    """Measure clearance along a motion.
+    """Measure clearance along a motion, bounded between the points measured (see the module's text).
 
     Parameters
     ----------
@@ -219,7 +219,11 @@ def clearance_along(
     joints : values (N, n) in rad or m at times (N,) in s; NaN where the motion is unknown
     t : (N,), s, rising: where the motion is known or not; refined as needed
     shown : times (K,) of ``t`` at which the clearance is returned
-    depth : m; see the module's text
+    depth : m, of overlaps that may be missed, and to within which the smallest clearance is found
+
+    Returns
+    -------
+    along : distances in m at ``shown`` and at all times at which every pair was measured; and the contacts
     """
     motion = _Motion(bodies, joints, rates)
     every = np.arange(len(bodies.pairs))
@@ -363,13 +367,18 @@ STEP = 0.02
 
 
 def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float, Pair] | None:
-    """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which; None
-    if nothing does at the rows and every STEP between them. Allowed contacts are not looked up.
+    """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which.
+
+    Allowed contacts are not looked up.
 
     Parameters
     ----------
     t : (n,), s
-    q : (n, joints), rad or m; rows that are not finite are left out, with what is beside them
+    q : (n, joints), rad or m; rows that are not finite are left out, with the ways to and from them
+
+    Returns
+    -------
+    moment, pair : s, and two bodies; None if nothing overlaps at the rows and every ``STEP`` between them
     """
     moving = [body for body in (*arm_bodies(robot), *carried_bodies(robot, scene)) if body.link != BASE]
     solids = [body for solid in scene.solids for body in solid_bodies(solid)]
@@ -421,7 +430,16 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Smallest distance of the arm, at each joint vector (N, n) in rad or m, from the scene's solids and from itself.
+    """Smallest distance of the arm from the scene's solids and from itself, at each joint vector.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    scene : None for the arm alone
+
+    Returns
+    -------
+    clearance : distances (N,) in m, negative by the depth of overlap, and the nearest pairs
 
     Raises
     ------

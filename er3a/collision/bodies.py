@@ -97,10 +97,18 @@ class Bodies:
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
 
     def ends(self, q: Reals) -> Reals:
-        """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
+        """Points whose hulls are the cores of the moving bodies; of a capsule the ends of its line.
 
-        Of a capsule the ends of its line. A body moves, as a set, by no more than its points do; those of a body that
-        has fewer than others come more than once.
+        A body moves, as a set, by no more than its points do; those of a body that has fewer than others come more than
+        once.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m
+
+        Returns
+        -------
+        points : (..., bodies, k, 3), m, world frame
         """
         T = link_frames(self.robot, q)[..., [body.link for body in self.capsules], :, :]
         placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], self._padded) + T[..., None, :3, 3]

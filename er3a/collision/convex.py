@@ -335,10 +335,18 @@ MAX_POINTS = 1000
 
 
 def overlap_depth(first: Reals, second: Reals) -> float:
-    """Depth (m) by which the hulls of two sets of points (n, 3), (m, 3) overlap; 0 for sets that lie in one plane.
+    """Depth by which the hulls of two sets of points overlap: the shortest separating translation [3]_.
 
     A hull of some of the difference's corners grows by the farthest corner beyond its face nearest to the origin,
     until there is none beyond; few of the n m points are ever looked at.
+
+    Parameters
+    ----------
+    first, second : (n, 3) and (m, 3), m
+
+    Returns
+    -------
+    depth : m; 0 where they don't overlap, or for sets that lie in one plane
     """
     corners = _farthest(first, second, STARTS)
     try:

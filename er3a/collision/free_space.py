@@ -147,6 +147,10 @@ def find_places(
     ----------
     across : cells along the longest side of what the samples reach
     rounds : how often POSES_A_ROUND further poses are tried in a cell without a clear arm; all branches of each
+
+    Returns
+    -------
+    places : M cells, in m; none is joined to home yet
     """
     robot = bodies.robot
     T = forward(robot, space.q)
@@ -195,11 +199,16 @@ def _try_poses(
 
 
 def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours: int) -> Flags:
-    """Which clear places (M,) can be joined to home (n,), an arm free of overlap, by moves that are proven free.
+    """Which clear places can be joined to home by moves that are proven free [2]_.
 
     Parameters
     ----------
+    home : (n,), rad or m, an arm free of overlap
     neighbours : moves to how many of the nearest arms are tried from each
+
+    Returns
+    -------
+    joined : (M,) bool; nothing is proven of the others
     """
     clear = np.flatnonzero(places.clear)
     q = np.concatenate([home[None], places.witness[clear]])

@@ -54,6 +54,11 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     ----------
     vertices : (V, 3), m; faces : (F, 3), rows of vertices, outwards by the right-hand rule
     threshold : concavity that is left, a share of the mesh's size (coacd's measure), 0.01 to 1
+    seed : of the split, and of the points at which the excess is measured
+
+    Returns
+    -------
+    pieces : in m, with what sticks out of them, and how far they stick out
 
     Raises
     ------
@@ -67,9 +72,19 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
 
 
 def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
-    """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface is flattest [1]_.
+    """A mesh with at most so many triangles: edges collapse where the surface is flattest [1]_.
 
     Of triangles with both sides (two with the same corners) one is kept: edges of more than two don't collapse.
+
+    Parameters
+    ----------
+    vertices : (V, 3), m
+    faces : (F, 3), rows of ``vertices``
+    most : triangles
+
+    Returns
+    -------
+    vertices, faces : the given ones if there are few enough
 
     References
     ----------
@@ -129,7 +144,7 @@ def hull_of(points: Reals) -> ConvexPieces:
 
     Returns
     -------
-    pieces : one piece; the margin (m) is how far corners left out stick out of it, the excess is 0: corners are points
+    pieces : one; ``uncovered`` (m) is how far corners left out stick out of it, ``excess`` is 0: corners are points
     """
     corners = hull_corners(points)
     if len(corners) <= MAX_CORNERS:

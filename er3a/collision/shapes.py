@@ -168,12 +168,20 @@ def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
 
 
 def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
-    """Whether a tool, or the flange, reaches out of all shapes, which those of the arm's file and what it carries are.
+    """Whether a tool, or the flange, reaches out of all shapes: those of the arm's file and of what it carries.
 
     Without anything carried, its point lies outside the last link's shapes. What is inside another link's shape at some
     joint values is not inside it at others. Or, seen along the line from the table's end to that point, these shapes
     and what is carried reach along less than all but ``UNSHAPED`` of it: something must hold what is carried at a
-    tool's tip. Tools are bent, and fingers stand beside the line, so it need not lie inside them.
+    tool's tip. Tools are bent, and fingers are next to the line, so it need not lie inside them.
+
+    Parameters
+    ----------
+    scene : with what the tool carries; None for nothing
+
+    Returns
+    -------
+    bare : False for guessed shapes, and for arms without tool and flange lengths
     """
     shapes = arm_shapes(robot)
     if not shapes.given or not (robot.tool[:3, 3].any() or robot.flange[:3, 3].any()):
@@ -244,13 +252,16 @@ def _size(robot: Robot) -> float:
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
-    """The remark on collisions where the arm's shapes are assumed; None where a document that
-    verdicts rest on gives them, for all of its links.
+    """The remark on collisions where the arm's shapes are assumed.
 
     Parameters
     ----------
     margin : m, within which of assumed shapes nothing is settled
     clearances : m, smallest ones by name; None where unknown, negative for overlaps
+
+    Returns
+    -------
+    remark : None where a document that verdicts rest on gives the shapes of all links
     """
     shapes = arm_shapes(robot)
     if not shapes.assumed:
@@ -528,7 +539,15 @@ def _corners(body: Body, radius: float) -> Reals:
 
 
 def hull_faces(points: Reals) -> Integers:
-    """The triangles (n, 3) of the convex hull of points (k, 3), their corners counter-clockwise from outside.
+    """The triangles of a convex hull.
+
+    Parameters
+    ----------
+    points : (k, 3), m
+
+    Returns
+    -------
+    faces : (n, 3), rows of ``points``, counter-clockwise from outside
 
     Raises
     ------

@@ -357,12 +357,20 @@ def surface_distance(
     near: Reals,
     far: float,
 ) -> float:
-    """Distance of a surface, body a placed by T (4, 4), from body b; below 0 where one is inside the other, 0 where
-    they cross. From ``far`` on any number from ``far`` to the distance.
+    """Distance of a body's surface from another body.
 
-    Body b is a surface placed by S (4, 4) or, if it has no tree, a convex core: rows from first to last of points
-    (P, 3) in space, and the radius of its disc. ``near`` (2, 3) holds the closest points of hulls around the two, and
-    gets their own.
+    Parameters
+    ----------
+    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree
+    T, S : (4, 4), m, place the two surfaces; S does not count for a core
+    core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), m, holds the closest points of hulls around the two, and gets their own
+    far : m; of surfaces farther away any number from ``far`` to the distance may be returned
+
+    Returns
+    -------
+    distance : m; below 0 where one is inside the other, 0 where they cross
     """
     w, first, last, disc = core
     convex = trees.root[b] < 0

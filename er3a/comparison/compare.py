@@ -247,6 +247,10 @@ def compare(
     robot_b : the table to compare with
     tolerance_mm, tolerance_deg : entries that differ by at most this are equal
 
+    Returns
+    -------
+    comparison : the verdict with its layers, lengths in mm and angles in deg
+
     Raises
     ------
     RobotError

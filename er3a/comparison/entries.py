@@ -97,6 +97,10 @@ def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:
     ----------
     tables : one, or one for each of H rows of amounts
     amounts : (H, k), m and rad; relative for the scale, which has to come before lengths
+
+    Returns
+    -------
+    tables : H
     """
     found = tables if len(tables) == len(amounts) else tables[np.zeros(len(amounts), dtype=np.int64)]
     columns: dict[str, Any] = {}

@@ -860,6 +860,10 @@ def mechanism_from_axes(directions: Reals, points: Reals, flange: Reals, angle: 
     directions, points : (m, 3), of positive rotation, and on each line, m, in the base's frame
     flange : (4, 4) at these joint values
     angle : rad, below which neighbouring axes are parallel
+
+    Returns
+    -------
+    mechanism : of m rows that turn, its links along common normals
     """
     m = len(directions)
     z = directions / np.linalg.norm(directions, axis=1)[:, None]

@@ -283,11 +283,16 @@ class Repair:
 
 
 def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repair]:
-    """All repairs that change the given table (a batch of one).
+    """All repairs without free number that change the given table.
 
     Parameters
     ----------
+    given : a batch of one
     references : a limit that they contradict is a repair, with the value that they state
+
+    Returns
+    -------
+    repairs : each with the fault that it corrects
     """
     joints, alphas = range(given.a.shape[-1]), np.degrees(given.alpha[0]).tolist()
     candidates = [

@@ -48,8 +48,13 @@ def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Re
 
     Parameters
     ----------
+    tables : one, or H
     which : (H, k), the places among ``numbers`` of the k entries to change in each table
     amounts : (H, k), m or rad; relative for the scale
+
+    Returns
+    -------
+    tables : H
     """
     every = np.zeros((len(which), len(numbers)))
     np.put_along_axis(every, which, amounts, axis=1)
@@ -196,14 +201,19 @@ def lowered(
     floor: float = FLOOR,
     widest: Reals | float = np.inf,
 ) -> tuple[Reals, Reals]:
-    """Damped least squares from many starts at once; none gets worse.
+    """Damped least squares from many starts at once [1]_; none gets worse.
 
     Parameters
     ----------
     amounts : (R, k), where to start; held : (R, k), those that stay
     within : what of residuals (R, n) counts; what does not, being met, is moved as little as will do
+    passes : steps at most
     floor : of the largest slope squared, as which smaller ones are damped
     widest : (k,), by how much amounts may be away from 0
+
+    Returns
+    -------
+    amounts, off : (R, k), and the model's residuals (R, n) there
     """
     amounts = np.clip(amounts, -widest, widest)
     off = model(amounts, np.arange(len(amounts)))
@@ -276,11 +286,16 @@ def meet(search: Search, fits: Fits) -> Fits:
 
 
 def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
-    """Steps (B, k) that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``.
+    """Steps that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``, by Lawson's weights [2]_.
 
     Parameters
     ----------
     slopes : (B, n, k); left : (B, n)
+    enough : in the unit of ``left``
+
+    Returns
+    -------
+    steps : (B, k); 0 where none lowers the largest
     """
     weights = np.full(left.shape, 1 / left.shape[1])
     best, least = np.zeros((len(left), slopes.shape[2])), np.abs(left).max(axis=1)

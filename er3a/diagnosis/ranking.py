@@ -442,6 +442,14 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
 
     Extremes over the limits are left out, because they take a search for every hypothesis, and so are references that
     contradict each other, which no table could meet.
+
+    Parameters
+    ----------
+    references : of which those that state no value are left out
+
+    Returns
+    -------
+    references : in the given order
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]

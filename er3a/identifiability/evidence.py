@@ -35,12 +35,16 @@ FIRST_STEP, HALVINGS = 0.05, 12
 def judge_limit(
     robot: Robot, entry: Entry, independent: Sequence[Reference], reacts: bool
 ) -> tuple[LimitStatus, tuple[float, float]]:
-    """Status of a limit or speed, and what independent references leave open for it, in its unit.
+    """Status of a limit or speed, and what independent references leave open for it.
 
     Parameters
     ----------
     independent : references that react to it and rest on other documents than it does
     reacts : whether any reference reacts to it
+
+    Returns
+    -------
+    status, interval : and lower and upper bound, in the entry's unit
     """
     value = entry.value(robot)
     direct = [r for r in independent if isinstance(r.quantity, Limit | Speed)]

@@ -77,13 +77,19 @@ class Region:
     def reached(
         self, direction: Reals, amounts: Reals, held: Flags | None = None, *, inner: float = INSIDE, near: bool = False
     ) -> tuple[Reals, Flags]:
-        """Amounts (R, k) that each start leads to, and whether (R,) they meet what is asked but for extremes.
+        """Amounts that starts lead to, and whether these meet what is asked but for extremes.
 
         Parameters
         ----------
+        direction : (R, n), +1 or -1
+        amounts : (R, k), m or rad, of the starts
         held : (R, k), entries that keep their amounts
         inner : of the half-widths, to which steps lead
         near : whether extremes count, where they were attained last
+
+        Returns
+        -------
+        amounts, met : (R, k), m or rad, and (R,) bool
         """
         found, met = amounts.copy(), np.zeros(len(amounts), dtype=bool)
         for begun in range(0, len(amounts), CHUNK):

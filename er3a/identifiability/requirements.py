@@ -220,9 +220,15 @@ class Requirement:
 def requirements_of(references: Sequence[Reference], places: Sequence[int] | None = None) -> list[Requirement]:
     """What references ask of a table; those about limits and speeds ask nothing of it.
 
+    Of references that contradict each other only the hull of the values that they allow is required.
+
     Parameters
     ----------
     places : by which requirements name the references; by default their order
+
+    Returns
+    -------
+    requirements : one for each reference, or for each set that contradicts itself
     """
     places = range(len(references)) if places is None else places
     asked = [i for i, each in enumerate(references) if each.expected is not None and each.quantity.depends_on_table]

@@ -79,13 +79,17 @@ class ArmAngleLaw:
 def laws_with_most_margin(
     robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
 ) -> list[ArmAngleLaw]:
-    """The best law of each slot, largest margin first; without slots that miss a pose.
+    """The best arm-angle law of each slot.
 
     Parameters
     ----------
     T : (K, 4, 4), poses of the tool, m, at shares (K,) of the path
     start : the arm angle at the start, rad, and the joints (n,), rad; None leaves them open, whole turns too
     slots : (s,), those that may be taken
+
+    Returns
+    -------
+    laws : largest margin first; slots that miss a pose have none
     """
     search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
     begun = -np.pi + TURN * np.arange(BEGUN_AT) / BEGUN_AT if start is None else np.array([start[0]])
@@ -267,12 +271,16 @@ def follows_tool_paths(robot: Robot) -> bool:
 
 
 def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:
-    """The joints' motion (n) along a path.
+    """The joints' motion along a tool path, for the part of the pose that the arm's class can meet.
 
     Parameters
     ----------
     q_start : (n,), rad or m, joints whose tool meets the path's first pose; None for those of the closed form that keep
         the limits longest, then with the largest margin
+
+    Returns
+    -------
+    motion : of n joints, rad or m, within 1e-10 of the closed form at the points between its nodes
 
     Raises
     ------

@@ -228,6 +228,10 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
     ----------
     ends : joint angles (6,) in rad at the end of each earlier path, NaN where it is not reached
 
+    Returns
+    -------
+    built : a joint move or a tool path, with what it starts from
+
     Raises
     ------
     InputError

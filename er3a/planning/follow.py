@@ -344,7 +344,15 @@ class Followed(ByValue, Displayed):
         return Sheet.of_table(found, columns, rows, len(rows), ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable.
+        """Joint angles at times, by the closed form of the branch followed there.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to the line's duration
+
+        Returns
+        -------
+        q : (..., 6), rad, manufacturer's angles; NaN where unreachable
 
         Raises
         ------
@@ -408,15 +416,19 @@ class Followed(ByValue, Displayed):
         return nearest
 
     def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
-        """Joint angles and their first and second derivative by progress, at shares of the path (n,) [2]_.
+        """Joint angles and their first and second derivative by progress, at shares of the path [2]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
-        singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
-        the line through there.
+        singular, the derivatives are those next to it, if both sides agree. Else they are NaN: no finite joint speed
+        follows the line through there.
+
+        Parameters
+        ----------
+        progress : (n,), shares of the path, 0 to 1
 
         Returns
         -------
-        q, dq, ddq : (n, 6), rad
+        q, dq, ddq : (n, 6), rad, rad per unit of progress, and rad per its square
         """
         q = self.joints_at(progress)
         dq, ddq = self.through_jacobian(q, progress)
@@ -525,7 +537,7 @@ class _Sequence:
 def follow(
     robot: Robot, line: ToolPath, t: Reals, q_start: Reals | None = None, start_slot: int | None = None
 ) -> Followed:
-    """Follow a line.
+    """Follow a line by the best sequence of closed-form branches as a whole.
 
     Parameters
     ----------
@@ -533,6 +545,10 @@ def follow(
         near to each other
     q_start : (6,), rad, joints at the start, whose tool pose is the line's first
     start_slot : closed-form branch (0..7) at the start; None for the best one
+
+    Returns
+    -------
+    followed : joints (M, 6) in rad, manufacturer's angles, M >= N; NaN where no branch reaches the pose
 
     Raises
     ------

@@ -393,13 +393,18 @@ SAMPLES = 500  # of a motion of an arm without the three sets
 
 
 def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.NearSingular) -> list[SingularEvent]:
-    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold, by time.
+    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold.
+
+    Of arms without the three sets the losses of rank are reported (:func:`er3a.kinematics.singularity.rank_losses`).
 
     Parameters
     ----------
-    near : distances below which a pass is reported
+    motion : of n joints, rad or m
+    near : distances below which a pass is reported, rad, and m for the shoulder
 
-    Of arms without the three sets the losses of rank are reported (:func:`er3a.kinematics.singularity.rank_losses`).
+    Returns
+    -------
+    events : sorted by time (s), then by type
     """
     if not has_branches(robot):
         t = np.union1d(motion.times, np.linspace(0.0, motion.duration, SAMPLES))

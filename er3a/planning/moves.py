@@ -365,6 +365,10 @@ def line(
     half_turn_axis : (3,), base frame; for rotations by exactly half a turn, the side to which the axis shall point
     ramp : share of the time of each ramp of a trapezoid; None for the quintic
 
+    Returns
+    -------
+    line : from rest to rest
+
     Raises
     ------
     Er3aError
@@ -380,7 +384,16 @@ def line(
 
 
 def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None = None) -> tuple[Reals, bool]:
-    """Rotation vector (3,) in rad in the base frame, in the shorter direction, and whether it is half a turn.
+    """Rotation of the tool from one pose to another, in the shorter direction.
+
+    Parameters
+    ----------
+    T_start, T_end : (4, 4), T_base_tool
+    half_turn_axis : (3,), base frame, the side to which the axis of exactly half a turn shall point; None for upwards
+
+    Returns
+    -------
+    rotation, half_turn : (3,), rotation vector, rad, base frame; and whether it is by half a turn
 
     Raises
     ------

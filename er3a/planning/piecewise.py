@@ -300,6 +300,10 @@ def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: in
     rates : angles, velocities and accelerations (..., n) at times (...,) in s
     breaks : (m + 1,), s, rising; those that repeat the one before, to rounding, are left out
     degree : of the angles
+
+    Returns
+    -------
+    motion : of m pieces at most; each series interpolates its own values
     """
     breaks = np.asarray(breaks, float)
     times = breaks[np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])]

@@ -156,9 +156,19 @@ def arc(
     half_turn_axis: Reals | None = None,
     ramp: float | None = None,
 ) -> Arc:
-    """The arc from a pose of the tool through a point ``via`` (3,) in m to another pose.
+    """The arc from a pose of the tool through a point to another pose.
 
-    The rest is as for :func:`er3a.planning.moves.line`.
+    Parameters
+    ----------
+    T_start, T_end : (4, 4), T_base_tool, m
+    via : (3,), m, base frame
+    duration : s
+    half_turn_axis : (3,), base frame; for rotations by exactly half a turn, the side to which the axis shall point
+    ramp : share of the time of each ramp of a trapezoid; None for the quintic
+
+    Returns
+    -------
+    arc : from rest to rest, by less than a full circle
 
     Raises
     ------
@@ -247,12 +257,17 @@ def straight(start: Reals, end: Reals) -> Reals:
 
 
 def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float | Reals) -> Reals:
-    """Coefficients (6, k) of the piece that takes over value and derivatives (k,) ``before`` and ends with ``after``.
+    """The quintic piece that takes over value and derivatives on one side and joins those on the other.
 
     Parameters
     ----------
+    before, after : value, first and second derivative, each (k,)
     span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
-        values are (m, k) and coefficients (6, m, k)
+        values are (m, k)
+
+    Returns
+    -------
+    coefficients : (6, k), of the powers 0 to 5 of the piece's share; (6, m, k) of m pieces
     """
     x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
     x1, v1, a1 = after[0], after[1] * span, after[2] * span**2
@@ -504,14 +519,18 @@ class _Piece:
 def segment_path(
     segments: Many[Segment], blends: Reals, timing: float | Times | LegTimes, ramp: float | None = None
 ) -> SegmentPath:
-    """Put segments together.
+    """Put lines and arcs together to one path, with rounded corners or stops between them.
 
     Parameters
     ----------
-    segments : each starting where the one before ends, none of length 0; their durations are ignored
+    segments : n, each starting where the one before ends, none of length 0; their durations are ignored
     blends : (n - 1,), m, over which length on either side each corner is rounded; 0 for a corner to stop at
     timing : s, divided between halts by path length; or the times of the corners; or those of the legs
     ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
+
+    Returns
+    -------
+    path : in m, rad and s
 
     Raises
     ------
@@ -567,6 +586,10 @@ def joint_sequence(
     blends : (n - 2,), rad of the joint that turns most, over which each corner is rounded on either side; 0 stops there
     timing : s, divided between halts by joint travel; or the times of the corners; or those of the legs
     ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
+
+    Returns
+    -------
+    sequence : in rad and s
 
     Raises
     ------

@@ -163,10 +163,18 @@ def joint_limits(
     acceleration: Reals | None = None,
     jerk: Reals | None = None,
 ) -> JointLimits:
-    """The robot's joint speeds, with ``assumed_speed`` (n,) in rad/s where they are unknown.
+    """The limits of a robot's joint rates, assumed where its table gives none.
 
-    Tables give no accelerations: where none are given (n,), each joint is taken to reach its full speed in
-    ``acceleration_time`` seconds.
+    Parameters
+    ----------
+    assumed_speed : (n,), rad/s or m/s, where a speed is unknown
+    acceleration_time : s, in which each joint is taken to reach its full speed where no accelerations are given
+    acceleration : (n,), rad/s^2 or m/s^2; None where none are given, as in tables
+    jerk : (n,), rad/s^3 or m/s^3; None for no limit
+
+    Returns
+    -------
+    limits : which of them are assumed is noted
     """
     known = np.isfinite(robot.speed)
     speed = np.where(known, robot.speed, assumed_speed)
@@ -182,6 +190,10 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
     ----------
     joints : angles (n, 6) in rad at times (n,)
     t, q : (N,) s and (N, 6) rad, to begin with
+
+    Returns
+    -------
+    t, q : (M,) s and (M, 6) rad, M >= N, the given points among them
     """
     for _ in range(MAX_ROUNDS):
         steps = np.diff(q, axis=0) / limits.speed
@@ -202,12 +214,18 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
 
 
 def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> Timed:
-    """Run along nodes (N, 6) in rad from rest to rest, as fast as the limits allow.
+    """Run along nodes from rest to rest, as fast as the limits allow, by TOPP-RA [1]_.
 
     Parameters
     ----------
+    q : (N, n), rad
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
     programmed : (N,), s, rising: times at which the programme is at the nodes; no stretch is run faster, but for
         what the nodes leave open of the programme's speed, and the whole takes no less time
+
+    Returns
+    -------
+    motion : on cubic splines through the nodes
 
     Raises
     ------
@@ -233,11 +251,17 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
 
 
 def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
-    """The spline through nodes (N, n) at path parameters ``s`` (N,), without those of one place; None of a single one.
+    """The cubic spline through nodes, without those of one place.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    s : (N,), path parameter, not falling
 
     Returns
     -------
     kept : which nodes are left; s : (k,), their places, or more places on a path of two; spline
+        None in place of all if a single node is left
     """
     kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
     if len(kept) < 2:
@@ -301,6 +325,10 @@ def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
     ----------
     start, end : (n,), rad
     limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
+
+    Returns
+    -------
+    motion : through ``STRAIGHT_NODES`` nodes
 
     Raises
     ------
@@ -412,11 +440,22 @@ def _programmed_speed(cap: Reals, joints: int) -> Any:
 
 
 def solved(path: Any, s: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
-    """Speeds along the path and times (s) at its nodes (N,), from rest to rest; :class:`TimingError` if there are none.
+    """The fastest speeds along a path from rest to rest, by toppra's solver.
 
     Parameters
     ----------
-    path : see :func:`toppra_path`; constraints : of toppra
+    path : see :func:`toppra_path`
+    s : (N,), path parameter at the nodes, rising
+    constraints : of toppra
+
+    Returns
+    -------
+    speed, t : (N,), of the path parameter per s, and s from 0, at the nodes
+
+    Raises
+    ------
+    TimingError
+        if there is no time law, or one that has to wait on the way
     """
     solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=s, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0, 0)

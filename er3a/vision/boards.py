@@ -134,11 +134,17 @@ class BoardNotFoundError(Er3aError):
 def board_views(
     images: Sequence[Image], board: Board, camera: Camera | None = None, pixel_deviation: float = 0.3
 ) -> BoardViews:
-    """Poses of a board in grey images (h, w).
+    """Poses of a board in grey images, with their covariances.
 
     Parameters
     ----------
+    images : (h, w) each, all of one size
     camera : intrinsics; None to estimate them from these images
+    pixel_deviation : standard deviation of a corner in each direction, pixels
+
+    Returns
+    -------
+    views : of the N images that show the board, T_camera_board (N, 4, 4), m
 
     Raises
     ------

@@ -191,9 +191,18 @@ class OffsetOpenError(Er3aError):
 
 
 def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
-    """Estimate the offset within +-``widest`` s.
+    """Estimate the offset between the clocks of two streams, by rotation angles over short times.
 
     Robust: up to half of the compared rotations may be wrong.
+
+    Parameters
+    ----------
+    hand, eye : streams of poses with times in s
+    widest : s, the offset is sought within this to either side
+
+    Returns
+    -------
+    offset : to be added to the eye's times, s
 
     Raises
     ------
@@ -236,10 +245,19 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
 
 
 def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
-    """``count`` poses (count, 4, 4) of hand and eye at equal times (count,), s, spread over rotations.
+    """Poses of hand and eye at equal times, spread over rotations.
 
     The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before,
     from the half of all times at which the arm is slowest, where an error of the offset matters least.
+
+    Parameters
+    ----------
+    offset : s, to be added to the eye's times
+    count : how many poses; fewer if the streams have fewer in common
+
+    Returns
+    -------
+    hand, eye, t : (count, 4, 4), m, twice, and (count,), s by the hand's clock
     """
     inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
     t = eye.t[inside] + offset

@@ -53,7 +53,15 @@ def mean_pose(T: Reals) -> Reals:
 
 
 def park(F: Reals, B: Reals) -> Unknowns:
-    """X and Y (..., 4, 4) after Park and Martin [1]_.
+    """Hand-eye and board pose after Park and Martin [1]_: rotation from logarithms of motions, then position.
+
+    Parameters
+    ----------
+    F, B : (..., N, 4, 4), m, see the module's text
+
+    Returns
+    -------
+    X, Y : (..., 4, 4), m
 
     Raises
     ------
@@ -73,7 +81,15 @@ def park(F: Reals, B: Reals) -> Unknowns:
 
 
 def shah(F: Reals, B: Reals) -> Unknowns:
-    """X and Y (4, 4) of samples (N, 4, 4) after Shah [2]_, who takes them as B Y^-1 = X^-1 F^-1.
+    """Hand-eye and board pose after Shah [2]_, who takes the samples as B Y^-1 = X^-1 F^-1.
+
+    Parameters
+    ----------
+    F, B : (N, 4, 4), m, see the module's text
+
+    Returns
+    -------
+    X, Y : (4, 4), m
 
     Raises
     ------

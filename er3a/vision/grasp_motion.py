@@ -98,10 +98,19 @@ def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> Gra
 
 
 def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tuple[GraspLeg, ...] | NoWayAround:
-    """Legs from joints (n,) to joints (n,), rad, on which nothing touches; or why there are none.
+    """Legs from joints to joints on which nothing touches.
 
-    Where the straight move comes nearer to something than ``needed`` (m), a way around is tried; of both the one is
-    taken that keeps farther away.
+    Where the straight move comes too near to something, a way around is tried; of both the one is taken that keeps
+    farther away.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+    needed : m, clearance with which the straight move is good enough
+
+    Returns
+    -------
+    legs : or why there are none
     """
     if outside := limits_exceeded(task.robot, start):
         return EndOutsideLimits("start", outside)
@@ -127,12 +136,17 @@ def _clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> float:
 def tool_leg(
     robot: Robot, part: Part, waypoints: Reals, ends: tuple[Reals, Reals], limits: JointLimits, speed: float
 ) -> tuple[GraspLeg, ...] | None:
-    """The straight line of the tool between two poses (4, 4), within limits and off singular poses; None if that fails.
+    """The straight line of the tool between two poses, within limits and off singular poses.
 
     Parameters
     ----------
-    waypoints : (k, n), rad, joints along it, from a search
+    waypoints : (k, n), rad, joints along it, from a search; arms without closed form move straight between them
+    ends : (4, 4) each, T_base_tool, m
     speed : m/s, the tool's largest
+
+    Returns
+    -------
+    legs : one, or one for each two waypoints; None if no line keeps the limits
     """
     if parallel_axes_arm(robot) is None and wrist_partition_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)

@@ -252,12 +252,16 @@ def plan_grasp(
     T_base_object: Reals,
     covariance_at: Callable[[Reals], Reals],
 ) -> GraspPlan:
-    """Choose a grasp of one object.
+    """Choose a grasp of one object, by the largest of the smallest margins (see the module's text).
 
     Parameters
     ----------
-    T_base_object : (4, 4)
+    T_base_object : (4, 4), m
     covariance_at : from joint angles (n,) of a grasp to the covariance (6, 6) of the object's pose as the tool meets it
+
+    Returns
+    -------
+    plan : the grasp with its probability, or why there is none; and how many were tried
     """
     poses = _poses(target, T_base_object)
     candidates = [

@@ -175,11 +175,20 @@ def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Re
 def worst_sample(
     samples: calibration_set.CalibrationSet, refined: Refined
 ) -> tuple[int, vision_findings.FarFromFit] | None:
-    """The sample whose residuals are too large beside those of all others; None if there is none.
+    """The sample whose residuals are too large compared with those of all others.
 
     Each sample's six residuals, with the share that it pulls towards itself taken back, over the others' scatter are
     distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is not too large,
     however little the others scatter.
+
+    Parameters
+    ----------
+    samples : N of them
+    refined : the fit of all of them
+
+    Returns
+    -------
+    number, finding : from 0, in mm and deg; None if no sample is too far from the fit
     """
     free = 6 * len(samples) - 12 - 6
     if free < 6:
@@ -462,6 +471,10 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
 def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
     """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
 
+    Parameters
+    ----------
+    found : a calibration; samples without joint values leave all joints unseen
+
     Returns
     -------
     found, unseen, smallest : see :class:`er3a.vision.typical_causes.ZerosTried`
@@ -483,7 +496,16 @@ EXPLAINED_BY_A_ZERO = {
 
 
 def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
-    """The closed-form answer X, Y (4, 4) with the smallest residuals, in standard deviations (2,) in m and rad.
+    """The closed-form answer with the smallest residuals, of Park's and Shah's.
+
+    Parameters
+    ----------
+    F, B : (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
+    deviations : (2,), m and rad, by which residuals are divided
+
+    Returns
+    -------
+    X, Y : (4, 4), m
 
     Raises
     ------

@@ -232,12 +232,18 @@ def stated_whitening(seen: PoseObservations, X: Reals, Y: Reals) -> Reals:
 def refine(
     seen: PoseObservations, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
 ) -> Refined:
-    """The likeliest poses from starts X, Y (4, 4).
+    """The likeliest hand-eye and board pose, by Levenberg and Marquardt's steps [1]_.
 
     Parameters
     ----------
+    seen : N samples, with what is stated of their scatter
+    X, Y : (4, 4), m, where to start
     model : what predicts the samples, with ``more`` unknowns that start at zero; None: the two poses alone
     W : (N, 6, 6), weights to keep; None: as the samples state them, or estimated
+
+    Returns
+    -------
+    refined : with covariance, and residuals in m and rad
 
     Raises
     ------

@@ -127,13 +127,17 @@ def seen_pose_error(
     accuracy: ArmAccuracy,
     arm: tuple[Robot, Reals, Reals | None],
 ) -> SeenPoseError:
-    """Errors of T_base_object (..., 4, 4) as the tool meets them that goes there.
+    """Errors of an object's pose as the tool meets them that goes there, to first order.
 
     Parameters
     ----------
-    T_camera_object : (..., 4, 4); camera_covariance : (..., 6, 6) of it by the camera's axes
+    T_camera_object : (..., 4, 4), m; camera_covariance : (..., 6, 6) of it by the camera's axes
     arm : the robot, the joint angles (..., n) at which its tool is on the object, and those (n,) at which a camera on
         the flange takes the picture (None for a fixed one)
+
+    Returns
+    -------
+    errors : covariances (..., 6, 6) of T_base_object, m and rad by the base's axes, by cause
     """
     robot, q_there, q_picture = arm
     X = found.X

@@ -101,6 +101,10 @@ class TypicalCause:
         start : a fit of the poses alone, whose poses are the start
         W : (N, 6, 6), weights to keep, 1/m and 1/rad
 
+        Returns
+        -------
+        fit : its ``values`` (count,) are the cause's numbers
+
         Raises
         ------
         LinAlgError
@@ -129,12 +133,19 @@ class TypicalCause:
 
 
 def chance_of(drop: float, count: int, squares: float, free: int, least: float = 1e-300) -> float:
-    """Probability that ``count`` numbers lower a sum of squares by as much by chance.
+    """Probability that some numbers lower a sum of squares by as much by chance, by the F distribution.
 
     Parameters
     ----------
+    drop : of the sum of squares
+    count : of the numbers
+    squares : before the numbers were fitted
     free : degrees of freedom of what remains
     least : variance of a residual, if it is stated
+
+    Returns
+    -------
+    probability : 0 to 1
     """
     scale = max((squares - drop) / free, least)
     return float(scipy.special.fdtrc(count, free, max(drop, 0.0) / count / scale))
@@ -181,6 +192,10 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
     Parameters
     ----------
     refined : the fit of the samples without such an error
+
+    Returns
+    -------
+    fits : empty for fewer than ``LEAST_SAMPLES`` samples
     """
     if len(samples) < LEAST_SAMPLES:
         return ()
@@ -268,6 +283,10 @@ def moved_between(samples: CalibrationSet, refined: Refined) -> vision_findings.
     Parameters
     ----------
     refined : the fit of all these samples
+
+    Returns
+    -------
+    finding : from which sample on, by how many mm and deg; None if there is no such step
     """
     count = len(samples)
     free = 6 * count - UNKNOWNS - 6
@@ -325,6 +344,10 @@ def wrong_zero(samples: CalibrationSet, used: CalibrationSet, refined: Refined, 
     Parameters
     ----------
     used : those of the samples that the fit ``refined`` rests on
+
+    Returns
+    -------
+    tried : the joint with its zero in deg, if one explains them; and which joints no sample shows
     """
     names = joint_names(robot)
     if samples.q is None:

@@ -365,6 +365,14 @@ def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     A change before the path begins is preferred: where only the tool's pose is given there, the arm may as well begin
     on that branch. Else the change is made at the last good pose. Of the branches on which the rest keeps its distance
     within the limits, the one nearest in joint travel is taken.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion, or why there is none
     """
     bad = ~(segment.good & within(segment.robot, segment.q))
     if not bad.any():
@@ -576,7 +584,7 @@ def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName 
 
 
 def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0) -> StrategyResult | None:
-    """The usable strategy with the smallest deviation from the path (mm and deg added); None if there is none.
+    """The usable strategy with the smallest deviation from the path (mm and deg added).
 
     Among equals: the shortest time beyond the programmed one (in steps of ``SAME_TIME``), then a strategy that keeps
     its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
@@ -585,6 +593,10 @@ def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0
     ----------
     meets : whether the path meets a singular pose; what goes through it is then taken only if nothing else is usable
     programmed : duration of the path, s
+
+    Returns
+    -------
+    result : None if no strategy is usable
     """
 
     def price(cost: StrategyCost) -> tuple[bool, float, int, bool, float]:
