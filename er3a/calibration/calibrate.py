@@ -87,12 +87,12 @@ from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
-CLOSE = 0.9
-MAX_SCATTER = 3.0
+CLOSE = 0.9  # correlation of two estimates that are named together
+MAX_SCATTER = 3.0  # standard deviations, beyond which the model does not fit
 SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
 TOGETHER = 0.5
 """Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
-MAX_OUTLIER_SHARE = 0.1
+MAX_OUTLIER_SHARE = 0.1  # of the measurements, that is set aside at most
 FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 """Times ``WIDEST``: a correction beyond is none of this arm. A joint may lose its zero; a length is wrong by less."""
 ROUGHLY = 10.0

@@ -41,8 +41,8 @@ from er3a.comparison.entries import Entry
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
-PARTS = 10
-SEEDS = 1, 2, 3, 4
+PARTS = 10  # tenths, each left out once
+SEEDS = 1, 2, 3, 4  # of ways of leaving out; an average of several depends less on the draw
 SURE = 1e-5
 """How improbable a term's share has to be if there is only noise; some 80 terms are tried, again with each taken."""
 MIN_GAIN = 0.01
@@ -50,7 +50,7 @@ MIN_GAIN = 0.01
 MIN_POSES = 40
 MIN_SPARE = 3
 """Coordinates for each number of the model with all terms that are tried, for them to be tried."""
-RIDGE = 1e-12
+RIDGE = 1e-12  # of columns of unit length, so that dependent ones can be solved for
 
 
 @dataclass(frozen=True)

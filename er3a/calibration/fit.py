@@ -42,7 +42,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
-STEP = 1e-5
+STEP = 1e-5  # m or rad, of central differences
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
 STEPS, MAX_STEPS = 30, 100
@@ -61,7 +61,7 @@ FAR = 2.0  # times as near, where base and tool start elsewhere than in the robo
 OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
-MEDIAN_TO_DEVIATION = 1.4826
+MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution: the standard deviation over the median of the size
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
@@ -302,8 +302,8 @@ class Fit:
 def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     """Covariance of the estimates from the residuals themselves, pose by pose.
 
-    It is right also where what remains is no white noise of one size, but what a model misses at poses that could have
-    been others. Degrees of freedom are few where few poses settle a number.
+    It is right also where what remains is no white noise, but what a model misses at poses that could have been
+    others. Degrees of freedom are few where few poses settle a number.
 
     Parameters
     ----------
@@ -317,8 +317,8 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
 
     Notes
     -----
-    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``, so that those which the fit has
-    drawn to itself count in full; degrees of freedom as Satterthwaite's, if noise were white [2]_.
+    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``. So those which the fit
+    has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
@@ -374,8 +374,8 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
     """Rough places of base and tool, by the table as it is and points that were measured whole.
 
-    The tracker's frame may be anywhere, and the tool's place a guess. With points x and flanges turned by R, as the
-    table has them, a base S and a tool moved by t put the measured ones at ``m = S (x + R t)``. So
+    The tracker's frame may be anywhere, and the tool's place a guess. Let the table put points at x, and turn flanges
+    by R. A base S and a tool moved by t then put the measured points at ``m = S (x + R t)``. So
     ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may be any matrix. From the
     rotation nearest to that, t for a base and the base for a t are found by turns.
 

@@ -26,7 +26,7 @@ from er3a.robots.robot import Robot
 LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
-RICH_POSES = 64
+RICH_POSES = 64  # joint vectors all over the range
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""

@@ -19,7 +19,7 @@ from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
-PARALLEL_RAD = np.radians(1.0)
+PARALLEL_RAD = np.radians(1.0)  # within which two axes count as parallel
 DEPENDENT = 1e-3
 """Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
 

@@ -29,7 +29,7 @@ FEW = 6
 RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
 NEWTON_STEPS = 40
 LONGEST_STEP = 0.2  # rad, m
-TOUCHES_M = 1e-6
+TOUCHES_M = 1e-6  # m, within which a planned pose touches
 
 
 def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[int]:

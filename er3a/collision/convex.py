@@ -331,7 +331,7 @@ def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
-MAX_POINTS = 1000
+MAX_POINTS = 1000  # that a hull may grow by before all sums are taken
 
 
 def overlap_depth(first: Reals, second: Reals) -> float:

@@ -29,7 +29,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-Z_95 = 1.959963984540054
+Z_95 = 1.959963984540054  # half-width of the 95 % interval of a standard normal number
 POSES_A_ROUND = 8  # tried in a place in one round
 MIN_EXTENT_M = 1e-4  # of what a tool point that stays in place is reported to reach
 DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unproven, joins nothing

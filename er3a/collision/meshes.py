@@ -27,8 +27,8 @@ MAX_CORNERS = 64  # of a piece
 AGREE = 2e-5  # m, tolerance of the bound of what extends beyond
 CUTS = 12
 FINEST = 4_000_000  # triangles looked at in all
-SURFACE_POINTS = 20_000
-ROUNDING = 1e-12
+SURFACE_POINTS = 20_000  # at which the excess of pieces is measured, over all of them
+ROUNDING = 1e-12  # m, added to a bound that was computed
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import PairRule
 
-UNIT_LENGTH = 1e-6
+UNIT_LENGTH = 1e-6  # by which a normal's length may differ from 1
 
 
 @dataclass(frozen=True, eq=False)

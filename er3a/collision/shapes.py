@@ -38,7 +38,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import ConvexPiece, Envelope, Grade, LinkMesh, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
-SHORTEST = 1e-6
+SHORTEST = 1e-6  # m, below which a length of the table is none
 LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may protrude
 VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cables do
 COVERED, GAP = 0.75, 0.04  # of a link's lengths in the table its shapes have to reach along so much, or all but GAP, m
@@ -171,9 +171,9 @@ def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
     """Whether a tool, or the flange, reaches out of all shapes: those of the arm's file and of what it carries.
 
     Without anything carried, its point lies outside the last link's shapes. What is inside another link's shape at some
-    joint values is not inside it at others. Or, seen along the line from the table's end to that point, these shapes
-    and what is carried reach along less than all but ``UNSHAPED`` of it: something must hold what is carried at a
-    tool's tip. Tools are bent, and fingers are next to the line, so it need not lie inside them.
+    joint values is not inside it at others. Or these shapes and what is carried leave
+    more than ``UNSHAPED`` of the line from the table's end to that point free, seen along it. Something must hold what
+    is carried at a tool's tip. Tools are bent, and fingers are next to the line, so it need not lie inside them.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ ON_AXIS = 1e-9  # m
 LOOKED_AT = 100  # corners of a surface
 ROUND = 72  # corners by which a circle is drawn
 BALL = 200  # and a ball
-SIDES = 24
+SIDES = 24  # of the prism around a carried cylinder
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 

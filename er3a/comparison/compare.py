@@ -45,7 +45,7 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-SAMPLES = 192
+SAMPLES = 192  # joint vectors at which the two flanges are compared before the worst is sought
 SWEEPS = 2
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis

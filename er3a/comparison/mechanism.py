@@ -44,7 +44,7 @@ Parts = tuple[Reals, Reals, Reals]
 """Of a matrix, its singular value decomposition."""
 
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
-NEARLY_PARALLEL = math.radians(3.0)
+NEARLY_PARALLEL = math.radians(3.0)  # below it a common normal can be far outside the arm
 ON_AXIS = 1e-9  # m
 MAX_SENSES = 6
 MAX_ENTRIES = 4
@@ -415,8 +415,8 @@ class Match:
 
         Returns
         -------
-        entries, layers, size, turns : entries that differ (beta, which few tables have, counts more), differences of
-            convention, sum of the entries' differences (m and rad), turns of base and flange (rad)
+        entries, layers : how many entries differ (beta, which few tables have, counts more), and how many conventions
+        size, turns : sum of the entries' differences (m and rad), and turns of base and flange (rad)
         """
         entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
         size = sum(each.size for each in self.differences)

@@ -61,11 +61,11 @@ def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Re
     return shifted(tables, numbers, every)
 
 
-PROBE = 1e-6
-MEETS = 1.0 + 1e-6
+PROBE = 1e-6  # m or rad, of one-sided differences
+MEETS = 1.0 + 1e-6  # half-widths, with what rounding may add
 CURVED = 1.5
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e4
-EASED, STIFFENED = 0.1, 10.0
+EASED, STIFFENED = 0.1, 10.0  # factors of the damping after a step that lowers residuals, and after another
 TINY = 1e-12
 STALLED = 1e-4  # of the squares, by which a step has to lower them
 QUIET = 0.03  # weight of what is met

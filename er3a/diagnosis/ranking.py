@@ -40,7 +40,7 @@ from er3a.references.quantities import Extreme, Speed, Unit
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
-FREE_NUMBER = 1.5
+FREE_NUMBER = 1.5  # cost of a fault with a free number, in those of one without
 UNCHANGED = 1e-9
 MIN_SCALE = 1e-3
 DECIMALS = 12
@@ -332,7 +332,7 @@ def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     return fits[kept]
 
 
-SHOWN = 10
+SHOWN = 10  # groups of hypotheses
 UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
@@ -440,7 +440,7 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
     """The references that a diagnosis rests on: single poses and limits, authoritative ones if there are any.
 
-    Extremes over the limits are left out, because they take a search for every hypothesis, and so are references that
+    Extremes over the limits are left out, because they take a search for every hypothesis. So are references that
     contradict each other, which no table could meet.
 
     Parameters

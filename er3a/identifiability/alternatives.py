@@ -28,7 +28,7 @@ from er3a.references.quantities import Quantity, value_at
 from er3a.references.seen import TableEntry
 from er3a.robots.robot import Robot
 
-MAX_TOGETHER = 4
+MAX_TOGETHER = 4  # flips in a combination
 PATTERNS_UP_TO = 6
 MAX_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
@@ -182,8 +182,8 @@ def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
     return join([batch[~rows], own])[order]
 
 
-CHUNK = 1024
-NO_WORSE = 1e-6
+CHUNK = 1024  # combinations that are tried at once
+NO_WORSE = 1e-6  # half-widths, by which an alternative may miss more than the table does
 SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of another robot
 MAX_COMPOSED = 2048
 

@@ -91,9 +91,9 @@ def document_of(robot: Robot, entry: Entry) -> str:
     return (source.origin or source.source) if source else f"the table of {robot.name}"
 
 
-POSES = 32
-STEP = 1e-5
-NOTHING = 1e-7
+POSES = 32  # all over the joint range, at which the tool is looked at
+STEP = 1e-5  # of an entry's scale, of central differences
+NOTHING = 1e-7  # of the largest singular value, below which a combination moves no tool
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from er3a.robots.robot import Robot
 
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # in an entry's unit
 OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12

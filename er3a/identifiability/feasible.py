@@ -22,13 +22,13 @@ from er3a.identifiability.requirements import Asked
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-PROFILE = 1.959963984540054
+PROFILE = 1.959963984540054  # its square is 3.84, the 95 % point of chi squared with one degree of freedom
 MET = 1e-3  # of a half-width
 NEAR = 0.05  # of a half-width, by which an extreme that was followed may be missed once it is sought afresh
 INSIDE = 1.0 - MET / 2
 MIN_M = 1.0
 PASSES, DAMPING = 30, 1e-2
-CHUNK = 96
+CHUNK = 96  # starts that are led on at once
 FOLLOWED = 8  # times that extremes are sought afresh
 
 

@@ -18,7 +18,7 @@ from er3a.references.quantities import Extreme, LimitExcess, Quantity, Speed, va
 from er3a.references.reference import Documents, Reference, quantities_of
 from er3a.robots.robot import Robot
 
-PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)
+PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)  # by which entries are moved to see what reacts
 REACTS = 1e-6  # of the quantity's unit
 REACTS_MM = 1e-4  # of an extreme, which is searched for
 

@@ -30,8 +30,8 @@ Function = Callable[[Reals], Reals]
 """Values (P,) at points (P, d)."""
 STEP = 1e-4
 LONGEST_STEP = 0.5
-SCAN, WATCHED = 384, 48
-CORNERS_UP_TO = 6
+SCAN, WATCHED = 384, 48  # points of a box where an extreme is sought afresh, and where it is followed
+CORNERS_UP_TO = 6  # dimensions of boxes whose corners are looked at, too: 64 at most
 CLIMBS = 6
 PEAK_STEPS = 25
 GAINS_NOTHING = 1e-10

@@ -217,7 +217,7 @@ def made_from_table(robot: Robot, document: str, documents: Documents) -> bool:
 
 
 SAME_MM, SAME_DEG = 1e-6, 1e-7
-SEEN_AT = 12
+SEEN_AT = 12  # joint vectors, at which the tools of tables are compared
 
 
 @dataclass(frozen=True)

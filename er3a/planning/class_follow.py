@@ -237,7 +237,7 @@ def _improved(search: _LawSearch, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
     return law
 
 
-DEGREE = 9
+DEGREE = 9  # of the polynomials, piece by piece
 FIRST_PIECES, MAX_PIECES = 4, 1024  # between two corners of the path or of its law of time
 CLOSE = 1e-10  # rad, m
 SAME_TIME = 1e-9  # share of the duration

@@ -49,8 +49,8 @@ from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
-WIDE_STEP = np.radians(20.0)
-SHORTEST_INTERVAL = 1e-10
+WIDE_STEP = np.radians(20.0)  # of a joint between two grid points: beyond it branches can't be matched without doubt
+SHORTEST_INTERVAL = 1e-10  # share of the duration, below which times are not halved further
 FREE_WRIST = 1e-10  # rad; below it rounding decides joint 4
 FREE_SHOULDER = 1e-10  # m; below it rounding decides joint 1
 STRAIGHT_ELBOW = 1e-3  # rad; the angle of the elbow grows with the root of the distance from the edge of reach
@@ -519,7 +519,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration
-SAME_JOINTS = 1e-6
+SAME_JOINTS = 1e-6  # rad, by which equal joints differ by rounding
 SWITCH_STEP = 1e-4
 EQUAL = 6  # digits of rad to which travel and margin count
 

@@ -19,8 +19,8 @@ from er3a.errors import Er3aError
 from er3a.numerics.arrays import Integers, Reals
 
 Rates = tuple[Reals, Reals, Reals]
-HALVINGS = 60
-SAME_SHARE = 1e-13
+HALVINGS = 60  # more than a time has binary digits
+SAME_SHARE = 1e-13  # of the path, within which a share is that of a break
 BEYOND = 1e-6  # by which times and shares may miss a motion's ends, of the whole
 Ends = tuple[Reals | float, Reals | float]
 

@@ -193,7 +193,7 @@ def arc(
     return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))
 
 
-POWERS = 6
+POWERS = 6  # of a quintic, 0 to 5
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 

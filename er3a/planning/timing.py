@@ -35,7 +35,7 @@ SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full s
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
 MAX_ROUNDS = 30
-STRAIGHT_NODES = 81
+STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 

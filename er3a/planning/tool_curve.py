@@ -28,8 +28,8 @@ from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, evaluated_
 from er3a.planning.profiles import times_at
 from er3a.robots.robot import Robot
 
-DEGREE = 16
-FIRST_PIECES = 32
+DEGREE = 16  # of the polynomials, piece by piece
+FIRST_PIECES = 32  # evenly over the path, before any is halved
 SHORTEST = 1e-6, 1e-9  # share of the duration and of the path, of pieces that miss rates, and that miss angles or reach
 SAME_TIME = 1e-9  # share of the duration
 CLOSE = np.array([1e-9, 1e-8, 1e-7])[:, None]  # rad, rad/s, rad/s^2; relative where a rate is greater than 1

@@ -41,18 +41,18 @@ from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 from er3a.robots.robot import Robot
 
 ROUNDS = 4000
-SHORT_CUTS = 50
+SHORT_CUTS = 50  # random ones that are tried
 LONGEST_MOVE = 1.5  # rad of all joints together, by which a tree grows at a time
 SHORTEST_STEP = 2e-3  # rad of the joint that turns most, by which a move advances beside an obstacle
 MARGINS = (0.008, 0.003, 0.0)  # m beyond the tolerance, tried in this order
 FROM_LIMITS, FROM_ENDS = np.radians(2.0), 0.002  # rad, m of those that slide: drawn joints keep from their limits
 ROUNDINGS = (1.0, 0.5, 0.2, 0.0)  # of half of the shorter side
 NODES = 240
-SHOWN = 101
+SHOWN = 101  # times at which the clearance of a way is returned
 STILL = 1e-9  # rad
 SPARE = 0.25  # of the clearance at the ends, to within which that of the motion is found
 STREAM = 17
-MAX_PAIRS = 4
+MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its rounds
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 

@@ -151,11 +151,11 @@ class CalibrationSet(ByValue, Displayed):
         )
 
 
-GRID_S = 0.02
+GRID_S = 0.02  # s, between offsets tried before the best is refined
 SPAN_S = 0.4  # over which turns are compared
-INLIER = 3.0
-MAX_PAIRS = 2000
-MIN_PAIRS = 10
+INLIER = 3.0  # standard deviations, beyond which a rotation counts as wrong
+MAX_PAIRS = 2000  # of rotations, that are compared at most
+MIN_PAIRS = 10  # of rotations, without which an offset is left open
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,8 +247,8 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
 def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
     """Poses of hand and eye at equal times, spread over rotations.
 
-    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before,
-    from the half of all times at which the arm is slowest, where an error of the offset matters least.
+    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before.
+    Only the half of all times counts at which the arm is slowest: there an error of the offset matters least.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ DEPTH = 2e-4  # m, to within which the smallest clearance is found
 PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
 MIN_DURATION = 0.05  # s
-CHECKS = 41
+CHECKS = 41  # times of a leg at which it is solved and measured first; both are refined from there
 
 
 @dataclass(frozen=True, eq=False)

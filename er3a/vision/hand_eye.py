@@ -177,9 +177,9 @@ def worst_sample(
 ) -> tuple[int, vision_findings.FarFromFit] | None:
     """The sample whose residuals are too large compared with those of all others.
 
-    Each sample's six residuals, with the share that it pulls towards itself taken back, over the others' scatter are
-    distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is not too large,
-    however little the others scatter.
+    The share by which a sample pulls the fit towards itself is taken back from its six residuals. Over the others'
+    scatter these are distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is
+    not too large, however little the others scatter.
 
     Parameters
     ----------
@@ -303,15 +303,15 @@ def _misfit(residual: Reals) -> tuple[float, float, float]:
     return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, 1000 * distance, float(np.degrees(turn))
 
 
-MIN_SAMPLES = 3
+MIN_SAMPLES = 3  # two motions with different axes determine the rotation
 FEW_SAMPLES = 6  # of which none is judged by the others
-EQUAL = 1e-9
-MIN_TURN = np.radians(0.5)
-MIN_SPREAD = np.radians(1.0)
+EQUAL = 1e-9  # m and rad, within which all poses are one: nothing was moved
+MIN_TURN = np.radians(0.5)  # of the hand, without which nothing is determined
+MIN_SPREAD = np.radians(1.0)  # of the rotation axes, without which a shift along them stays open
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
-MAX_FACTS = 10
+MAX_FACTS = 10  # findings that a notebook shows
 
 
 @dataclass(frozen=True, eq=False)

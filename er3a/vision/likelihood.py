@@ -38,8 +38,8 @@ from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_ro
 from er3a.numerics.arrays import Integers, Reals
 from er3a.vision.calibration_set import CalibrationSet, Setup
 
-UNKNOWNS = 12
-CONFIDENCE = 0.95
+UNKNOWNS = 12  # position and rotation of both poses
+CONFIDENCE = 0.95  # of all intervals
 MAX_STEPS = 60
 STEP_ENDS = 1e-11  # m and rad
 ROUNDS = 20

@@ -18,10 +18,10 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.vision.hand_eye import HandEye
 
-DRAWS = 4000
+DRAWS = 4000  # a probability near 0.95 has a standard deviation of 0.0034
 DRAW_SEED = 9283
 ISO_DEVIATIONS = 3.0  # ISO 9283: RP is the mean distance from the mean place plus three standard deviations of it
-TABLE_STEP = 1e-6
+TABLE_STEP = 1e-6  # m or rad, of one-sided differences
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ def seen_pose_error(
     Parameters
     ----------
     T_camera_object : (..., 4, 4), m; camera_covariance : (..., 6, 6) of it by the camera's axes
-    arm : the robot, the joint angles (..., n) at which its tool is on the object, and those (n,) at which a camera on
-        the flange takes the picture (None for a fixed one)
+    arm : the robot, and the joint angles (..., n) at which its tool is on the object; then those (n,) at which a camera
+        on the flange takes the picture, None for a fixed one
 
     Returns
     -------

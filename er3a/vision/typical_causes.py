@@ -54,7 +54,7 @@ STEP_CHANCE = 3e-5  # of sound sets in which a step is found
 MIN_BLOCK = 2  # samples on either side of a step
 MIN_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
-MIN_ZERO = np.radians(0.5)
+MIN_ZERO = np.radians(0.5)  # below which a joint's zero is not named
 
 DistanceError = Literal["board", "focal_length", "principal_point_x", "principal_point_y"]
 

@@ -177,7 +177,7 @@ class TouchContradicts(Finding):
     probability: float
 
 
-MUCH_SCATTER = 3.0
+MUCH_SCATTER = 3.0  # standard deviations: residuals so much larger than stated contradict what is stated
 _GRAVE = (
     *(NoMajority, OtherConvention, UnexplainedResiduals, MovedBetween, NotConverged, JointZero),
     *get_args(WrongDistances),

@@ -106,7 +106,7 @@ class AccelerationExceeded(Finding):
 
 
 AT_REST = 1e-6  # rad
-POINTS = 501
+POINTS = 501  # grid points of a stretch that its timing passes through at most
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,10 +38,10 @@ Kind = Literal["shift", "tilt"]
 
 WIDER = 2.5  # a bend spans the region's half width so many times, if the path is long enough
 STEP = 1e-6  # of the characteristic length, or rad
-BENT_POINTS = 120
-GROWTH = 1.4
-HALVINGS = 12
-MAX_SIDES = 8
+BENT_POINTS = 120  # at which the distance along a bend is looked at
+GROWTH = 1.4  # of a bend's size from try to try, until one clears the region
+HALVINGS = 12  # of the interval between the last size that did not clear it and the first that did
+MAX_SIDES = 8  # combinations of sides that are followed: with each region more they double
 MAX_BEND: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
 SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
@@ -356,7 +356,7 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     return avoidance.Avoidance(joined(parts), crosses_by_joints=True)
 
 
-COARSE = 201
+COARSE = 201  # times at which other branches are looked at before one is followed in full
 
 
 def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
@@ -586,8 +586,8 @@ def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName 
 def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0) -> StrategyResult | None:
     """The usable strategy with the smallest deviation from the path (mm and deg added).
 
-    Among equals: the shortest time beyond the programmed one (in steps of ``SAME_TIME``), then a strategy that keeps
-    its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
+    Among equals the shortest time beyond the programmed one (in steps of ``SAME_TIME``) counts. Then comes a strategy
+    that keeps its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
 
     Parameters
     ----------
