@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal, get_args
@@ -863,14 +863,8 @@ def _corrected(
     if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):
         lower, upper, continuous, combined = robot_b.lower, robot_b.upper, robot_b.continuous, robot_b.combined
     speed = np.where(np.isfinite(robot_b.speed), robot_b.speed, robot_a.speed)
-    text = f"{robot_a.name}, corrected by {robot_b.name}"
-    sources = {group: Source(text, source.grade) for group, source in robot_a.sources.items()}
-    for group, source in robot_b.sources.items():
-        if group in ("limits", "speeds", "base", "flange"):
-            sources[group] = Source(text, source.grade)
-    for group, changed in (("base", base is not robot_a.base), ("flange", flange is not robot_a.flange)):
-        if changed:
-            sources.setdefault(group, Source(text, "inferred"))
+    placed = {"base": base is not robot_a.base, "flange": flange is not robot_a.flange}
+    sources = _sources_of_both(robot_a, robot_b, [group for group, changed in placed.items() if changed])
     return Robot(
         name=robot_a.name,
         title=f"{robot_a.title}, corrected",
@@ -888,6 +882,18 @@ def _corrected(
         sources=sources,
         **columns,
     )
+
+
+def _sources_of_both(robot_a: Robot, robot_b: Robot, changed: Sequence[str]) -> dict[str, Source]:
+    """Sources of A's groups, with the grades of B for what is B's; groups that are ``changed`` are inferred."""
+    text = f"{robot_a.name}, corrected by {robot_b.name}"
+    sources = {group: Source(text, source.grade) for group, source in robot_a.sources.items()}
+    for group, source in robot_b.sources.items():
+        if group in ("limits", "speeds", "base", "flange"):
+            sources[group] = Source(text, source.grade)
+    for group in changed:
+        sources.setdefault(group, Source(text, "inferred"))
+    return sources
 
 
 def _rounded(value: float, angle: bool) -> float:

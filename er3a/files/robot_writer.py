@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -123,16 +123,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
     }
     if np.isfinite(robot.speed).any():
-        keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
-        speeds = [
-            {
-                "joint": k + 1,
-                **({keys[k]: _tidy(value)} if np.isfinite(value) else {}),
-                **_origins(robot, "speeds", k + 1),
-            }
-            for k, value in enumerate(shown(robot, robot.speed))
-        ]
-        content["speeds"] = sourced("speeds") | {"rows": speeds}
+        content["speeds"] = sourced("speeds") | {"rows": _speed_rows(robot)}
     if robot.coupling is not None:
         content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
     if robot.envelopes or robot.hulls or robot.meshes:
@@ -143,11 +134,8 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for group, fields in mass_groups(robot).items():
         content[group] = sourced(group) | fields
-    for key in ("base", "flange", "tool"):
-        T = getattr(robot, key)
-        if not np.array_equal(T, np.eye(4)):
-            placement = {"xyz_mm": map(_tidy, T[:3, 3] * 1000), "rpy_deg": map(_tidy, np.degrees(rpy_of(T)))}
-            content[key] = sourced(key) | {name: list(values) for name, values in placement.items()}
+    for key, placement in _placements(robot):
+        content[key] = sourced(key) | placement
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
         return parse(RobotFile, content, path).with_surfaces(robot.meshes)
 
@@ -161,6 +149,24 @@ def _short(lengths_mm: np.ndarray) -> bool:
 def _shifted(base: np.ndarray) -> bool:
     """Whether a base is where only a calibration puts it, less than 2 mm off."""
     return bool(RESIDUE_MM < np.abs(base[:3, 3]).max() * 1000 < SHORTEST_PLAIN_LENGTH_MM)
+
+
+def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
+    """Base, flange and tool where they are moved, each as position and roll, pitch, yaw."""
+    for key in ("base", "flange", "tool"):
+        T = getattr(robot, key)
+        if not np.array_equal(T, np.eye(4)):
+            xyz, rpy = map(_tidy, T[:3, 3] * 1000), map(_tidy, np.degrees(rpy_of(T)))
+            yield key, {"xyz_mm": list(xyz), "rpy_deg": list(rpy)}
+
+
+def _speed_rows(robot: Robot) -> list[dict]:
+    """A row for each joint, with its speed where one is known."""
+    keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
+    return [
+        {"joint": k + 1, **({keys[k]: _tidy(value)} if np.isfinite(value) else {}), **_origins(robot, "speeds", k + 1)}
+        for k, value in enumerate(shown(robot, robot.speed))
+    ]
 
 
 def _limit_rows(robot: Robot) -> list[dict]:

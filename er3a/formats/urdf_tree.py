@@ -400,16 +400,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     if kind in MOVING and longest < 1e-9:
         raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
     direction = direction / (longest or 1.0)  # so that no square overflows
-    lower, upper, speed = math.nan, math.nan, math.nan
-    if kind in MOVING and limit is not None:
-        lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
-        if kind != "continuous" and math.isnan(lower) != math.isnan(upper):  # the specification's default
-            missing = "lower" if math.isnan(lower) else "upper"
-            notes.append(f"{where} has no {missing} limit: 0 was taken")
-            lower, upper = np.nan_to_num([lower, upper]).tolist()
-        if lower > upper:
-            notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
-            lower, upper = upper, lower
+    lower, upper = _stated_limits(path, where, kind, limit, notes)
     if kind == "continuous":
         kind = "revolute" if -MAX_TURNED <= lower < upper <= MAX_TURNED else kind
         if not (math.isnan(lower) and math.isnan(upper)):
@@ -418,22 +409,47 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     lower, upper = _within_soft_limits(path, element, kind, (lower, upper), notes)
     if kind == "revolute":
         lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
-    if kind in MOVING and limit is not None and (limit.get("velocity") or "inf") != "inf":
-        speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
-        if speed < 0:
-            notes.append(f"{where} has the velocity {speed:g}, which is below 0: its speed counts as unknown")
-            speed = math.nan
-    follows = None
-    if mimic is not None:
-        if not mimic.get("joint"):
-            raise InputError(path, where, "its <mimic> names no joint", "Add joint=... to it")
-        factors = (
-            _numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0))
-        )
-        follows = Mimic(mimic.get("joint", ""), *factors)
+    speed = _stated_speed(path, where, limit if kind in MOVING else None, notes)
+    follows = None if mimic is None else _mimic(path, where, mimic)
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
     placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
     return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes), doubtful)
+
+
+def _stated_limits(
+    path: Path, where: str, kind: str, limit: ElementTree.Element | None, notes: list[str]
+) -> tuple[float, float]:
+    """Limits of a joint that moves, rad or m, in order; NaN where it has none."""
+    if kind not in MOVING or limit is None:
+        return math.nan, math.nan
+    lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
+    if kind != "continuous" and math.isnan(lower) != math.isnan(upper):  # the specification's default
+        missing = "lower" if math.isnan(lower) else "upper"
+        notes.append(f"{where} has no {missing} limit: 0 was taken")
+        lower, upper = np.nan_to_num([lower, upper]).tolist()
+    if lower > upper:
+        notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
+        lower, upper = upper, lower
+    return lower, upper
+
+
+def _stated_speed(path: Path, where: str, limit: ElementTree.Element | None, notes: list[str]) -> float:
+    """Largest speed of a joint, rad/s or m/s; NaN where none is known."""
+    if limit is None or (limit.get("velocity") or "inf") == "inf":
+        return math.nan
+    speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
+    if speed < 0:
+        notes.append(f"{where} has the velocity {speed:g}, which is below 0: its speed counts as unknown")
+        return math.nan
+    return speed
+
+
+def _mimic(path: Path, where: str, mimic: ElementTree.Element) -> Mimic:
+    """Which joint another one follows, and how."""
+    if not mimic.get("joint"):
+        raise InputError(path, where, "its <mimic> names no joint", "Add joint=... to it")
+    factors = (_numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0)))
+    return Mimic(mimic.get("joint", ""), *factors)
 
 
 def _within_soft_limits(

@@ -136,17 +136,8 @@ def check_file(path: Path) -> str:
     """
     if path.is_dir():
         return check_file(path / "config" / "config.yaml")
-    if path.suffix == ".csv" and path.parent.name == "targets":
-        read_targets(path)
-        return _WORDS["targets"]
-    if path.suffix == ".csv" and path.parent.name == "paths":
-        read_path_table(path)
-        return "a path"
-    if path.name == DOCUMENTS:
-        load_documents(path)
-        return "documents of references"
-    if path.suffix == ".csv":
-        return _check_table(path)
+    if path.suffix == ".csv" or path.name == DOCUMENTS:
+        return _check_csv(path)
     if path.suffix.lower() in SUFFIXES and path.suffix != ".csv":
         read_program(path)
         return PROGRAM
@@ -185,6 +176,20 @@ def check_file(path: Path) -> str:
 def _is_outside(folder: Path) -> bool:
     """Whether the working folder does not lie in it: who works below some ``data`` names files from there."""
     return not Path.cwd().is_relative_to(folder)
+
+
+def _check_csv(path: Path) -> str:
+    """What a CSV is, by the folder that it stands in, its name or its columns."""
+    if path.parent.name == "targets":
+        read_targets(path)
+        return _WORDS["targets"]
+    if path.parent.name == "paths":
+        read_path_table(path)
+        return "a path"
+    if path.name == DOCUMENTS:
+        load_documents(path)
+        return "documents of references"
+    return _check_table(path)
 
 
 def _check_table(path: Path) -> str:

@@ -145,20 +145,15 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
     """
     if task.bodies is None:
         return NothingMeasured()
-    ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
-    for name, q in ends:
-        if outside := limits_exceeded(task.robot, q):
-            return EndOutsideLimits(name, outside)
-    clear, pairs = task.bodies.min_distance(np.stack([start, end]))
-    for (name, _), distance, pair in zip(ends, clear, pairs):
-        if distance <= 0:
-            return EndOverlaps(name, PairOverlaps(task.bodies.pairs[pair], -float(distance) * 1000))
-    depth = min(task.tolerance, SPARE * float(clear.min()))
+    clear = _clear_at_ends(task, task.bodies, start, end)
+    if not isinstance(clear, float):
+        return clear
+    depth = min(task.tolerance, SPARE * clear)
     if np.abs(end - start).max() < STILL:
         return _proven(task, np.stack([start, end]), standing(start, 1.0), depth) or NoneFound(0)
     rounds = 0
     for attempt, margin in enumerate(MARGINS):
-        moves = _Moves(task.robot, task.bodies, min(task.tolerance + margin, 0.5 * float(clear.min())))
+        moves = _Moves(task.robot, task.bodies, min(task.tolerance + margin, 0.5 * clear))
         if moves.free(start, end):
             corners: Reals | None = np.stack([start, end])
         else:
@@ -175,6 +170,21 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
             if found := _proven(task, corners, motion, depth):
                 return found
     return NoneFound(rounds)
+
+
+def _clear_at_ends(
+    task: PlanningTask, bodies: Bodies, start: Reals, end: Reals
+) -> float | EndOutsideLimits | EndOverlaps:
+    """The smaller clearance (m) of the two ends (n,); which of them can't be one, and why."""
+    ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
+    for name, q in ends:
+        if outside := limits_exceeded(task.robot, q):
+            return EndOutsideLimits(name, outside)
+    clear, pairs = bodies.min_distance(np.stack([start, end]))
+    for (name, _), distance, pair in zip(ends, clear, pairs):
+        if distance <= 0:
+            return EndOverlaps(name, PairOverlaps(bodies.pairs[pair], -float(distance) * 1000))
+    return float(clear.min())
 
 
 @dataclass(frozen=True, eq=False)

@@ -459,17 +459,8 @@ class Writer(ABC):
 
     def _add(self, instruction: instructions.Instruction | ReadyMotion) -> None:
         match instruction:
-            case ReadyMotion(motion=motion):
-                if motion.acceleration is not None and motion.acceleration.value <= 0:  # not known
-                    instruction = replace(instruction, motion=replace(motion, acceleration=None))
-                self.count["external"] += any(getattr(each, "external", ()) for each in (motion.target, motion.via))
-                if motion.load != self.load:
-                    self.load = motion.load
-                    if isinstance(motion.load, instructions.UnclearLoad):
-                        self.name_tool(f"the load {motion.load.text}")
-                    else:
-                        self.set_load(motion.load)
-                self.motion(instruction)
+            case ReadyMotion():
+                self._add_motion(instruction)
             case instructions.Remark(text=text):
                 self._remark(text)
             case instructions.Disabled(text=text):
@@ -488,6 +479,19 @@ class Writer(ABC):
                     self._foreign(f"{instruction.name} = {instruction.value}", False)
             case instructions.Decision():
                 pass
+
+    def _add_motion(self, ready: ReadyMotion) -> None:
+        motion = ready.motion
+        if motion.acceleration is not None and motion.acceleration.value <= 0:  # not known
+            ready = replace(ready, motion=replace(motion, acceleration=None))
+        self.count["external"] += any(getattr(each, "external", ()) for each in (motion.target, motion.via))
+        if motion.load != self.load:
+            self.load = motion.load
+            if isinstance(motion.load, instructions.UnclearLoad):
+                self.name_tool(f"the load {motion.load.text}")
+            else:
+                self.set_load(motion.load)
+        self.motion(ready)
 
     def _remark(self, text: str) -> None:
         for line in text.splitlines():

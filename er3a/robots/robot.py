@@ -216,6 +216,12 @@ class Robot(ByValue, Displayed):
             self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
         if self.coupling is not None:
             self._keep("coupling", np.array(as_floats(self.coupling, "coupling")), (rows, joints))
+        self._refuse_wrong(rows, joints)
+        object.__setattr__(self, "sources", ReadOnly(self.sources))
+        object.__setattr__(self, "origins", ReadOnly(self.origins))
+
+    def _refuse_wrong(self, rows: int, joints: int) -> None:
+        """Raise :class:`ShapeError` or :class:`RobotError` for values that make no arm."""
         if not (1 <= joints <= MAX_JOINTS and joints <= rows <= MAX_JOINTS):
             raise ShapeError("lower", (joints,), f"(1,) to ({MAX_JOINTS},)")
         if rows != joints and self.coupling is None:
@@ -235,8 +241,6 @@ class Robot(ByValue, Displayed):
         for limit in self.combined:
             if len(limit.factors) != joints:
                 raise ShapeError("combined", (len(limit.factors),), f"({joints},)")
-        object.__setattr__(self, "sources", ReadOnly(self.sources))
-        object.__setattr__(self, "origins", ReadOnly(self.origins))
 
     def __hash__(self) -> int:
         if "hash" not in self.derived:

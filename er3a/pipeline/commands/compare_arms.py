@@ -54,11 +54,7 @@ def compare(
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
-    for option, value in (("--tolerance-mm", tolerance_mm), ("--tolerance-deg", tolerance_deg)):
-        if not 0 < value < MAX_TOLERANCE:
-            raise Er3aError(f"{option} is {value:g}; give a number above 0 and below {MAX_TOLERANCE:g}")
-    if output is not None and output.suffix not in (".yaml", ".yml"):
-        raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
+    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True}
     folder = Path(b)
@@ -104,6 +100,14 @@ def compare(
                 print(f"{written}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _refuse_wrong(tolerances: dict[str, float], output: Path | None) -> None:
+    for option, value in tolerances.items():
+        if not 0 < value < MAX_TOLERANCE:
+            raise Er3aError(f"{option} is {value:g}; give a number above 0 and below {MAX_TOLERANCE:g}")
+    if output is not None and output.suffix not in (".yaml", ".yml"):
+        raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
 
 
 def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
