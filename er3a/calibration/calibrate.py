@@ -87,12 +87,12 @@ from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
 SHOWN_POSES = 3
-CLOSE = 0.9
-MAX_SCATTER = 3.0
+CLOSE = 0.9  # correlation of two estimates that are named together
+MAX_SCATTER = 3.0  # standard deviations, beyond which the model does not fit
 SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
 TOGETHER = 0.5
 """Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
-MAX_OUTLIER_SHARE = 0.1
+MAX_OUTLIER_SHARE = 0.1  # of the measurements, that is set aside at most
 FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 """Times ``WIDEST``: a correction beyond is none of this arm. A joint may lose its zero; a length is wrong by less."""
 ROUGHLY = 10.0
@@ -137,8 +137,18 @@ class Level:
 
 
 def choose_level(robot: Robot, observations: PointObservations) -> Level:
-    """The fullest level that the observations determine as far as positions of these points ever can, with numbers to
-    spare; at each, base and tool are tried with the table first.
+    """The fullest level that the observations determine.
+
+    They have to determine it as far as positions of these points ever can, with numbers to spare. At each level, base
+    and tool are tried with the table first.
+
+    Parameters
+    ----------
+    robot : the table to start from
+
+    Returns
+    -------
+    level : with what more observations would settle
 
     Raises
     ------
@@ -256,17 +266,17 @@ class Estimate:
 
     @property
     def name(self) -> str:
-        """Such as d4."""
+        """Name of the entry, such as ``d4``."""
         return self.parameter.name
 
     @property
     def unit(self) -> Literal["mm", "deg"]:
-        """Of the numbers."""
+        """Unit of the numbers, mm or deg."""
         return "mm" if self.parameter.unit == "mm" else "deg"
 
     @property
     def half_width(self) -> float:
-        """Half-width of the 95 % interval."""
+        """Half-width of the correction's 95 % interval, mm or deg."""
         return self.quantile * self.standard_error
 
 
@@ -416,16 +426,37 @@ class Calibration(ByValue, Displayed):
         return self.beyond or CorrectedModel(self.robot, JointErrors(self.robot, (), np.empty(0)))
 
     def forward(self, q: Reals) -> Reals:
-        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m, by the model; without terms
-        as ``er3a.forward(found.robot, q)``."""
+        """Pose of the tool by the model; without terms as ``er3a.forward(found.robot, q)``.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m, commanded joint values
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         return self.model.forward(q)
 
     def without_terms(self) -> Calibration:
-        """The same with what a robot file holds: the table, and ratios."""
+        """The same calibration with what a robot file holds: the table, and ratios of joints.
+
+        Returns
+        -------
+        calibration : whose :attr:`model` has no terms beyond the table
+        """
         return replace(self, beyond=None)
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """How far the model is from other measurements, (P,): over their measured coordinates.
+        """How far the model is from other measurements, over their measured coordinates.
+
+        Parameters
+        ----------
+        measurements : P of them
+
+        Returns
+        -------
+        distances : (P,), mm
 
         Raises
         ------
@@ -435,7 +466,12 @@ class Calibration(ByValue, Displayed):
         return self.model.distances_mm(measurements)
 
     def sheet(self) -> Sheet:
-        """A row for each estimated entry."""
+        """What the notebook shows: a row for each estimated entry, in mm and deg, with its 95 % interval.
+
+        Returns
+        -------
+        sheet : with the conclusion, and why other entries were held
+        """
         rows = ((each.name, each.nominal, each.correction, each.half_width, each.unit) for each in self.estimates)
         shown, left = first_rows(rows, len(self.estimates))
         rms = f"rms {shortly(self.rms_before_mm)} -> {shortly(self.rms_after_mm)} mm"
@@ -460,8 +496,13 @@ def calibrate(
     Parameters
     ----------
     robot : the table to start from
+    measurements : in mm, and joint values in deg, or mm of joints that slide
     fixed : ``"base"``, ``"tool"``, ``"ratios"``: to be taken from the robot's file; the tool is fixed unless its point
         was measured
+
+    Returns
+    -------
+    calibration : the corrected robot, with intervals in mm and deg
 
     Raises
     ------

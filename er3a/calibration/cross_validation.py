@@ -41,8 +41,8 @@ from er3a.comparison.entries import Entry
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
-PARTS = 10
-SEEDS = 1, 2, 3, 4
+PARTS = 10  # tenths, each left out once
+SEEDS = 1, 2, 3, 4  # of ways of leaving out; an average of several depends less on the draw
 SURE = 1e-5
 """How improbable a term's share has to be if there is only noise; some 80 terms are tried, again with each taken."""
 MIN_GAIN = 0.01
@@ -50,7 +50,7 @@ MIN_GAIN = 0.01
 MIN_POSES = 40
 MIN_SPARE = 3
 """Coordinates for each number of the model with all terms that are tried, for them to be tried."""
-RIDGE = 1e-12
+RIDGE = 1e-12  # of columns of unit length, so that dependent ones can be solved for
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,16 @@ class _Linear:
         self._parts = [[np.flatnonzero(part[pose_of] == k) for k in range(PARTS)] for part in parts]
 
     def errors(self, columns: list[int]) -> list[Reals]:
-        """(n,) for each way of leaving out: what the fits without a coordinate's part leave of it."""
+        """Errors at coordinates whose part was left out of the fit.
+
+        Parameters
+        ----------
+        columns : which numbers are fitted
+
+        Returns
+        -------
+        errors : (n,) for each way of leaving out, in standard deviations of a coordinate
+        """
         J, square = np.ascontiguousarray(self.J[:, columns]), np.ix_(np.array(columns), np.array(columns))
         whole, right = self.whole[0][square] + np.diag(self._prior[columns]), self.whole[1][columns]
         found = []
@@ -120,11 +129,29 @@ class _Linear:
         return found
 
     def squares(self, columns: list[int]) -> Reals:
-        """Mean square for each way of leaving out."""
+        """Mean square of the errors at what was left out.
+
+        Parameters
+        ----------
+        columns : which numbers are fitted
+
+        Returns
+        -------
+        squares : one for each way of leaving out
+        """
         return np.array([errors @ errors / len(errors) for errors in self.errors(columns)])
 
     def fitted(self, columns: list[int]) -> tuple[Reals, float]:
-        """Amounts (c,) from all coordinates, and what they leave, squared."""
+        """The fit to all coordinates, with the priors of terms.
+
+        Parameters
+        ----------
+        columns : c numbers that are fitted
+
+        Returns
+        -------
+        amounts, squares : (c,), and the sum of squares that they leave
+        """
         information = self.whole[0][np.ix_(np.array(columns), np.array(columns))] + np.diag(self._prior[columns])
         amounts = np.linalg.solve(information, self.whole[1][columns])
         rest = self.rest - self.J[:, columns] @ amounts
@@ -132,7 +159,17 @@ class _Linear:
 
 
 def parts_of(observations: PointObservations, seed: int) -> tuple[Integers, Integers]:
-    """Which of ten parts each point (P,) is in, all of one pose in one: at random, and by neighbourhood."""
+    """Which of ten parts each point is in, all of one pose in one.
+
+    Parameters
+    ----------
+    observations : of P points
+    seed : of the random parts and of the neighbourhoods' first centres
+
+    Returns
+    -------
+    random, near : (P,), numbers of parts, drawn at random, and by neighbourhood in joint space (k-means)
+    """
     row_values, pose = observations.row_values, observations.same_pose
     count = len(row_values)
     random = (np.random.default_rng(seed).permutation(count) % PARTS)[pose]
@@ -151,12 +188,32 @@ class ChosenTerms:
 
 
 def can_leave_out(pose_of: Integers, numbers: int) -> bool:
-    """Whether there are poses enough to leave some out; ``pose_of`` (m,) those of independent coordinates."""
+    """Whether there are enough poses to leave some out.
+
+    Parameters
+    ----------
+    pose_of : (m,), the pose of each independent coordinate
+    numbers : how many numbers are estimated
+
+    Returns
+    -------
+    enough : ``MIN_POSES`` poses, and twice as many coordinates as numbers
+    """
     return len(np.unique(pose_of)) >= MIN_POSES and len(pose_of) >= 2 * numbers
 
 
 def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
-    """What the model of a fit errs by at poses left out; other parts than those that terms are chosen by."""
+    """Errors of a fitted model at poses left out, in other parts than those that terms are chosen by.
+
+    Parameters
+    ----------
+    found : the fit to all observations
+    seed : of the parts
+
+    Returns
+    -------
+    errors : mean and largest distance in mm, for poses left out at random, and by neighbourhood
+    """
     parts = parts_of(observations, seed)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
@@ -176,14 +233,20 @@ def choose_terms(
     observations: PointObservations,
     ways: Sequence[Sequence[TermKind]] = FOR_ALL_JOINTS,
 ) -> ChosenTerms:
-    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it; one that
-    stood for others is dropped when these are there.
+    """Terms, one after the other, as long as both errors at poses left out fall and noise can't have done it.
+
+    One that was taken in place of others is dropped when these are there.
 
     Parameters
     ----------
     robot : the table to start from; here : corrected without terms
+    kept : entries that are fitted with the terms
     ways : kinds that are tried, by the first for which there are coordinates enough; none if there is no such, or if
         the table leaves nothing but rounding
+
+    Returns
+    -------
+    chosen : the terms taken, and what was tried
     """
     rows, last = observations.independent(here)
     pose_of, rows = observations.pose_of[last], rows / observations.deviation_mm
@@ -255,7 +318,16 @@ class _Trial:
             self.probability = min(1.0, len(RIPPLES) * self.probability)
 
     def outcome(self, before: Reals) -> TriedTerm:
-        """What leaving out poses says of it; ``before``: their mean squares without it."""
+        """What leaving out poses says of a term.
+
+        Parameters
+        ----------
+        before : mean squares of errors without it, for each way of leaving out
+
+        Returns
+        -------
+        tried : with the share by which it changes them (negative is better), and whether it is taken
+        """
         term = self.term
         change = (self._linear.squares(self._columns) / before - 1).reshape(len(SEEDS), 2).mean(axis=0)
         verdict: TermVerdict = "taken"
@@ -286,7 +358,17 @@ class _RippleSearch:
         self._rows, self._shapes = rows, shapes.reshape(len(rows), -1, len(x))
 
     def best(self, J: Reals, rest: Reals) -> list[JointTerm]:
-        """One for each joint; J (n, k), whose columns they come beside, and what is to be explained, (n,)."""
+        """The ripple of each turning joint that explains most of what is left.
+
+        Parameters
+        ----------
+        J : (n, k), columns that are fitted with it
+        rest : (n,), what is to be explained, in standard deviations
+
+        Returns
+        -------
+        terms : one for each turning joint
+        """
         span = np.linalg.qr(J)[0]
         beside, found = np.column_stack([rest - span @ (span.T @ rest), span]), []
         for row, effect, shapes, own in zip(self._rows, self._effect.T, self._shapes, self._own):

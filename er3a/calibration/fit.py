@@ -42,7 +42,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
-STEP = 1e-5
+STEP = 1e-5  # m or rad, of central differences
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
 STEPS, MAX_STEPS = 30, 100
@@ -61,7 +61,7 @@ FAR = 2.0  # times as near, where base and tool start elsewhere than in the robo
 OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
-MEDIAN_TO_DEVIATION = 1.4826
+MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution: the standard deviation over the median of the size
 LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
@@ -86,8 +86,17 @@ class Subspace:
 def jacobian(
     robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
 ) -> Reals:
-    """Derivative (n, p) of observed values (mm) by parameters (m, rad), where amounts (p,) are added to the robot's, by
-    central differences; exact to about 1e-8."""
+    """Derivatives of observed values by parameters, by central differences; exact to about 1e-8.
+
+    Parameters
+    ----------
+    parameters : p entries of table, base and tool
+    amounts : (p,), m or rad, added to the robot's values, where the derivatives are taken
+
+    Returns
+    -------
+    J : (n, p), mm per m or rad
+    """
     count = len(parameters)
     steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
     values = observations.predict(robot, parameters, steps)
@@ -102,14 +111,20 @@ def subspace(
     left: float | None = None,
     dependent: float = DEPENDENT,
 ) -> Subspace:
-    """The identifiable part of the parameters: columns of the weighted Jacobian are taken in order of preference, and
-    one that lies in the span of those before it (to ``dependent`` of its length) is held. So is one that does no more
-    to points which touch something than to turn or shrink what the table leaves of them: all of these could be brought
-    to one.
+    """The identifiable part of the parameters.
+
+    Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
+    ``dependent`` of its length) is held. So is one that only turns or shrinks what the table leaves of points which
+    touch something: all of these could be brought to one.
 
     Parameters
     ----------
+    parameters : p entries, the preferred ones first
     left : of a point that touches something, in standard deviations; what the table leaves, unless given
+
+    Returns
+    -------
+    subspace : places of the parameters kept, why others are held, and singular values (per mm or mrad)
     """
     rows = observations.independent(robot)[0]
     J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
@@ -134,8 +149,16 @@ def subspace(
 
 
 def left_of_touched(robot: Robot, observations: PointObservations) -> float:
-    """What a table leaves where points touch something, apart from what base and tool can take up: root mean square, in
-    standard deviations; 0 where nothing is touched."""
+    """What a table leaves where points touch something, and base and tool can't take it up.
+
+    Parameters
+    ----------
+    observations : with places or planes that were touched
+
+    Returns
+    -------
+    left : root mean square, in standard deviations; 0 where nothing is touched
+    """
     if not observations.dropped:
         return 0.0
     off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
@@ -147,8 +170,17 @@ def left_of_touched(robot: Robot, observations: PointObservations) -> float:
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
-    """The longest length of the table that moves the points as nothing else does, which is taken as it is; None where
-    coordinates were measured, or joints have slid while a place or plane was touched."""
+    """The longest length of the table that moves the points as nothing else does, which sets the scale.
+
+    Parameters
+    ----------
+    observations : if only places and planes were touched, nothing in them sets the scale
+
+    Returns
+    -------
+    entry : to be taken as it is; None where coordinates were measured, or joints have slid while a place or plane was
+        touched
+    """
     if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
@@ -182,12 +214,30 @@ def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObse
 
 
 def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Entry, ...]:
-    """Those that can be estimated beside a length that sets the scale, if one does."""
+    """Parameters that can still be estimated if a length sets the scale.
+
+    Parameters
+    ----------
+    scale : as of :func:`scale_of`
+
+    Returns
+    -------
+    parameters : all if nothing sets the scale
+    """
     return tuple(each for each in parameters if scale is None or each not in (scale, TURNS_ALL))
 
 
 def held_with(scale: Entry | None) -> tuple[Held, ...]:
-    """Why the others can't."""
+    """Why parameters are held if a length sets the scale.
+
+    Parameters
+    ----------
+    scale : as of :func:`scale_of`
+
+    Returns
+    -------
+    held : empty if nothing sets the scale
+    """
     return (MovesNothing(TURNS_ALL.name), SetsScale(scale.name)) if scale else ()
 
 
@@ -250,12 +300,25 @@ class Fit:
 
 
 def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
-    """Covariance (k + c, k + c) of the estimates from the residuals themselves, pose by pose: right also where what
-    remains is no white noise of one size, but what a model misses at poses that could have been others; and how many
-    degrees of freedom (k + c,) each variance rests on, few where few poses settle a number.
+    """Covariance of the estimates from the residuals themselves, pose by pose.
 
-    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``, so that those which the fit has
-    drawn to itself count in full; degrees of freedom as Satterthwaite's, if noise were white [2]_.
+    It is right also where what remains is no white noise, but what a model misses at poses that could have been
+    others. Degrees of freedom are few where few poses settle a number.
+
+    Parameters
+    ----------
+    found : a fit of k numbers and c coefficients
+    pose_of : (m,), the pose of each independent coordinate
+
+    Returns
+    -------
+    covariance : (k + c, k + c), m and rad
+    freedom : (k + c,), degrees of freedom that each variance rests on, one at least
+
+    Notes
+    -----
+    Residuals of a pose (J_p its rows) count as ``(1 - J_p C J_p^T)^(-1/2) r_p``. So those which the fit
+    has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
     C = found.covariance
     order = np.argsort(pose_of, kind="stable")
@@ -281,9 +344,22 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
 
 
 def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
-    """Place and turn (4, 4) that bring points (P, 3) nearest to measured ones [Kabsch, Acta Cryst. A 32 (1976)]; how
-    many times as far apart the measured ones are (NaN if all are at one place), and the share of their squares that is
-    left beside such a scale."""
+    """Rigid transform that brings points nearest to measured ones, in the least squares (Kabsch).
+
+    Parameters
+    ----------
+    points, measured : (P, 3), m
+
+    Returns
+    -------
+    S : (4, 4), m, places the points at the measured ones
+    scale : how many times as large the measured figure is; NaN if all points of one are at one place
+    share : of the squares, what remains after such a scale, 0 to 1
+
+    References
+    ----------
+    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A 32, 1976.
+    """
     S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
     U, sizes, V = np.linalg.svd((measured - centre).T @ (points - at))
     signs = np.array([1.0, 1.0, np.linalg.det(U @ V)])
@@ -296,16 +372,20 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
 
 
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
-    """Amounts of what is free of base and tool, by the table as it is and points that were measured whole: the
-    tracker's frame may be anywhere, and the tool's place a guess.
+    """Rough places of base and tool, by the table as it is and points that were measured whole.
 
-    With points x and flanges turned by R, as the table has them, a base S and a tool moved by t put the measured ones
-    at ``m = S (x + R t)``. So ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may
-    be any matrix. From the rotation nearest to that, t for a base and the base for a t are found by turns.
+    The tracker's frame may be anywhere, and the tool's place a guess. Let the table put points at x, and turn flanges
+    by R. A base S and a tool moved by t then put the measured points at ``m = S (x + R t)``. So
+    ``inv(S) m - R t = x``: linear in the 12 numbers of inv(S) and in t, if its rotation may be any matrix. From the
+    rotation nearest to that, t for a base and the base for a t are found by turns.
+
+    Parameters
+    ----------
+    observations : of P points
 
     Returns
     -------
-    amounts : as of :func:`placements_of`, 0 where too few points say something
+    amounts : as of :func:`placements_of`, m and rad, 0 where too few points say something
     used : (P,), points without those that are far out, by the median of all
     """
     whole = np.flatnonzero(observations.seen.all(axis=1) & (observations.touched < 0))
@@ -355,8 +435,16 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
 
 
 def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservations) -> Reals:
-    """Amounts (k,) to start from: 0, unless other places of base and tool bring the table's points much nearer to the
-    measured ones."""
+    """Amounts to start a fit from.
+
+    Parameters
+    ----------
+    kept : k entries that are fitted, with those of base and tool
+
+    Returns
+    -------
+    amounts : (k,), m or rad; 0, unless other places of base and tool bring the points much nearer to the measured ones
+    """
     amounts, none = np.zeros(len(kept)), np.zeros(len(kept))
     rough, used = rough_places(robot, observations)
     by_name = dict(zip(placements_of(observations.free), rough.tolist()))
@@ -374,11 +462,20 @@ def fit(
     terms: Sequence[JointTerm] = (),
     most_steps: int = MAX_STEPS,
 ) -> Fit:
-    """Corrections, and coefficients of terms (of measured points only), that meet the observations best.
+    """Corrections, and coefficients of terms, that meet the observations best, by weighted least squares [1]_.
 
     Points that touch something may be met best by quite another arm, if they settle little or some are outliers. If the
     steps don't end, or end there, corrections are taken to be small (``PLAUSIBLE``), and none of them is settled.
-    ``most_steps``: where only small corrections are of interest, a few are enough.
+
+    Parameters
+    ----------
+    kept : k entries to correct
+    terms : of measured points only
+    most_steps : where only small corrections are of interest, a few are enough
+
+    Returns
+    -------
+    fit : amounts in m and rad
 
     Raises
     ------

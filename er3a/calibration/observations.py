@@ -26,7 +26,7 @@ from er3a.robots.robot import Robot
 LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
-RICH_POSES = 64
+RICH_POSES = 64  # joint vectors all over the range
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
@@ -120,7 +120,12 @@ class PointObservations:
         return len(self.values_mm)
 
     def groups(self) -> list[tuple[TouchKind, Integers]]:
-        """Of each place and plane its kind and points."""
+        """Places and planes that are touched.
+
+        Returns
+        -------
+        groups : of each its kind, and its points (k,), numbers from 0 to P - 1
+        """
         numbers = np.unique(self.touched[self.touched >= 0])
         return [(self.kinds[number], np.flatnonzero(self.touched == number)) for number in numbers]
 
@@ -135,7 +140,12 @@ class PointObservations:
         return sum(each.coordinates * min(each.poses, each.unknown) for each in self.things())
 
     def things(self) -> list[Touched]:
-        """What is touched, and how often."""
+        """What is touched, and how often.
+
+        Returns
+        -------
+        things : places and planes, in the order of :meth:`groups`
+        """
         return [
             Touched(
                 kind,
@@ -148,7 +158,16 @@ class PointObservations:
         ]
 
     def relative(self, xyz: Reals) -> Reals:
-        """What is observed of points (P, 3), m: see ``touched``."""
+        """What is observed of points: coordinates, offsets from a place's mean, distances from a plane.
+
+        Parameters
+        ----------
+        xyz : (P, 3), m, base frame
+
+        Returns
+        -------
+        observed : (P, 3), m; of a plane only the first column counts
+        """
         found = xyz.copy() if self.kinds else xyz
         for kind, rows in self.groups():
             own = xyz[rows]
@@ -159,7 +178,17 @@ class PointObservations:
         return found
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
-        """By how much small shifts (P, 3) of points ``around`` change what is observed, m."""
+        """By how much small shifts of points change what is observed, to first order.
+
+        Parameters
+        ----------
+        shift : (P, 3), m, base frame
+        around : (P, 3), m, where the points are
+
+        Returns
+        -------
+        change : (P, 3), m, columns as of :meth:`relative`
+        """
         found = shift.copy()
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
@@ -178,6 +207,10 @@ class PointObservations:
 
     def independent(self, robot: Robot) -> tuple[scipy.sparse.csr_array, Integers]:
         """What is observed without what drops out, in standard deviations, near to a robot's table.
+
+        Parameters
+        ----------
+        robot : whose table says where the points are
 
         Returns
         -------
@@ -214,8 +247,17 @@ class PointObservations:
         return np.nonzero(self.seen)[0]
 
     def predict(self, robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Reals:
-        """Values (H, n), mm, by the robot with each row of amounts (H, p), in m and rad, added to its table, base and
-        tool."""
+        """Observed values by a table with corrections.
+
+        Parameters
+        ----------
+        parameters : p entries of table, base and tool
+        amounts : (H, p), m or rad, added to the robot's values
+
+        Returns
+        -------
+        values : (H, n), mm
+        """
         own, base_inverse, points = tables_of(robot), np.linalg.inv(robot.base), self.points(robot)
         placing = np.array([not parameter.joint for parameter in parameters], dtype=bool)
         step = max(1, AT_ONCE // max(len(self.row_values), 1))
@@ -236,23 +278,58 @@ class PointObservations:
         return values
 
     def positions(self, robot: Robot) -> Reals:
-        """Measured points (P, 3), m, by a robot's table, in its base frame."""
+        """Measured points by a robot's table.
+
+        Parameters
+        ----------
+        robot : with any base and tool
+
+        Returns
+        -------
+        xyz : (P, 3), m, base frame
+        """
         T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
         found: Reals = np.einsum("pij,pj->pi", T[:, :3, :3], self.points(robot)) + T[:, :3, 3]
         return found
 
     def turns(self, robot: Robot) -> Reals:
-        """How a robot's table turns the tool, (P, 3, 3); 0 where the flange's point was measured."""
+        """How a robot's table turns the tool.
+
+        Parameters
+        ----------
+        robot : with any base and tool
+
+        Returns
+        -------
+        R : (P, 3, 3); 0 where the flange's point was measured, since no tool moves it
+        """
         T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
         return np.where(self.on_tool[:, None, None], T[:, :3, :3], 0.0)
 
     def points(self, robot: Robot) -> Reals:
-        """Where the measured points are in the flange's frame (P, 3), m."""
+        """Where the measured points are in the flange's frame.
+
+        Parameters
+        ----------
+        robot : whose tool places the tool's point
+
+        Returns
+        -------
+        xyz : (P, 3), m; 0 for the flange's own point
+        """
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)
 
     def slid(self, robot: Robot) -> Reals:
-        """By how much joints that slide have changed what is observed (n,), mm; what drops out with a place doesn't
-        count."""
+        """By how much joints that slide have changed what is observed; what drops out with a place doesn't count.
+
+        Parameters
+        ----------
+        robot : whose axes the joints slide along
+
+        Returns
+        -------
+        change : (n,), mm
+        """
         T = frames_of(tables_of(robot), robot, self.row_values)[0]
         ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
         shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
@@ -260,7 +337,16 @@ class PointObservations:
         return found
 
     def take(self, used: Flags) -> PointObservations:
-        """Those of some points (P,)."""
+        """Observations of some points.
+
+        Parameters
+        ----------
+        used : (P,) bool
+
+        Returns
+        -------
+        observations : in the same order
+        """
         own = used[self.pose_of]
         return replace(
             self,
@@ -286,8 +372,15 @@ class PointObservations:
         return first
 
     def merged(self) -> PointObservations:
-        """Readings of one point, or of one place or plane, at one pose as one, their mean: what a model
-        misses there is the same each time, so that repeated readings don't tell it from what it has to find."""
+        """Readings of one point, place or plane at one pose as one, their mean.
+
+        What a model misses there is the same each time, so repeated readings don't distinguish it from what it has to
+        find.
+
+        Returns
+        -------
+        observations : with the root mean square of the readings' standard deviations, not divided by their number
+        """
         keys = np.column_stack([self.same_pose, self.touched, self.on_tool])
         first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)[1:]
         order = np.argsort(first)
@@ -312,26 +405,67 @@ class PointObservations:
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:
-        """With amounts (P, m), rad or m, added to what the rows move by."""
+        """Observations with other moves of the rows.
+
+        Parameters
+        ----------
+        amounts : (P, m), rad or m, added to what the rows move by
+
+        Returns
+        -------
+        observations : with the same values
+        """
         return replace(self, row_values=self.row_values + amounts)
 
     def with_deviation(self, deviation_mm: float) -> PointObservations:
-        """With one standard deviation, estimated from what a fit leaves."""
+        """Observations with one standard deviation for all, estimated from what a fit leaves.
+
+        Parameters
+        ----------
+        deviation_mm : of each coordinate, mm
+
+        Returns
+        -------
+        observations : with the same values
+        """
         return replace(self, deviation_mm=np.full(len(self), deviation_mm))
 
     def rich(self, robot: Robot) -> PointObservations:
-        """The same points, with the coordinates that were measured of any, at poses all over the joint range."""
+        """The same points at poses all over the joint range, to see what could be determined.
+
+        Parameters
+        ----------
+        robot : whose limits the poses keep
+
+        Returns
+        -------
+        observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any; values are 0
+        """
         points = np.unique(self.on_tool)
         every = self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
         seen = np.broadcast_to(self.seen[self.touched < 0].any(axis=0), every.seen.shape)
         return replace(every, seen=seen, values_mm=np.zeros(seen.sum()), deviation_mm=every.deviation_mm[: seen.sum()])
 
     def flange_at(self, robot: Robot, poses: Sequence[Pose]) -> PointObservations:
-        """The flange at poses."""
+        """The flange's point at poses, all coordinates observed.
+
+        Parameters
+        ----------
+        poses : joint values, deg, or mm of those that slide
+
+        Returns
+        -------
+        observations : one point for each pose
+        """
         return self._at(robot, np.array(poses), np.zeros(len(poses), dtype=bool))
 
     def as_coordinates(self) -> PointObservations:
-        """The same points as if their coordinates were measured."""
+        """The same points as if their coordinates were measured.
+
+        Returns
+        -------
+        observations : P points, nothing touched
+        """
         return self._coordinates(self.row_values, self.on_tool)
 
     def _at(self, robot: Robot, poses: Reals, on_tool: Flags) -> PointObservations:
@@ -360,7 +494,16 @@ def _innovations(basis: Reals) -> Reals:
 
 
 def plane(xyz: Reals) -> tuple[Reals, Reals]:
-    """Normal (3,) of the plane that fits points (P, 3) best, and where they are in it, (P, 2)."""
+    """The plane that fits points best, by singular values.
+
+    Parameters
+    ----------
+    xyz : (P, 3), m
+
+    Returns
+    -------
+    normal, within : (3,), unit vector whose largest component is positive, and (P, 2), m, where the points are in it
+    """
     here = xyz - xyz.mean(axis=0)
     axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
     return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
@@ -371,7 +514,12 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
 
     Parameters
     ----------
+    measurements : in mm, and joint values in deg, or mm of joints that slide
     fixed : what of base and tool is where the robot's file has it; the tool is free only if its point was measured
+
+    Returns
+    -------
+    observations : one point for each measurement
 
     Raises
     ------
@@ -424,7 +572,18 @@ def _is_flat(robot: Robot, points: PointObservations) -> bool:
 
 
 def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | Path | None = None) -> None:
-    """Refuse poses of another arm, or outside the joint limits: :class:`InputError` naming row and joint."""
+    """Refuse poses of another arm, or outside the joint limits.
+
+    Parameters
+    ----------
+    measurements : poses in deg, or mm of joints that slide
+    path : file that they were read from, for the message
+
+    Raises
+    ------
+    InputError
+        naming row and joint of the first such pose
+    """
     lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
     units = ["mm" if slides else "deg" for slides in robot.slides]
     for measurement in measurements:
@@ -444,7 +603,16 @@ def check_poses(measurements: Sequence[Measurement], robot: Robot, path: str | P
 
 
 def spread(robot: Robot) -> list[Pose]:
-    """Poses all over the joint range, in whole multiples of 5 deg or mm, or at a limit."""
+    """Poses all over the joint range, from a quasi-random sequence.
+
+    Parameters
+    ----------
+    robot : whose limits they keep
+
+    Returns
+    -------
+    poses : ``RICH_POSES`` of them, deg, or mm of joints that slide, in whole multiples of 5, or at a limit
+    """
     low, high = shown(robot, robot.lower), shown(robot, robot.upper)
     rows = np.clip(np.round(quasi_random_points(low, high, RICH_POSES) / 5) * 5, low, high) + 0.0
     return [tuple(row) for row in rows.tolist()]

@@ -19,16 +19,24 @@ from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
-PARALLEL_RAD = np.radians(1.0)
+PARALLEL_RAD = np.radians(1.0)  # within which two axes count as parallel
 DEPENDENT = 1e-3
 """Share of a direction's length that has to lie outside the span of others to count as one more: 0.1 mm of 100 mm."""
 
 
 def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
-    """The entries of a level, in the order in which they are preferred where some can't be told apart.
+    """The entries of a level, in the order in which they are preferred where some have the same effect.
 
-    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta beside alpha wherever neighbouring axes are
+    ``lengths`` are those that are not 0. ``all_entries`` has Hayati's beta with alpha wherever neighbouring axes are
     parallel: their common normal, on which the other four entries rest, is undefined there.
+
+    Parameters
+    ----------
+    level : one of ``LEVELS``
+
+    Returns
+    -------
+    entries : of the table; base and tool are not among them
     """
     joints = range(1, robot.rows + 1)
     lengths = [Entry(column, j) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]
@@ -44,20 +52,47 @@ def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
 
 
 def placements_of(names: Sequence[PlacementName]) -> tuple[Entry, ...]:
-    """The parameters of base and tool; they are preferred to table entries with the same effect."""
+    """The parameters of base and tool; they are preferred to table entries with the same effect.
+
+    Parameters
+    ----------
+    names : ``base``, ``tool``, both or none
+
+    Returns
+    -------
+    entries : six of the base, three of the tool
+    """
     columns = (BASE_COLUMNS if "base" in names else ()) + (TOOL_COLUMNS if "tool" in names else ())
     return tuple(Entry(column) for column in columns)
 
 
 def all_parameters(robot: Robot) -> tuple[Entry, ...]:
-    """Every parameter of the robot that a calibration can correct."""
+    """Every parameter of the robot that a calibration can correct.
+
+    Parameters
+    ----------
+    robot : with m rows
+
+    Returns
+    -------
+    entries : a, alpha, beta, d and offset of each row, then those of base and tool
+    """
     joints = range(1, robot.rows + 1)
     table = (Entry(column, j) for column in ("a", "alpha", "beta", "d", "offset") for j in joints)
     return (*table, *placements_of(("base", "tool")))
 
 
 def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
-    """Rows whose alpha stands between two parallel joint axes (within 1 deg), each with the two joints."""
+    """Rows whose alpha is between two parallel joint axes, to within ``PARALLEL_RAD``.
+
+    Parameters
+    ----------
+    robot : in standard or modified (Craig) rows
+
+    Returns
+    -------
+    pairs : the row of alpha, and the two joints, all from 1
+    """
     shift = 1 if robot.convention == "modified" else 0
     pairs = []
     for joint in range(1, robot.rows):
@@ -68,7 +103,17 @@ def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
 
 
 def placed(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
-    """What amounts (p,) say of base and tool: S (4, 4), behind the base, and the tool's shift (3,), m."""
+    """What amounts say of base and tool.
+
+    Parameters
+    ----------
+    parameters : p entries, of which those of base and tool count
+    amounts : (p,), m or rad
+
+    Returns
+    -------
+    S, shift : (4, 4), m, behind the robot's base, and (3,), m, of the tool's point in the flange's frame
+    """
     by_column = {parameter.column: amount for parameter, amount in zip(parameters, amounts) if not parameter.joint}
     x, y, z, rx, ry, rz = (by_column.get(column, 0.0) for column in BASE_COLUMNS)
     S = translation(x, y, z) @ rot_z(rz) @ rot_y(ry) @ rot_x(rx)
@@ -80,19 +125,46 @@ WIDEST = 0.05
 
 
 def settles(robot: Robot, unit: EntryUnit, half_width: float) -> bool:
-    """Whether the half-width of a 95 % interval, mm or deg, is less than the largest plausible error of a table."""
+    """Whether an estimate is sure enough to say something about a table.
+
+    Parameters
+    ----------
+    unit : of the entry, mm or deg
+    half_width : of its 95 % interval, in that unit
+
+    Returns
+    -------
+    settles : whether that is less than the largest plausible error of a table
+    """
     return half_width <= WIDEST * (whole_length_mm(robot) if unit == "mm" else float(np.degrees(1)))
 
 
 def whole_length_mm(robot: Robot) -> float:
-    """Of all lengths and strokes."""
+    """Sum of all lengths a and d, and of the strokes of joints that slide.
+
+    Parameters
+    ----------
+    robot : any arm
+
+    Returns
+    -------
+    length : mm
+    """
     strokes = (robot.upper - robot.lower)[robot.slides]
     return MM * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
 
 
 def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:
-    """The robot whose rows (from 1) move, for each (row, other), by ``error`` times what the other is meant to move by
-    more than they are meant to, by its coupling."""
+    """The robot with errors of ratios and couplings in its coupling.
+
+    Parameters
+    ----------
+    errors : by (row, other), both from 1: ``row`` moves too far by this share of what ``other`` is meant to move by
+
+    Returns
+    -------
+    robot : itself if there are no errors
+    """
     factors = np.eye(robot.rows)
     for (row, other), error in errors.items():
         factors[row - 1, other - 1] += error
@@ -100,7 +172,17 @@ def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:
 
 
 def corrected(robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Robot:
-    """The robot with amounts (p,), in m and rad, added to its table, base and tool."""
+    """The robot with amounts added to its table, base and tool.
+
+    Parameters
+    ----------
+    parameters : p entries
+    amounts : (p,), m or rad
+
+    Returns
+    -------
+    robot : its base is ``base S``, its tool's point is shifted in the flange's frame
+    """
     found = robot_of(shifted(tables_of(robot), parameters, amounts[None]), 0, robot)
     S, shift = placed(parameters, amounts)
     if any(parameter.column in BASE_COLUMNS for parameter in parameters):

@@ -29,12 +29,22 @@ FEW = 6
 RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
 NEWTON_STEPS = 40
 LONGEST_STEP = 0.2  # rad, m
-TOUCHES_M = 1e-6
+TOUCHES_M = 1e-6  # m, within which a planned pose touches
 
 
 def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[int]:
-    """Places of the blocks of rows (k, p) that add most to ln det of an information matrix (p, p), one after the
-    other."""
+    """Greedy choice of the measurements that add most to ln det of the information matrix [1]_.
+
+    Parameters
+    ----------
+    information : (p, p), of what was measured
+    blocks : rows (k, p) of the scaled Jacobian, of each candidate
+    count : how many to choose at most
+
+    Returns
+    -------
+    places : of the chosen candidates, the best first
+    """
     information = information + max(RIDGE, RELATIVE_RIDGE * np.trace(information)) * np.eye(len(information))
     chosen: list[int] = []
     for _ in range(min(count, len(blocks))):
@@ -51,7 +61,16 @@ def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[i
 
 
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:
-    """Touches all over the joint range of the first few things that are touched, as they would be by the table."""
+    """Touches all over the joint range, as they would be by the table.
+
+    Parameters
+    ----------
+    seen : observations of places and planes that were touched, of which the first few count
+
+    Returns
+    -------
+    observations : with the median of the standard deviations in ``seen``, mm
+    """
     point: Literal["flange", "tool"] = "tool" if seen.on_tool.any() else "flange"
     x, q, new = seen.positions(robot), meant(robot, np.array(spread(robot))), list[Measurement]()
     for thing, (_, rows) in list(zip(seen.things(), seen.groups()))[:FEW]:

@@ -61,12 +61,16 @@ class JointTerm:
         return 2 if self.kind in ("once", "twice", "ripple") else 1
 
     def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
-        """(P, count), what the coefficients are multiplied by.
+        """What the coefficients are multiplied by.
 
         Parameters
         ----------
-        x : (P, m), what the rows are meant to move by
+        x : (P, m), rad or m, what the rows are meant to move by
         climb, own_climb : (P, m), derivative of the measured point's height by it, and of the centre of mass's
+
+        Returns
+        -------
+        shapes : (P, count)
         """
         own = x[:, (self.by or self.joint) - 1]
         if self.kind in IN_ROBOT_FILE:
@@ -80,7 +84,16 @@ class JointTerm:
 
 
 def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTerm, ...]:
-    """The terms that are tried besides ripples; prismatic joints have no harmonics."""
+    """The terms that are tried besides ripples; prismatic joints have no harmonics.
+
+    Parameters
+    ----------
+    kinds : of terms; ripples among them are left out
+
+    Returns
+    -------
+    terms : kind by kind, rows from 1; weights only for rows that carry a link with known mass
+    """
     joints = range(1, robot.rows + 1)
     return tuple(
         JointTerm(kind, row, by=by)
@@ -95,14 +108,31 @@ def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTe
 
 
 def terms_of(robot: Robot) -> tuple[JointTerm, ...]:
-    """All terms that apply to the robot's joints."""
+    """All terms that apply to the robot's joints.
+
+    Parameters
+    ----------
+    robot : with m rows
+
+    Returns
+    -------
+    terms : candidates of all kinds, then ripples of joints that turn
+    """
     turning = np.flatnonzero(~robot.sliding) + 1
     return (*candidates(robot), *(JointTerm("ripple", int(row), turns) for row in turning for turns in RIPPLES))
 
 
 def starting_table(robot: Robot) -> dict[str, Any]:
-    """All that a model takes of the robot that it started from, as plain numbers: m, rad; of each body its link, mass
-    (kg) and centre (m)."""
+    """All that a model takes of the robot that it started from, as plain numbers for a file.
+
+    Parameters
+    ----------
+    robot : uncorrected
+
+    Returns
+    -------
+    table : columns in m and rad, transforms as lists, and of each body its link, mass (kg) and centre (m)
+    """
     names = ("a", "alpha", "beta", "d", "direction", "offset", "sliding", "base", "flange", "tool")
     return {
         "convention": robot.convention,
@@ -113,7 +143,17 @@ def starting_table(robot: Robot) -> dict[str, Any]:
 
 
 def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
-    """How points (P, 3), m, in the flange's frame move with what the rows move by: (P, m, 3), m per rad or m."""
+    """How points move with what the rows move by.
+
+    Parameters
+    ----------
+    row_values : (P, m), rad or m
+    points : (P, 3), m, in the flange's frame
+
+    Returns
+    -------
+    effects : (P, m, 3), m per rad or m, in the base frame
+    """
     T = frames_of(tables_of(robot), robot, row_values)[0]
     return _moving(robot, T, np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3])
 
@@ -127,8 +167,16 @@ def _moving(robot: Robot, T: Reals, p: Reals) -> Reals:
 
 
 def centre_climb(robot: Robot, row_values: Reals) -> Reals:
-    """How the centre of mass of all known links rises with what the rows move by, (P, m), m per rad or m; 0 without
-    known masses."""
+    """How the centre of mass of all known links rises with what the rows move by.
+
+    Parameters
+    ----------
+    row_values : (P, m), rad or m
+
+    Returns
+    -------
+    climb : (P, m), m per rad or m; 0 without known masses
+    """
     T = frames_of(tables_of(robot), robot, row_values)[0]
     found, whole = np.zeros_like(row_values), sum(each.body.mass for each in robot.masses.links)
     for each in robot.masses.links:
@@ -154,13 +202,33 @@ class JointErrors(ByValue):
     coefficients: Reals
 
     def columns(self, x: Reals, points: Reals) -> list[tuple[int, Reals]]:
-        """For each coefficient the row (from 0) and what it is multiplied by (P,)."""
+        """What each coefficient is multiplied by.
+
+        Parameters
+        ----------
+        x : (P, m), rad or m, what rows are commanded to move by
+        points : (P, 3), m, in the flange's frame
+
+        Returns
+        -------
+        columns : for each coefficient the row (from 0) that it acts on, and its factors (P,)
+        """
         climb, own = effects(self.robot, x, points)[:, :, 2], centre_climb(self.robot, x)
         shapes = [(term, term.shapes(x, climb, own)) for term in self.terms]
         return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
 
     def amounts(self, x: Reals, points: Reals) -> Reals:
-        """Errors (P, m), rad or m, of rows commanded to move by x (P, m)."""
+        """Errors of rows, by all terms.
+
+        Parameters
+        ----------
+        x : (P, m), rad or m, what rows are commanded to move by
+        points : (P, 3), m, in the flange's frame, where a load is
+
+        Returns
+        -------
+        amounts : (P, m), rad or m, to be added to x
+        """
         found = np.zeros_like(x)
         for coefficient, (row, values) in zip(self.coefficients, self.columns(x, points)):
             found[:, row] += coefficient * values
@@ -181,7 +249,16 @@ class CorrectedModel(ByValue):
     errors: JointErrors
 
     def forward(self, q: Reals) -> Reals:
-        """Pose of the tool (..., 4, 4), m, for commanded joint values (..., n), rad or m."""
+        """Pose of the tool by the corrected model.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m, commanded joint values
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         if not self.errors.terms:
             return forward(self.robot, q)
         q = np.asarray(q, float)
@@ -192,19 +269,45 @@ class CorrectedModel(ByValue):
         return T
 
     def positions_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """Where the measured points are by the model, (P, 3)."""
+        """Where the measured points are by the model.
+
+        Parameters
+        ----------
+        measurements : P of them
+
+        Returns
+        -------
+        xyz : (P, 3), mm, base frame
+        """
         return 1000 * self._seen(measurements).positions(self.robot)
 
     def differences_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """Of each measurement what the model says minus what was observed, (P, 3); NaN where nothing was. Of a touched
-        place or plane, and of distances, see :class:`PointObservations`."""
+        """What the model says minus what was observed.
+
+        Parameters
+        ----------
+        measurements : P of them
+
+        Returns
+        -------
+        differences : (P, 3), mm; NaN where nothing was observed. For places and planes see :class:`PointObservations`
+        """
         seen = self._seen(measurements)
         found = np.full(seen.seen.shape, np.nan)
         found[seen.seen] = seen.predict(self.robot, (), np.zeros((1, 0)))[0] - seen.values_mm
         return found
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
-        """How far the model is from measurements, (P,): over what was observed."""
+        """How far the model is from measurements, over what was observed of each.
+
+        Parameters
+        ----------
+        measurements : P of them
+
+        Returns
+        -------
+        distances : (P,), mm
+        """
         found: Reals = np.sqrt(np.nansum(self.differences_mm(measurements) ** 2, axis=1))
         return found
 
@@ -222,8 +325,19 @@ def term_jacobian(
     observations: PointObservations,
     shifted: PointObservations | None = None,
 ) -> Reals:
-    """Derivative (n, c) of measured coordinates (mm) by the coefficients of terms, at a corrected robot ``here``;
-    ``robot`` as of :class:`JointErrors`, ``shifted`` the observations by these."""
+    """Derivatives of observed values by the coefficients of terms.
+
+    Parameters
+    ----------
+    here : the corrected robot at which they are taken
+    robot : uncorrected, which heights are computed by, as of :class:`JointErrors`
+    terms : with c coefficients in all
+    shifted : the observations with the errors of joints; None for none
+
+    Returns
+    -------
+    J : (n, c), mm per unit of each coefficient
+    """
     x, shifted = observations.row_values, shifted or observations
     by_row = effects(here, shifted.row_values, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
@@ -234,11 +348,30 @@ def term_jacobian(
 
 
 def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
-    """Places of each term's coefficients among those of all, counted from ``first``."""
+    """Places of each term's coefficients among those of all.
+
+    Parameters
+    ----------
+    first : place of the first coefficient
+
+    Returns
+    -------
+    places : one list for each term
+    """
     ends = first + np.cumsum([0, *(term.count for term in terms)])
     return [list(range(start, end)) for start, end in pairwise(ends)]
 
 
 def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
-    """Whether the estimated sag has the wrong sign: a load would lift the arm."""
+    """Whether an estimated sag has the wrong sign: a load would lift the arm.
+
+    Parameters
+    ----------
+    term : of any kind
+    coefficients : its own; of sag the compliance, rad per m of lever, or m for a row that slides
+
+    Returns
+    -------
+    wrong : False for terms other than sag and weight
+    """
     return term.kind in ("sag", "weight") and float(coefficients[0]) < 0

@@ -127,7 +127,7 @@ class _Motion:
 
     @cached_property
     def lever(self) -> float:
-        """No point of a body is farther from a joint's axis that moves it, m, within the limits of rows that slide."""
+        """How far a point of a body can be from the axis of a joint that moves it, m, sliding rows at their limits."""
         robot = self.bodies.robot
         T = link_frames(robot, np.zeros(robot.joints))
         links = np.linalg.norm(np.diff(T[:, :3, 3], axis=0), axis=1).sum()
@@ -137,12 +137,30 @@ class _Motion:
         return float(links + slides + own)
 
     def of_rows(self, sizes: Reals) -> Reals:
-        """What rows (..., m) move by at most where joints move by up to ``sizes`` (..., n)."""
+        """What rows of the table move by at most, by the coupling of the joints.
+
+        Parameters
+        ----------
+        sizes : (..., n), rad or m, sizes of the joints' moves
+
+        Returns
+        -------
+        sizes : (..., m), of the rows
+        """
         coupling = self.bodies.robot.coupling
         return sizes if coupling is None else np.asarray(sizes @ np.abs(coupling).T)
 
     def acceleration(self, start: Reals, end: Reals) -> Reals:
-        """Bounds (k,) of the ends' accelerations between times (k,) and (k,), m/s^2; infinite where there are none."""
+        """Bounds of the accelerations of the capsules' ends between times.
+
+        Parameters
+        ----------
+        start, end : (k,), s
+
+        Returns
+        -------
+        bounds : (k,), m/s^2; infinite where the joints' rates are unknown
+        """
         sliding = self.bodies.robot.sliding
         speed, acceleration = self.rates(start, end)
         known = np.asarray(np.isfinite(speed + acceleration).all(axis=1, keepdims=True))
@@ -153,7 +171,16 @@ class _Motion:
         return np.where(known[:, 0], found, np.inf)
 
     def tracked(self, q: Reals) -> Reals:
-        """End points (..., tracks, 2, 3): of links in other links' frames, then of capsules in space."""
+        """End points whose paths count: of links in other links' frames, then of capsules in space.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m
+
+        Returns
+        -------
+        points : (..., tracks, k, 3), m; k is the largest number of points of a body
+        """
         bodies, ends = self.bodies, self.bodies.ends(q)
         links = [bodies.capsules[i].link for i in bodies.first[self._own]]
         T = link_frames(bodies.robot, q)[..., links, :, :]
@@ -161,7 +188,18 @@ class _Motion:
         return np.concatenate([from_link @ T[..., :3, :3], ends[..., self._moving, :, :]], axis=-3)
 
     def measure(self, t: float, q: Reals, pairs: Integers) -> Reals:
-        """Distances (P,) at a time, those of ``pairs`` known, the others perhaps NaN."""
+        """Distances at a time, measured where they are not known yet.
+
+        Parameters
+        ----------
+        t : s, by which they are remembered
+        q : (n,), rad or m, the arm at that time
+        pairs : (k,), numbers of pairs that are needed
+
+        Returns
+        -------
+        distances : (P,), m, negative by the depth; NaN for pairs that were never asked for at that time
+        """
         found = self.known.setdefault(t, np.full(len(self.bodies.pairs), np.nan))
         missing = pairs[np.isnan(found[pairs])]
         if missing.size:
@@ -172,7 +210,7 @@ class _Motion:
 def clearance_along(
     bodies: Bodies, joints: Joints, rates: RateBounds, t: Reals, shown: Reals, depth: float
 ) -> ClearanceAlong:
-    """Measure clearance along a motion.
+    """Measure clearance along a motion, bounded between the points measured (see the module's text).
 
     Parameters
     ----------
@@ -181,7 +219,11 @@ def clearance_along(
     joints : values (N, n) in rad or m at times (N,) in s; NaN where the motion is unknown
     t : (N,), s, rising: where the motion is known or not; refined as needed
     shown : times (K,) of ``t`` at which the clearance is returned
-    depth : m; see the module's text
+    depth : m, of overlaps that may be missed, and to within which the smallest clearance is found
+
+    Returns
+    -------
+    along : distances in m at ``shown`` and at all times at which every pair was measured; and the contacts
     """
     motion = _Motion(bodies, joints, rates)
     every = np.arange(len(bodies.pairs))
@@ -325,13 +367,18 @@ STEP = 0.02
 
 
 def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float, Pair] | None:
-    """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which; None
-    if nothing does at the rows and every STEP between them. Allowed contacts are not looked up.
+    """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which.
+
+    Allowed contacts are not looked up.
 
     Parameters
     ----------
     t : (n,), s
-    q : (n, joints), rad or m; rows that are not finite are left out, with what is beside them
+    q : (n, joints), rad or m; rows that are not finite are left out, with the ways to and from them
+
+    Returns
+    -------
+    moment, pair : s, and two bodies; None if nothing overlaps at the rows and every ``STEP`` between them
     """
     moving = [body for body in (*arm_bodies(robot), *carried_bodies(robot, scene)) if body.link != BASE]
     solids = [body for solid in scene.solids for body in solid_bodies(solid)]
@@ -369,12 +416,30 @@ class Clearance:
 
 @lru_cache(maxsize=8)
 def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
-    """The bodies of an arm and a scene; the eight used last are kept."""
+    """The bodies of an arm and a scene; the eight used last are kept.
+
+    Parameters
+    ----------
+    scene : None for the arm alone
+
+    Returns
+    -------
+    bodies : with the pairs that can meet
+    """
     return Bodies(robot, scene)
 
 
 def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
-    """Smallest distance of the arm, at each joint vector (N, n) in rad or m, from the scene's solids and from itself.
+    """Smallest distance of the arm from the scene's solids and from itself, at each joint vector.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    scene : None for the arm alone
+
+    Returns
+    -------
+    clearance : distances (N,) in m, negative by the depth of overlap, and the nearest pairs
 
     Raises
     ------

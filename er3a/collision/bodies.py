@@ -97,25 +97,63 @@ class Bodies:
         self._padded = np.array([body.points[row] for body, row in zip(self.capsules, rows)]).reshape(-1, most, 3)
 
     def ends(self, q: Reals) -> Reals:
-        """Points (..., bodies, k, 3) in m whose hulls are the cores of bodies, at joint angles (..., n) in rad.
+        """Points whose hulls are the cores of the moving bodies; of a capsule the ends of its line.
 
-        Of a capsule the ends of its line. A body moves, as a set, by no more than its points do; those of a body that
-        has fewer than others come more than once.
+        A body moves, as a set, by no more than its points do; those of a body that has fewer than others come more than
+        once.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m
+
+        Returns
+        -------
+        points : (..., bodies, k, 3), m, world frame
         """
         T = link_frames(self.robot, q)[..., [body.link for body in self.capsules], :, :]
         placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], self._padded) + T[..., None, :3, 3]
         return placed
 
     def distances(self, q: Reals, pairs: Integers) -> Reals:
-        """Distances (len(pairs),) in m of some pairs, negative by the depth of overlap, of one arm (n,)."""
+        """Distances of some pairs in one arm pose.
+
+        Parameters
+        ----------
+        q : (n,), rad or m
+        pairs : (k,), numbers of pairs
+
+        Returns
+        -------
+        distances : (k,), m, negative by the depth of overlap
+        """
         return self.nearest(q, pairs)[0]
 
     def counted(self, distances: Reals) -> Reals:
-        """Distances (..., P) as they are counted: infinite for joined pairs that don't overlap."""
+        """Distances as they are counted: infinite for joined pairs that don't overlap.
+
+        Parameters
+        ----------
+        distances : (..., P), m
+
+        Returns
+        -------
+        distances : (..., P), m
+        """
         return np.where(self.joined & (distances > 0), np.inf, distances)
 
     def nearest(self, q: Reals, pairs: Integers) -> tuple[Reals, Reals]:
-        """Distances as :meth:`distances`, and the points (len(pairs), 2, 3), m, where the bodies' cores are nearest."""
+        """Distances of some pairs in one arm pose, and where they are.
+
+        Parameters
+        ----------
+        q : (n,), rad or m
+        pairs : (k,), numbers of pairs
+
+        Returns
+        -------
+        distances : (k,), m, negative by the depth of overlap
+        points : (k, 2, 3), m, world frame, where the bodies' cores are nearest
+        """
         found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
         some_distances(self.layout, np.ascontiguousarray(q, float), np.asarray(pairs, np.int64), found, deep, near)
         for row in np.flatnonzero(deep):
@@ -123,7 +161,17 @@ class Bodies:
         return found, near
 
     def min_distance(self, q: Reals) -> tuple[Reals, Integers]:
-        """Smallest distance (N,) in m of arms (N, n), negative by the depth, and the number of its pair (-1: none)."""
+        """Smallest distance over all pairs, for many arm poses.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        distance : (N,), m, negative by the depth of overlap; joined pairs count only where they overlap
+        pair : (N,), number of the pair; -1 where nothing can meet
+        """
         q = np.ascontiguousarray(q, float)
         smallest, pair, deep = np.empty(len(q)), np.empty(len(q), np.int64), np.zeros(len(q), bool)
         measure(self.layout, q, np.empty((0, 0)), smallest, pair, deep)
@@ -135,8 +183,16 @@ class Bodies:
         return smallest, pair
 
     def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
-        """As :meth:`min_distance`, for arms (N, n) many of which are others but for whole turns: those are measured
-        once."""
+        """As :meth:`min_distance`, for arm poses many of which are others but for whole turns: those are measured once.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        distance, pair : (N,), m, and numbers of pairs
+        """
         if self.robot.coupling is not None:
             return self.min_distance(q)
         _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
@@ -144,14 +200,33 @@ class Bodies:
         return smallest[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:
-        """Which pairs overlap, (N, P), in arms (N, n)."""
+        """Which pairs overlap, for many arm poses.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        overlaps : (N, P) bool
+        """
         q = np.ascontiguousarray(q, float)
         found = np.empty((len(q), len(self.pairs)), bool)
         which_overlap(self.layout, q, found)
         return found
 
     def free(self, q: Reals, margin: float = 0.0) -> Flags:
-        """Whether nothing overlaps, (N,), in arms (N, n), and what no joint holds together is a margin (m) apart."""
+        """Which arm poses are free of overlap, and keep a margin.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+        margin : m, between all pairs that no joint holds together
+
+        Returns
+        -------
+        free : (N,) bool
+        """
         q = np.ascontiguousarray(q, float)
         clear = np.ones(len(q), bool)
         for layout in (self.layout,) if margin <= 0 else _apart_by(self.layout, margin):
@@ -161,7 +236,17 @@ class Bodies:
         return clear
 
     def surface_points(self, q: Reals, pair: int) -> Reals:
-        """The points (2, 3), m, on the surfaces of a pair's bodies that are nearest, for an arm (n,)."""
+        """The points on the surfaces of a pair's bodies that are nearest.
+
+        Parameters
+        ----------
+        q : (n,), rad or m
+        pair : number of the pair
+
+        Returns
+        -------
+        points : (2, 3), m, world frame; the cores' nearest points moved towards each other by the bodies' radii
+        """
         near = self.nearest(q, np.array([pair]))[1][0]
         along = near[1] - near[0]
         length = float(np.linalg.norm(along))
@@ -171,7 +256,16 @@ class Bodies:
         return points
 
     def always_overlaps(self, pair: int) -> bool:
-        """Whether a pair overlaps in all arms within the limits, proven."""
+        """Whether a pair overlaps in all arm poses within the limits, proven on boxes of joint vectors.
+
+        Parameters
+        ----------
+        pair : number of the pair
+
+        Returns
+        -------
+        always : False too where ``BOXES`` boxes did not decide it
+        """
         box = np.stack([self.robot.lower, self.robot.upper])
         return search_boxes(self.layout, pair, box, (True, 0.0), BOXES, np.empty(box.shape[1]))[0] == FREE
 
@@ -191,7 +285,17 @@ def _core_points(body: Body, T: Reals) -> Reals:
 
 
 def named_pair(first: Body, second: Body) -> Pair:
-    """What the results call two bodies, the second the outer one or a solid."""
+    """What the results call two bodies.
+
+    Parameters
+    ----------
+    first : a body of the arm, or one that the tool carries
+    second : the outer one, or a solid of the scene
+
+    Returns
+    -------
+    pair : by link numbers from 0, and names of other bodies
+    """
     is_link = [body.name == link_label(body.link) for body in (first, second)]
     if second.link < 0:
         return LinkAndSolid(first.link, second.name) if is_link[0] else CarriedAndSolid(first.name, second.name)

@@ -52,7 +52,18 @@ def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -
 
 @kernel
 def lines_distance(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
-    """Distance of the lines from row a0 to a1 and from b0 to b1 of ``w``; ``near`` (2, 3) gets their closest points."""
+    """Distance of two line segments, in closed form [1]_ (section 5.1.9).
+
+    Parameters
+    ----------
+    w : (P, 3), m, points
+    a0, a1, b0, b1 : rows of ``w``, ends of the two; a segment may be a point
+    near : (2, 3), gets the closest points, m
+
+    Returns
+    -------
+    distance : m
+    """
     aa = ab = bb = ac = bc = 0.0
     for r in range(3):
         u, v, d = w[a1, r] - w[a0, r], w[b1, r] - w[b0, r], w[b0, r] - w[a0, r]
@@ -82,7 +93,17 @@ def lines_distance(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) ->
 
 @inner_kernel
 def support(w: Reals, first: int, last: int, disc: float, room: Reals, sign: float, row: int) -> None:
-    """The support point of a core along ``sign`` times the row V of ``room``, into a row of it."""
+    """The point of a core that is farthest along a direction, written into a row of scratch memory.
+
+    Parameters
+    ----------
+    w : (P, 3), m, points
+    first, last : rows of the core in ``w``, ``last`` excluded
+    disc : m, radius of a cylinder's discs; 0 for a hull of points
+    room : (ROOM, 3), whose row ``AXIS`` holds the direction, of any length
+    sign : 1 or -1, along the direction or against it
+    row : of ``room``, gets the point, m
+    """
     x, y, z = sign * room[AXIS, 0], sign * room[AXIS, 1], sign * room[AXIS, 2]
     best, at = -np.inf, first
     for p in range(first, last):
@@ -188,7 +209,20 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
 def cores_distance(
     w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
 ) -> float:
-    """Distance of two cores, rows of ``w`` within ``bounds``, by Gilbert, Johnson and Keerthi; 0 where they overlap."""
+    """Distance of two convex cores by the iteration of Gilbert, Johnson and Keerthi [2]_.
+
+    Parameters
+    ----------
+    w : (P, 3), m, points
+    bounds : first and last row of either core in ``w``, the last excluded
+    disc_a, disc_b : m, radii of cylinders' discs; 0 for hulls of points
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), gets the closest points, m; meaningless where the cores overlap
+
+    Returns
+    -------
+    distance : m; 0 where they overlap or touch
+    """
     first_a, last_a, first_b, last_b = bounds
     count, last, size = 0, np.inf, 0.0
     for r in range(3):
@@ -240,7 +274,20 @@ def cores_distance(
 
 @inner_kernel
 def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: Reals) -> float:
-    """How far a core stays above a half-space, whose rows begin with ``plane``; negative by the depth."""
+    """How far a core stays above a half-space.
+
+    Parameters
+    ----------
+    w : (P, 3), m, points
+    first, last : rows of the core in ``w``, ``last`` excluded
+    disc : m, radius of a cylinder's discs; 0 for a hull of points
+    plane : row of ``w`` with the unit normal; the next row begins with the offset along it, m
+    near : (2, 3), gets the lowest point of the core and its foot on the plane, m
+
+    Returns
+    -------
+    height : m, negative by the depth
+    """
     x, y, z = w[plane, 0], w[plane, 1], w[plane, 2]
     smallest, at = np.inf, first
     for p in range(first, last):
@@ -265,7 +312,14 @@ def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: 
 
 @kernel
 def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
-    """Distances (N,) of points (N, 3) from the hull of points (m, 3); 0 inside."""
+    """Distances of points from the hull of others.
+
+    Parameters
+    ----------
+    points : (N, 3), m
+    hull : (m, 3), m
+    found : (N,), gets the distances, m; 0 inside
+    """
     w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
     for i in range(len(hull)):
         copy_values(hull[i], w[1 + i])
@@ -277,14 +331,22 @@ def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
-MAX_POINTS = 1000
+MAX_POINTS = 1000  # that a hull may grow by before all sums are taken
 
 
 def overlap_depth(first: Reals, second: Reals) -> float:
-    """Depth (m) by which the hulls of two sets of points (n, 3), (m, 3) overlap; 0 for sets that lie in one plane.
+    """Depth by which the hulls of two sets of points overlap: the shortest separating translation [3]_.
 
     A hull of some of the difference's corners grows by the farthest corner beyond its face nearest to the origin,
     until there is none beyond; few of the n m points are ever looked at.
+
+    Parameters
+    ----------
+    first, second : (n, 3) and (m, 3), m
+
+    Returns
+    -------
+    depth : m; 0 where they don't overlap, or for sets that lie in one plane
     """
     corners = _farthest(first, second, STARTS)
     try:
@@ -317,7 +379,18 @@ def _depth_of_all(first: Reals, second: Reals) -> float:
 
 
 def cylinder_points(ends: Reals, disc: float, rim: int = RIM) -> Reals:
-    """Points (2 * rim, 3) whose hull holds a cylinder with ends (2, 3) and a radius, 0.05 % of it too wide for 96."""
+    """Corners of a prism that holds a cylinder.
+
+    Parameters
+    ----------
+    ends : (2, 3), m, of the axis
+    disc : m, radius
+    rim : corners on either end; the prism is wider by a factor of ``1 / cos(pi / rim)``, 0.05 % for 96
+
+    Returns
+    -------
+    points : (2 * rim, 3), m
+    """
     axis = ends[1] - ends[0]
     across = np.linalg.svd(axis[None])[2][1:]
     angle = 2 * np.pi * np.arange(rim) / rim

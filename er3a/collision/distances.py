@@ -85,9 +85,17 @@ def pair_distance(
 ) -> tuple[float, bool]:
     """Distance of two bodies, and whether their cores overlap; then the depth is at least the one returned.
 
-    Of surfaces, from ``far`` (m) on, any number from ``far`` to the distance. ``T`` (m + 2, 4, 4) and ``w`` (P, 3) are
-    as :func:`place` leaves them, ``room`` (ROOM, 3) scratch; ``near`` (2, 3) gets the closest points of the cores. The
-    second body may be a half-space.
+    Parameters
+    ----------
+    T, w : (m + 2, 4, 4) and (P, 3), m, as :func:`place` leaves them
+    a, b : numbers of the bodies; the second may be a half-space
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), gets the closest points of the cores, m
+    far : m; of surfaces farther away any number from ``far`` to the distance may be returned
+
+    Returns
+    -------
+    distance, overlap : m, of the cores, less both radii; and whether the cores overlap
     """
     start, kind, disc, link, trees = layout.start, layout.kind, layout.disc, layout.link, layout.trees
     sizes, convex = layout.radius[a] + layout.radius[b], trees.root[a] < 0 and trees.root[b] < 0
@@ -153,15 +161,31 @@ def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
 
 @kernel
 def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
-    """Room for what :func:`place` finds."""
+    """Room for what :func:`place` finds.
+
+    Parameters
+    ----------
+    layout : an arm of m rows with B bodies of P points
+
+    Returns
+    -------
+    T, world, middle : (m + 2, 4, 4), (P, 3) and (B, 3), not filled
+    """
     rows = layout.links.shape[0] + 1
     return np.empty((rows, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
 
 
 @kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
-    """Frames ``T`` (m + 2, 4, 4) of base and links at joint values (n,), the last that of the world; points (P, 3) and
-    middles (B, 3) in space."""
+    """Place base, links and bodies at joint values.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    T : (m + 2, 4, 4), gets the frames of base and links, and last that of the world, m
+    world : (P, 3), gets the bodies' points in space, m
+    middle : (B, 3), gets the middles of the balls around the bodies, m
+    """
     _place_frames(layout, q, T)
     for b in range(layout.link.shape[0]):
         _place_middle(layout, T, b, middle)
@@ -213,7 +237,16 @@ def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
 
 @kernel
 def some_distances(layout: Layout, q: Reals, pairs: Integers, found: Reals, deep: Flags, near: Reals) -> None:
-    """Distances (m,) of some pairs of bodies at joint values (n,); ``near`` is (m, 2, 3)."""
+    """Distances of some pairs of bodies in one arm pose.
+
+    Parameters
+    ----------
+    q : (n,), rad or m
+    pairs : (k,), numbers of pairs
+    found : (k,), gets the distances, m, as of :func:`pair_distance`
+    deep : (k,) bool, gets whether the cores overlap, so that a depth has to be added
+    near : (k, 2, 3), gets the closest points of the cores, m
+    """
     room, (T, w, middle) = np.empty((ROOM, 3)), unplaced(layout)
     place(layout, q, T, w, middle)
     for row in range(len(pairs)):
@@ -223,12 +256,17 @@ def some_distances(layout: Layout, q: Reals, pairs: Integers, found: Reals, deep
 
 @kernel
 def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integers, deep: Flags) -> None:
-    """Distances of all pairs in arms (N, n); of overlapping cores the smallest known depth.
+    """Distances of all pairs in many arm poses, or the smallest of each; of overlapping cores the smallest known depth.
 
-    ``found`` (N, K) gets them all; if it has no columns, only ``smallest`` (N,) and its number ``pair`` (N,) are worked
-    out, without pairs that can't be the nearest: hulls first, then surfaces, the nearest hulls around them first.
-    Joined pairs count as nearest only where they overlap. ``deep`` (N,) says whether cores overlapped, or a surface
-    and another body, of which the depth is not known then.
+    Without columns of ``found`` pairs that can't be the nearest are left out: hulls first, then surfaces, the nearest
+    hulls around them first.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    found : (N, K), gets all distances, m; or (0, 0)
+    smallest, pair : (N,), get the smallest distance, m, and its number; joined pairs count only where they overlap
+    deep : (N,), gets whether cores overlapped, or a surface and another body, whose depth is not known then
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w, middle = unplaced(layout)
@@ -264,10 +302,15 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
 
 @kernel
 def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
-    """Which pairs overlap, (N, K), in arms (N, n); with one column, whether any does.
+    """Which pairs overlap, in many arm poses.
 
-    What the arm before has shown is tried first, for it mostly holds again: the pair that overlapped, the direction
-    that kept a pair apart. Points of a body are placed only where the balls don't settle it.
+    What the pose before has shown is tried first, for it mostly holds again: the pair that overlapped, the direction
+    that separated a pair. Points of a body are placed only where the balls don't settle it.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    found : (N, K) bool, gets which overlap; with one column, whether any does
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     T, w, middle = unplaced(layout)
@@ -376,12 +419,18 @@ def _box_state(
 
 @kernel
 def free_between(layout: Layout, start: Reals, end: Reals, depth: float, most: int) -> tuple[int, int]:
-    """Whether a straight move of the joints is free of overlap, proven, with the number of joint vectors examined.
+    """Whether a straight move of the joints is free of overlap, proven by halving it.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+    depth : m, of overlaps that a stretch may hold which is not halved further
+    most : how many joint vectors are examined at most
 
     Returns
     -------
-    FREE, MEETS (an arm in which something overlaps was found), or UNDECIDED: more than ``most`` arms, or a stretch that
-    may hold no overlap deeper than ``depth`` (m)
+    state, looked : FREE; MEETS, if an arm in which something overlaps was found; or UNDECIDED, for more than ``most``
+        arms or such a stretch. And the number of joint vectors examined
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     placed = unplaced(layout)
@@ -420,15 +469,21 @@ def _set_box(box: Reals, low: Reals, high: Reals) -> None:
 def search_boxes(
     layout: Layout, k: int, box: Reals, aim: tuple[bool, float], most: int, at: Reals
 ) -> tuple[int, int, float]:
-    """Whether a pair is apart (or, by ``aim``, overlaps) in all joint vectors of a box (2, n), by halving it.
+    """Whether a pair keeps clear (or, by ``aim``, overlaps) in all joint vectors of a box, by halving it.
 
-    ``aim`` says whether overlap is to be shown, and of how much (m, 0 or more); less is not decided.
+    Parameters
+    ----------
+    k : number of the pair
+    box : (2, n), rad or m, lower and upper ends
+    aim : whether overlap is to be shown, and of how much (m, 0 or more); less is not decided
+    most : boxes to examine at most
+    at : (n,), gets the joint vector of MEETS
 
     Returns
     -------
-    FREE if so, proven; MEETS with the joint vector ``at`` (n,) in which it is otherwise; or UNDECIDED
+    state : FREE if so, proven; MEETS with the joint vector ``at`` in which it is otherwise; or UNDECIDED
     looked : how many boxes were examined
-    smallest : m, of FREE a lower bound of how far apart (or deep) the two stay
+    smallest : m, of FREE a lower bound of the distance (or depth)
     """
     room, near = np.empty((ROOM, 3)), np.empty((2, 3))
     n = box.shape[1]

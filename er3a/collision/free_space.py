@@ -29,7 +29,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-Z_95 = 1.959963984540054
+Z_95 = 1.959963984540054  # half-width of the 95 % interval of a standard normal number
 POSES_A_ROUND = 8  # tried in a place in one round
 MIN_EXTENT_M = 1e-4  # of what a tool point that stays in place is reported to reach
 DEPTH = 1e-3  # m; a move in which the arm may overlap by less than this, unproven, joins nothing
@@ -45,12 +45,12 @@ class Share:
 
     @property
     def value(self) -> float:
-        """The share that was counted."""
+        """The share that was counted, 0 to 1."""
         return self.count / self.of
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval [1]_."""
+        """95 % interval of the share, 0 to 1, after Wilson [1]_."""
         n, p = self.of, self.value
         middle = (p + Z_95**2 / (2 * n)) / (1 + Z_95**2 / n)
         half = Z_95 / (1 + Z_95**2 / n) * float(np.sqrt(p * (1 - p) / n + Z_95**2 / (4 * n**2)))
@@ -76,7 +76,16 @@ class JointSpace:
     overlaps: Flags
 
     def count(self, pairs: list[int]) -> int:
-        """Vectors in which any of some pairs overlaps."""
+        """Number of joint vectors in which any of some pairs overlaps.
+
+        Parameters
+        ----------
+        pairs : their numbers, columns of ``overlaps``
+
+        Returns
+        -------
+        count : 0 to N
+        """
         return int(self.overlaps[:, pairs].any(axis=1).sum())
 
 
@@ -107,7 +116,18 @@ class ClearPlaces:
 
 
 def sample_joint_space(bodies: Bodies, samples: int, random: np.random.Generator) -> JointSpace:
-    """Try random joint vectors, uniform within the limits."""
+    """Try random joint vectors, uniform within the limits.
+
+    Parameters
+    ----------
+    bodies : of the arm and a scene
+    samples : N, how many
+    random : generator that draws them
+
+    Returns
+    -------
+    space : the vectors (N, n), rad or m, and which pairs overlap in them
+    """
     robot = bodies.robot
     q = random.uniform(robot.lower, robot.upper, (samples, robot.joints))
     own = bodies.second >= 0
@@ -127,6 +147,10 @@ def find_places(
     ----------
     across : cells along the longest side of what the samples reach
     rounds : how often POSES_A_ROUND further poses are tried in a cell without a clear arm; all branches of each
+
+    Returns
+    -------
+    places : M cells, in m; none is joined to home yet
     """
     robot = bodies.robot
     T = forward(robot, space.q)
@@ -175,11 +199,16 @@ def _try_poses(
 
 
 def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours: int) -> Flags:
-    """Which clear places (M,) can be joined to home (n,), an arm free of overlap, by moves that are proven free.
+    """Which clear places can be joined to home by moves that are proven free [2]_.
 
     Parameters
     ----------
+    home : (n,), rad or m, an arm free of overlap
     neighbours : moves to how many of the nearest arms are tried from each
+
+    Returns
+    -------
+    joined : (M,) bool; nothing is proven of the others
     """
     clear = np.flatnonzero(places.clear)
     q = np.concatenate([home[None], places.witness[clear]])

@@ -92,12 +92,31 @@ class CollisionMatrix:
 @derived
 @lru_cache(maxsize=32)  # of equal robots too: who checks many programs loads the arm for each
 def collision_matrix(robot: Robot) -> CollisionMatrix:
-    """The matrix of an arm without anything carried."""
+    """The matrix of an arm without anything carried; kept, also for equal robots.
+
+    Parameters
+    ----------
+    robot : with its shapes, and the rules of its file
+
+    Returns
+    -------
+    matrix : a row for each pair of links that have shapes
+    """
     return matrix_of(robot, list(combinations(arm_bodies(robot), 2)), robot.pair_rules)
 
 
 def matrix_of(robot: Robot, pairs: Sequence[BodyPair], rules: Sequence[PairRule]) -> CollisionMatrix:
-    """Judge pairs of bodies of different links; bodies of one link never move against each other."""
+    """Judge pairs of bodies of different links; bodies of one link never move against each other.
+
+    Parameters
+    ----------
+    pairs : of bodies, in any order
+    rules : what the file decides of pairs of links or carried bodies, by their names
+
+    Returns
+    -------
+    matrix : a row for each two names, and the pairs of bodies that are to be checked
+    """
     by_names: dict[tuple[str, str], list[BodyPair]] = {}
     for first, second in pairs:
         if first.link != second.link:
@@ -190,7 +209,16 @@ def _joined(robot: Robot, pairs: Sequence[BodyPair], overlap: Flags) -> tuple[Ma
 
 
 def girth(body: Body, centre: Reals) -> float:
-    """How far a capsule extends from the line that leads from ``centre`` (3,) through its middle, m."""
+    """How far a capsule extends from the line that leads from a point through its middle.
+
+    Parameters
+    ----------
+    centre : (3,), m, in the frame of the body's link
+
+    Returns
+    -------
+    girth : m, its radius included
+    """
     along, away = body.points.mean(axis=0) - centre, body.points - centre
     length = float(np.linalg.norm(along))
     if length > SHORTEST:
@@ -199,7 +227,17 @@ def girth(body: Body, centre: Reals) -> float:
 
 
 def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
-    """What is left of a capsule's line outside the ball about ``centre`` (3,) with ``radius`` (m)."""
+    """What is left of a capsule's line outside a ball.
+
+    Parameters
+    ----------
+    centre : (3,), m, in the frame of the body's link
+    radius : m
+
+    Returns
+    -------
+    bodies : up to two capsules; none if the line is wholly inside
+    """
     start, line = body.points[0], body.points[-1] - body.points[0]
     away, length = start - centre, float(line @ line)
     if length <= SHORTEST**2:
@@ -273,7 +311,16 @@ class BaseContact:
 
 
 def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
-    """Solids that the base overlaps or rests on, the deepest contact with each."""
+    """Solids that the base overlaps or rests on, the deepest contact with each.
+
+    Parameters
+    ----------
+    scene : None for none
+
+    Returns
+    -------
+    contacts : with depths in m
+    """
     base = [body for body in arm_bodies(robot) if body.link == BASE]
     solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
     bodies = [*base, *map(_middle, base), *solids]
@@ -300,7 +347,16 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
 
 
 def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
-    """Solids of a scene, by name, that a box would overlap by more than ``PENETRATION_TOLERANCE`` on a side."""
+    """Solids of a scene that a box would overlap.
+
+    Parameters
+    ----------
+    box : in the world; taken smaller by ``PENETRATION_TOLERANCE`` on each side
+
+    Returns
+    -------
+    names : of the solids, each once, in the scene's order
+    """
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
     bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
     layout = layout_of(robot, bodies, [(0, k) for k in range(1, len(bodies))])

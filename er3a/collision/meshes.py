@@ -27,8 +27,8 @@ MAX_CORNERS = 64  # of a piece
 AGREE = 2e-5  # m, tolerance of the bound of what extends beyond
 CUTS = 12
 FINEST = 4_000_000  # triangles looked at in all
-SURFACE_POINTS = 20_000
-ROUNDING = 1e-12
+SURFACE_POINTS = 20_000  # at which the excess of pieces is measured, over all of them
+ROUNDING = 1e-12  # m, added to a bound that was computed
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,11 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
     ----------
     vertices : (V, 3), m; faces : (F, 3), rows of vertices, outwards by the right-hand rule
     threshold : concavity that is left, a share of the mesh's size (coacd's measure), 0.01 to 1
+    seed : of the split, and of the points at which the excess is measured
+
+    Returns
+    -------
+    pieces : in m, with what sticks out of them, and how far they stick out
 
     Raises
     ------
@@ -67,9 +72,19 @@ def convex_pieces(vertices: Reals, faces: Integers, threshold: float, seed: int)
 
 
 def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Integers]:
-    """Vertices and faces of a mesh with at most so many triangles: edges collapse where the surface is flattest [1]_.
+    """A mesh with at most so many triangles: edges collapse where the surface is flattest [1]_.
 
     Of triangles with both sides (two with the same corners) one is kept: edges of more than two don't collapse.
+
+    Parameters
+    ----------
+    vertices : (V, 3), m
+    faces : (F, 3), rows of ``vertices``
+    most : triangles
+
+    Returns
+    -------
+    vertices, faces : the given ones if there are few enough
 
     References
     ----------
@@ -86,7 +101,17 @@ def simplified(vertices: Reals, faces: Integers, most: int) -> tuple[Reals, Inte
 
 
 def is_convex(vertices: Reals, faces: Integers) -> bool:
-    """Whether a closed mesh fills its hull."""
+    """Whether a closed mesh fills its hull, by volumes from signed tetrahedra.
+
+    Parameters
+    ----------
+    vertices : (k, 3), m
+    faces : (F, 3), rows of ``vertices``, their normals outwards
+
+    Returns
+    -------
+    convex : False for a flat mesh
+    """
     try:
         hull, corners = scipy.spatial.ConvexHull(vertices), vertices[faces] - vertices[0]
     except scipy.spatial.QhullError:  # flat
@@ -111,9 +136,15 @@ def _split(vertices: Reals, faces: Integers, seed: int, **settings: Any) -> tupl
 
 
 def hull_of(points: Reals) -> ConvexPieces:
-    """The hull of points (n, 3), m, with at most ``MAX_CORNERS`` of its corners: the outermost ones.
+    """The hull of points, with at most ``MAX_CORNERS`` of its corners: the outermost ones.
 
-    What the corners left out stand out by is the margin; the excess is not that of a mesh, but 0: corners are points.
+    Parameters
+    ----------
+    points : (n, 3), m
+
+    Returns
+    -------
+    pieces : one; ``uncovered`` (m) is how far corners left out stick out of it, ``excess`` is 0: corners are points
     """
     corners = hull_corners(points)
     if len(corners) <= MAX_CORNERS:
@@ -125,7 +156,22 @@ def hull_of(points: Reals) -> ConvexPieces:
 
 
 def uncovered(vertices: Reals, faces: Integers, pieces: Sequence[Reals]) -> float:
-    """A bound (m) of how far a mesh's surface sticks out of the union of convex pieces."""
+    """A bound of how far a mesh's surface sticks out of the union of convex pieces.
+
+    Parameters
+    ----------
+    vertices : (k, 3), m
+    faces : (F, 3), rows of ``vertices``
+    pieces : corners (c, 3), m, of each
+
+    Returns
+    -------
+    bound : m; it exceeds the farthest point measured by about ``AGREE``, or by more where triangles got too many
+
+    Notes
+    -----
+    The distance from a convex body is convex, so that no point of a triangle is farther than its farthest corner.
+    """
     triangles, settled, looked = vertices[faces], 0.0, 0
     for cut in range(CUTS + 1):
         corners, where = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
@@ -169,6 +215,16 @@ def _excess(vertices: Reals, faces: Integers, pieces: Sequence[Reals], seed: int
 
 
 def hull_corners(points: Reals) -> Reals:
+    """Corners of the hull of points.
+
+    Parameters
+    ----------
+    points : (n, 3), m
+
+    Returns
+    -------
+    corners : (k, 3), m; all points where they lie in a plane
+    """
     try:
         corners: Reals = points[scipy.spatial.ConvexHull(points).vertices]
     except scipy.spatial.QhullError:  # flat

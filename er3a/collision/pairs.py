@@ -18,11 +18,11 @@ class TwoBodies(ABC):
     @property
     @abstractmethod
     def names(self) -> tuple[str, str]:
-        """Of both bodies."""
+        """Names of both bodies."""
 
     @property
     def label(self) -> str:
-        """For columns of text."""
+        """Both names with a slash between, for columns of text."""
         return "/".join(self.names)
 
 
@@ -34,6 +34,7 @@ class LinkPair(TwoBodies, Finding):
 
     @property
     def names(self) -> tuple[str, str]:
+        """Such as ``base`` and ``link_3``."""
         return link_label(self.first), link_label(self.second)
 
 
@@ -45,6 +46,7 @@ class LinkAndSolid(TwoBodies, Finding):
 
     @property
     def names(self) -> tuple[str, str]:
+        """The link's label and the solid's name."""
         return link_label(self.link), self.solid
 
 
@@ -56,6 +58,7 @@ class CarriedAndLink(TwoBodies, Finding):
 
     @property
     def names(self) -> tuple[str, str]:
+        """The link's label and the name of what is carried."""
         return link_label(self.link), self.carried
 
 
@@ -67,6 +70,7 @@ class CarriedAndSolid(TwoBodies, Finding):
 
     @property
     def names(self) -> tuple[str, str]:
+        """The name of what is carried and the solid's name."""
         return self.carried, self.solid
 
 
@@ -114,5 +118,14 @@ class ShapesAssumed(Finding):
 
 
 def link_label(number: int) -> str:
-    """A link's name in columns of text."""
+    """A link's name in columns of text.
+
+    Parameters
+    ----------
+    number : 0 for the base, k for the link that row k moves
+
+    Returns
+    -------
+    label : ``base``, or such as ``link_3``
+    """
     return "base" if number == BASE else f"link_{number}"

@@ -12,7 +12,7 @@ from er3a.geometry.transforms import check_poses
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import PairRule
 
-UNIT_LENGTH = 1e-6
+UNIT_LENGTH = 1e-6  # by which a normal's length may differ from 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,12 @@ class Scene(ByValue, Displayed):
     pair_rules: tuple[PairRule, ...] = ()
 
     def sheet(self) -> Sheet:
-        """A row for each solid."""
+        """What the notebook shows: a row for each solid, measures in mm.
+
+        Returns
+        -------
+        sheet : its first rows, and how many are left out
+        """
         rows = ((solid.name, type(solid).__name__.lower(), solid.measures) for solid in self.solids)
         shown, left_out = first_rows(rows, len(self.solids))
         return Sheet(f"Scene: {shortly(self.title)}", ("name", "solid", "measures"), shown, left_out)

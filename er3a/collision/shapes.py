@@ -38,7 +38,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import ConvexPiece, Envelope, Grade, LinkMesh, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
-SHORTEST = 1e-6
+SHORTEST = 1e-6  # m, below which a length of the table is none
 LINE_POINTS, TOUCH = 25, 1e-3  # points along a piece of a link, and m, by which they may protrude
 VISIBLE = 0.02  # m, by which a link's visible mesh may protrude: covers and cables do
 COVERED, GAP = 0.75, 0.04  # of a link's lengths in the table its shapes have to reach along so much, or all but GAP, m
@@ -80,14 +80,23 @@ class ArmShapes:
 
     @property
     def links(self) -> set[int]:
-        """The links that have a shape."""
+        """Numbers of the links that have a shape, 0 for the base."""
         shapes: tuple[Envelope | ConvexPiece | LinkMesh, ...] = (*self.capsules, *self.pieces, *self.meshes)
         return {shape.link for shape in shapes}
 
 
 @derived
 def arm_shapes(robot: Robot) -> ArmShapes:
-    """The shapes of an arm (see the module's text)."""
+    """The shapes of an arm: those of its file, or capsules guessed from its table if the file gives none at all.
+
+    Parameters
+    ----------
+    robot : any arm
+
+    Returns
+    -------
+    shapes : in the links' frames, m, and what they leave open: bare, uncovered and partial links
+    """
     given = bool(robot.envelopes or robot.hulls or robot.meshes)
     capsules = robot.envelopes if given else default_envelopes(robot)
     source = robot.sources.get("envelopes")
@@ -108,8 +117,17 @@ def arm_shapes(robot: Robot) -> ArmShapes:
 
 
 def covered_lengths(robot: Robot, shapes: ArmShapes, link: int) -> tuple[float, float]:
-    """Of a link's lengths in the table that along which its shapes reach, or which lies in those of the links beside
-    it, and all of them, m."""
+    """How much of a link's lengths in the table its shapes, or those of its neighbours, reach along.
+
+    Parameters
+    ----------
+    shapes : of the whole arm
+    link : number, 0 for the base
+
+    Returns
+    -------
+    covered, whole : m
+    """
     lines = _own_lengths(robot, link)
     lengths = [float(np.linalg.norm(line[1] - line[0])) for line in lines]
     shares = [_covered(robot, shapes, line, link) for line in lines]
@@ -150,12 +168,20 @@ def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
 
 
 def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
-    """Whether a tool, or the flange, reaches out of all shapes, which those of the arm's file and what it carries are.
+    """Whether a tool, or the flange, reaches out of all shapes: those of the arm's file and of what it carries.
 
     Without anything carried, its point lies outside the last link's shapes. What is inside another link's shape at some
-    joint values is not inside it at others. Or, seen along the line from the table's end to that point, these shapes
-    and what is carried reach along less than all but ``UNSHAPED`` of it: something must hold what is carried at a
-    tool's tip. Tools are bent, and fingers stand beside the line, so it need not lie inside them.
+    joint values is not inside it at others. Or these shapes and what is carried leave
+    more than ``UNSHAPED`` of the line from the table's end to that point free, seen along it. Something must hold what
+    is carried at a tool's tip. Tools are bent, and fingers are next to the line, so it need not lie inside them.
+
+    Parameters
+    ----------
+    scene : with what the tool carries; None for nothing
+
+    Returns
+    -------
+    bare : False for guessed shapes, and for arms without tool and flange lengths
     """
     shapes = arm_shapes(robot)
     if not shapes.given or not (robot.tool[:3, 3].any() or robot.flange[:3, 3].any()):
@@ -226,13 +252,16 @@ def _size(robot: Robot) -> float:
 
 
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
-    """The remark on collisions where the arm's shapes are assumed; None where a document that
-    verdicts rest on gives them, for all of its links.
+    """The remark on collisions where the arm's shapes are assumed.
 
     Parameters
     ----------
     margin : m, within which of assumed shapes nothing is settled
     clearances : m, smallest ones by name; None where unknown, negative for overlaps
+
+    Returns
+    -------
+    remark : None where a document that verdicts rest on gives the shapes of all links
     """
     shapes = arm_shapes(robot)
     if not shapes.assumed:
@@ -243,7 +272,16 @@ def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float |
 
 
 def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
-    """Capsules along the table's link lengths (see the module's text)."""
+    """Capsules guessed along the table's link lengths.
+
+    Parameters
+    ----------
+    robot : any arm; its tool gets a capsule too
+
+    Returns
+    -------
+    envelopes : in the links' frames, m; links without length get none
+    """
     size = _size(robot)
     parts, found = link_parts(robot), []
     last = robot.rows
@@ -261,9 +299,18 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
 
 
 def enlarged_by(robot: Robot, scene: Scene | None, names: Sequence[str]) -> float:
-    """By how much (m) shapes of links, and of solids, are at most larger than the meshes that they hold, together.
+    """By how much shapes are at most larger than the meshes that they hold, together.
 
     An overlap by less is no contact for sure.
+
+    Parameters
+    ----------
+    scene : None for none
+    names : of the two bodies in contact: labels of links, names of solids
+
+    Returns
+    -------
+    margin : m, the sum of the largest margin of each
     """
     margins = [(link_label(piece.link), piece.margin) for piece in arm_shapes(robot).pieces]
     solids = (*scene.solids, *scene.carried) if scene else ()
@@ -272,7 +319,16 @@ def enlarged_by(robot: Robot, scene: Scene | None, names: Sequence[str]) -> floa
 
 
 def link_frames(robot: Robot, q: Reals) -> Reals:
-    """Frames (..., m + 1, 4, 4) of the base and the links at joint values (..., n)."""
+    """Frames of the base and the links.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+
+    Returns
+    -------
+    T : (..., m + 1, 4, 4), T_world_link, m; the tool's frame is not among them
+    """
     T = frames(robot, q)
     base = np.broadcast_to(robot.base, (*T.shape[:-3], 1, 4, 4))
     return np.concatenate([base, T[..., :-1, :, :]], axis=-3)
@@ -290,7 +346,7 @@ ON_AXIS = 1e-9  # m
 LOOKED_AT = 100  # corners of a surface
 ROUND = 72  # corners by which a circle is drawn
 BALL = 200  # and a ball
-SIDES = 24
+SIDES = 24  # of the prism around a carried cylinder
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
@@ -330,7 +386,16 @@ def _surface(mesh: LinkMesh) -> Body:
 
 
 def arm_bodies(robot: Robot) -> tuple[Body, ...]:
-    """Capsules, convex pieces and surfaces of the arm, link by link."""
+    """Capsules, convex pieces and surfaces of the arm, link by link.
+
+    Parameters
+    ----------
+    robot : any arm
+
+    Returns
+    -------
+    bodies : points in the frame of each body's link, m
+    """
     shapes = arm_shapes(robot)
     capsules = [
         Body(link_label(c.link), c.link, np.unique([c.start, c.end], axis=0), c.radius) for c in shapes.capsules
@@ -340,7 +405,16 @@ def arm_bodies(robot: Robot) -> tuple[Body, ...]:
 
 
 def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
-    """What the tool carries, in the frame of the last link; a cylinder as a prism around it, under 1 % too wide."""
+    """What the tool carries, as bodies of the last link.
+
+    Parameters
+    ----------
+    scene : None for none
+
+    Returns
+    -------
+    bodies : in the last link's frame, m; a cylinder as a prism around it, under 1 % too wide
+    """
     if scene is None or not scene.carried:
         return ()
     last = robot.rows
@@ -354,7 +428,16 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
 
 
 def solid_bodies(solid: Solid) -> tuple[Body, ...]:
-    """A solid as bodies of the world."""
+    """A solid as convex bodies of the world.
+
+    Parameters
+    ----------
+    solid : of a scene
+
+    Returns
+    -------
+    bodies : points in the world frame, m; one for each piece of a mesh, else one
+    """
     match solid:
         case Plane():
             points = np.array([solid.normal, [solid.offset, 0, 0]])
@@ -375,16 +458,30 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
 
 
 def depths_in(solid: Solid, points: Reals) -> Reals:
-    """How deep points (n, 3), m, of the world are in a solid, (n,), m; not above 0 outside. The margin around the
-    pieces of a mesh does not count."""
+    """How deep points are in a solid.
+
+    Parameters
+    ----------
+    points : (n, 3), m, world frame
+
+    Returns
+    -------
+    depths : (n,), m; not above 0 outside. The margin around the pieces of a mesh does not count
+    """
     depths: Reals = np.max([_depths_in(body, points) for body in solid_bodies(solid)], axis=0)
     return depths
 
 
 def depth_inside(body: Body, other: Body, T: Reals) -> float:
-    """How deep another body, placed by T (4, 4) in the frame of a body, has points inside its core, m, not below 0.
+    """How deep another body has points inside a body's core.
 
-    Of a surface up to ``LOOKED_AT`` corners are looked at, so that it is at least that deep.
+    Parameters
+    ----------
+    T : (4, 4), m, places the other body in the frame of the first
+
+    Returns
+    -------
+    depth : m, not below 0; of a surface up to ``LOOKED_AT`` corners are looked at, so that it is at least that deep
     """
     points = other.points if other.tree is None else other.tree.corner.reshape(-1, 3)
     points = points[:: -(-len(points) // LOOKED_AT)] @ T[:3, :3].T + T[:3, 3]
@@ -415,9 +512,19 @@ def _depths_in(body: Body, points: Reals) -> Reals:
 
 
 def solid_pieces(solid: Solid) -> tuple[Reals, ...]:
-    """Corners (k, 3), m, in the world, of the convex pieces that a solid is drawn by; planes have none.
+    """Convex pieces that a solid is drawn by.
 
-    Corners of round ones are on their surface. Pieces of a mesh are without the margin that is added to them.
+    Parameters
+    ----------
+    solid : of a scene
+
+    Returns
+    -------
+    corners : (k, 3), m, world frame, of each piece; planes have none
+
+    Notes
+    -----
+    Corners of round solids are on their surface. Pieces of a mesh are without the margin that is added to them.
     """
     if isinstance(solid, Plane):
         return ()
@@ -432,7 +539,15 @@ def _corners(body: Body, radius: float) -> Reals:
 
 
 def hull_faces(points: Reals) -> Integers:
-    """The triangles (n, 3) of the convex hull of points (k, 3), their corners counter-clockwise from outside.
+    """The triangles of a convex hull.
+
+    Parameters
+    ----------
+    points : (k, 3), m
+
+    Returns
+    -------
+    faces : (n, 3), rows of ``points``, counter-clockwise from outside
 
     Raises
     ------
@@ -449,7 +564,18 @@ def hull_faces(points: Reals) -> Integers:
 def layout_of(
     robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], joined: Sequence[bool] = ()
 ) -> Layout:
-    """Arrays of bodies and of pairs of them; the second of a pair is on the outer link, or in the world."""
+    """Arrays of bodies and of pairs of them, for kernels.
+
+    Parameters
+    ----------
+    bodies : B, of the arm and the world
+    pairs : numbers of two bodies; the second is on the outer link, or in the world
+    joined : of each pair, whether a joint joins them; empty for none
+
+    Returns
+    -------
+    layout : m and rad
+    """
     starts = np.concatenate([[0], np.cumsum([len(body.points) for body in bodies])]).astype(np.int64)
     centre, reach = np.zeros((len(bodies), 3)), np.zeros(len(bodies))
     for b, body in enumerate(bodies):

@@ -70,7 +70,17 @@ class Trees(NamedTuple):
 
 
 def tree_of(points: Reals, faces: Integers) -> TriangleTree:
-    """The tree of a surface of triangles (F, 3) between points (k, 3), m; corners in the same place are one."""
+    """The tree of boxes of a surface, one triangle in each leaf.
+
+    Parameters
+    ----------
+    points : (k, 3), m; corners in the same place are one
+    faces : (F, 3), rows of ``points``
+
+    Returns
+    -------
+    tree : with the shells that the triangles make up
+    """
     points, same = np.unique(points, axis=0, return_inverse=True)
     faces = same.reshape(-1)[faces]
     corner = np.ascontiguousarray(points[faces])
@@ -120,9 +130,18 @@ def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
 
 
 def outer_corners(points: Reals, most: int = 64) -> Reals:
-    """At most so many points (k, 3), m, whose hull holds all points (n, 3): a box's eight for flat ones.
+    """Few points whose hull holds all points.
 
     The outermost corners of the hull, moved away from their middle until all others are inside.
+
+    Parameters
+    ----------
+    points : (n, 3), m
+    most : how many at most, 8 at least
+
+    Returns
+    -------
+    corners : (k, 3), m; of flat ones the eight of their box
     """
     low, high = points.min(axis=0), points.max(axis=0)
     box = np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
@@ -142,7 +161,16 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
 
 
 def trees_of(trees: Sequence[TriangleTree | None]) -> Trees:
-    """The trees of bodies, None for convex ones; a tree that several bodies share is laid down once."""
+    """The trees of bodies one after another, as kernels take them.
+
+    Parameters
+    ----------
+    trees : B, None for convex bodies; a tree that several bodies share is laid down once
+
+    Returns
+    -------
+    trees : with roots (B,), -1 for convex bodies
+    """
     own = {id(tree): tree for tree in trees if tree is not None}
     kept = list(own.values())
     sizes = [np.cumsum([0, *(len(getattr(tree, key)) for tree in kept)]) for key in ("box", "corner", "probe")]
@@ -285,7 +313,18 @@ def _ray_meets(corner: Reals, x: float, y: float, z: float) -> bool:
 
 @inner_kernel
 def holds_point(trees: Trees, T: Reals, root: int, point: Reals) -> bool:
-    """Whether a surface placed by T (4, 4) holds a point (3,) in one of its closed shells."""
+    """Whether a surface holds a point in one of its closed shells.
+
+    Parameters
+    ----------
+    T : (4, 4), m, places the surface
+    root : first box of its tree
+    point : (3,), m, in the frame in which T places it
+
+    Returns
+    -------
+    inside : False for open shells
+    """
     u, v, w = point[0] - T[0, 3], point[1] - T[1, 3], point[2] - T[2, 3]
     x = T[0, 0] * u + T[1, 0] * v + T[2, 0] * w
     y = T[0, 1] * u + T[1, 1] * v + T[2, 1] * w
@@ -318,12 +357,20 @@ def surface_distance(
     near: Reals,
     far: float,
 ) -> float:
-    """Distance of a surface, body a placed by T (4, 4), from body b; below 0 where one is inside the other, 0 where
-    they cross. From ``far`` on any number from ``far`` to the distance.
+    """Distance of a body's surface from another body.
 
-    Body b is a surface placed by S (4, 4) or, if it has no tree, a convex core: rows from first to last of points
-    (P, 3) in space, and the radius of its disc. ``near`` (2, 3) holds the closest points of hulls around the two, and
-    gets their own.
+    Parameters
+    ----------
+    a, b : numbers of the bodies; b is a surface, or a convex core if it has no tree
+    T, S : (4, 4), m, place the two surfaces; S does not count for a core
+    core : points (P, 3) in space, m, first and last row of the core (the last excluded), and the radius of its disc, m
+    room : (ROOM, 3), scratch memory
+    near : (2, 3), m, holds the closest points of hulls around the two, and gets their own
+    far : m; of surfaces farther away any number from ``far`` to the distance may be returned
+
+    Returns
+    -------
+    distance : m; below 0 where one is inside the other, 0 where they cross
     """
     w, first, last, disc = core
     convex = trees.root[b] < 0
@@ -402,7 +449,20 @@ def surface_distance(
 def surface_above_plane(
     trees: Trees, T: Reals, root: int, normal: tuple[float, float, float], offset: float, near: Reals
 ) -> float:
-    """How far a surface placed by T (4, 4) stays above a half-space; negative by the depth."""
+    """How far a surface stays above a half-space.
+
+    Parameters
+    ----------
+    T : (4, 4), m, places the surface
+    root : first box of its tree
+    normal : unit vector out of the solid
+    offset : m, how far along the normal the solid ends
+    near : (2, 3), gets the lowest corner and its foot on the plane, m
+
+    Returns
+    -------
+    height : m, negative by the depth
+    """
     x, y, z = normal
     u = x * T[0, 0] + y * T[1, 0] + z * T[2, 0]
     v = x * T[0, 1] + y * T[1, 1] + z * T[2, 1]
@@ -437,7 +497,14 @@ def surface_above_plane(
 
 @kernel
 def depths_inside(trees: Trees, body: int, points: Reals, found: Reals) -> None:
-    """How deep points (N, 3), in the frame of a body's surface, lie in its closed shells, (N,), m; 0 for others."""
+    """How deep points lie in a surface's closed shells.
+
+    Parameters
+    ----------
+    body : number of the body in ``trees``
+    points : (N, 3), m, in the body's frame
+    found : (N,), gets the depths, m; 0 for points outside
+    """
     T, room, near = np.eye(4), np.empty((ROOM, 3)), np.empty((2, 3))
     alone = Trees(
         np.array([trees.root[body], -1]),

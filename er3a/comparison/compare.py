@@ -45,7 +45,7 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-SAMPLES = 192
+SAMPLES = 192  # joint vectors at which the two flanges are compared before the worst is sought
 SWEEPS = 2
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
@@ -232,7 +232,7 @@ class Comparison(ByValue):
 
     @property
     def different_entries(self) -> int:
-        """How many entries of geometry differ: less is a better fit."""
+        """How many entries of geometry differ: less is a better fit; 1000 if joints can't be paired."""
         return len(self.geometry.differences) if self.geometry else 1000
 
 
@@ -246,6 +246,10 @@ def compare(
     robot_a : the table to test; differences are named by its entries
     robot_b : the table to compare with
     tolerance_mm, tolerance_deg : entries that differ by at most this are equal
+
+    Returns
+    -------
+    comparison : the verdict with its layers, lengths in mm and angles in deg
 
     Raises
     ------
@@ -323,7 +327,16 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
 
 
 def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
-    """Groups that a robot gives and a comparison does not look at."""
+    """Groups of a robot file that an arm gives and a comparison does not look at.
+
+    Parameters
+    ----------
+    robot : an identity tool, and masses that are not there, count as not given
+
+    Returns
+    -------
+    groups : their names, such as ``tool`` or ``inertia``
+    """
     masses = robot.masses
     given: dict[Uncompared, bool] = {
         "tool": not np.array_equal(robot.tool, np.eye(4)),
@@ -338,7 +351,16 @@ def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
 
 
 def given_by_both(one: Set[Uncompared], other: Set[Uncompared]) -> tuple[Uncompared, ...]:
-    """Groups that two arms give, in a fixed order."""
+    """Groups that two arms give.
+
+    Parameters
+    ----------
+    one, other : as of :func:`beside_the_table`
+
+    Returns
+    -------
+    groups : in the order of ``Uncompared``
+    """
     return tuple(group for group in get_args(Uncompared) if group in one and group in other)
 
 
@@ -349,9 +371,18 @@ def best_of(
     tolerance_mm: float = TOLERANCE_MM,
     tolerance_deg: float = TOLERANCE_DEG,
 ) -> list[tuple[str, Comparison]]:
-    """A robot compared with several, the one that fits best first: fewest entries, then the smallest differences.
+    """A robot compared with several, the one that fits best first.
 
-    Causes are searched for in the best one alone.
+    Fewest entries of geometry count first, then smallest differences. Causes are searched for in the best one alone.
+
+    Parameters
+    ----------
+    others : at least one, by name
+    tolerance_mm, tolerance_deg : by how much lengths (mm) and angles (deg) may differ and still agree
+
+    Returns
+    -------
+    found : names and comparisons, all of ``others``
     """
     tolerances = mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]
@@ -547,7 +578,17 @@ RANGES: dict[Uncompared, tuple[str, ...]] = {"limits": ("lower", "upper"), "spee
 
 
 def in_units(robot: Robot, slips: Iterable[Cause], side: Literal["a", "b"]) -> Robot:
-    """A robot with the columns that were read in another unit taken to their own; ``side``: which of both it is."""
+    """A robot with the columns that were read in another unit taken to their own.
+
+    Parameters
+    ----------
+    slips : of units, with their columns and factors
+    side : which of the two compared robots it is; slips without a side are the first one's
+
+    Returns
+    -------
+    robot : SI; of limits and speeds only joints that turn, or only those that slide, are changed, by the kind of slip
+    """
     columns: dict[str, Reals] = {}
     for slip in slips:
         for column in slip.entries if (slip.side or "a") == side else ():

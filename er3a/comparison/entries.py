@@ -19,7 +19,7 @@ LENGTHS = ("a", "d")
 BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_rx", "base_ry", "base_rz")
 TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
 IN_MM = (*LENGTHS, *BASE_COLUMNS[:3], *TOOL_COLUMNS)
-SCALE_M, SCALE_RAD = 1e-3, float(np.radians(0.1))
+SCALE_M, SCALE_RAD = 1e-3, float(np.radians(0.1))  # 0.1 deg moves a point 0.6 m away by a millimetre
 """Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
 
 
@@ -59,13 +59,31 @@ class Entry:
         return SCALE_M if self.unit == "mm" else SCALE_RAD
 
     def value(self, robot: Robot) -> float:
-        """The robot's value, in the unit; 0 for the base, whose corrections come behind what the file says."""
+        """The robot's value of this entry.
+
+        Parameters
+        ----------
+        robot : with as many rows as ``joint`` at least
+
+        Returns
+        -------
+        value : in :attr:`unit`; 0 for the base, whose corrections come behind what the file says
+        """
         if self.joint:
             return round(float(getattr(robot, self.column)[self.joint - 1] * self.in_unit), 9)
         return float(robot.tool[TOOL_COLUMNS.index(self.column), 3] * MM) if self.column in TOOL_COLUMNS else 0.0
 
     def of(self, tables: Tables) -> Reals:
-        """The entry (H,) of tables, in m or rad; 1 for the scale."""
+        """The entry of many tables.
+
+        Parameters
+        ----------
+        tables : H of them
+
+        Returns
+        -------
+        values : (H,), m or rad; 1 for the scale
+        """
         if self.column == "scale":
             return np.ones(len(tables))
         column: Reals = getattr(tables, self.column)[:, self.joint - 1]
@@ -79,6 +97,10 @@ def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:
     ----------
     tables : one, or one for each of H rows of amounts
     amounts : (H, k), m and rad; relative for the scale, which has to come before lengths
+
+    Returns
+    -------
+    tables : H
     """
     found = tables if len(tables) == len(amounts) else tables[np.zeros(len(amounts), dtype=np.int64)]
     columns: dict[str, Any] = {}
@@ -94,6 +116,16 @@ def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:
 
 
 def wrapped_between(tables: Tables, other: Tables, entry: Entry) -> Reals:
-    """By how much (H,) an entry of tables is more than another's, m or rad; angles within half a turn."""
+    """By how much an entry of tables is more than another's.
+
+    Parameters
+    ----------
+    tables, other : H each, or one that is compared with all
+    entry : of rows; not of base or tool
+
+    Returns
+    -------
+    difference : (H,), m or rad; angles in [-pi, pi)
+    """
     off = entry.of(tables) - entry.of(other)
     return off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi

@@ -44,7 +44,7 @@ Parts = tuple[Reals, Reals, Reals]
 """Of a matrix, its singular value decomposition."""
 
 EXACTLY_PARALLEL = 1e-5  # rad; below it a common normal has no digits left
-NEARLY_PARALLEL = math.radians(3.0)
+NEARLY_PARALLEL = math.radians(3.0)  # below it a common normal can be far outside the arm
 ON_AXIS = 1e-9  # m
 MAX_SENSES = 6
 MAX_ENTRIES = 4
@@ -64,7 +64,17 @@ class Tolerances:
     angle: float = math.radians(TOLERANCE_DEG)
 
     def exceeded(self, zeros: Reals, sliding: Flags) -> Flags:
-        """Which zeros (m,), rad or m, of rows that turn or slide, differ by more."""
+        """Which zeros differ by more.
+
+        Parameters
+        ----------
+        zeros : (m,), rad, or m for rows that slide
+        sliding : (m,) bool
+
+        Returns
+        -------
+        exceeded : (m,) bool
+        """
         return np.asarray(np.abs(zeros) > np.where(sliding, self.length, self.angle))
 
 
@@ -99,9 +109,16 @@ class Mechanism:
 
 
 def mechanism_of(robot: Robot, *, ends: bool = True, **otherwise: Reals | str) -> Mechanism:
-    """A robot's table without its tool; ``otherwise`` : columns, and a convention, that stand in for the robot's.
+    """A robot's table in standard form, without its tool.
 
-    Without ``ends`` base and flange are left out: they are 1.
+    Parameters
+    ----------
+    ends : False to leave out base and flange: they are identities then
+    otherwise : columns (m,), m or rad, and a convention, in place of the robot's
+
+    Returns
+    -------
+    mechanism : modified (Craig) rows are read as standard ones, m and rad
     """
     table = {key: otherwise.get(key, getattr(robot, key)) for key in (*_COLUMNS, "convention")}
     a, alpha, beta, d, offset = (np.array(table[column], float) for column in _COLUMNS)
@@ -181,7 +198,16 @@ def _measured_at(mechanism: Mechanism, k: int, height: float | None) -> Mechanis
 
 
 def by_normals(mechanism: Mechanism) -> Mechanism:
-    """The arm with beta = 0 wherever axes are not parallel to ``EXACTLY_PARALLEL``."""
+    """The arm with beta = 0 wherever neighbouring axes are not parallel to within ``EXACTLY_PARALLEL``.
+
+    Parameters
+    ----------
+    mechanism : with any beta
+
+    Returns
+    -------
+    mechanism : the same axes, its links measured along common normals
+    """
     for k in np.flatnonzero(mechanism.beta):
         if mechanism.between[k] > EXACTLY_PARALLEL:
             mechanism = _measured_at(mechanism, int(k), None)
@@ -189,8 +215,18 @@ def by_normals(mechanism: Mechanism) -> Mechanism:
 
 
 def without_far_normals(mechanism: Mechanism) -> Mechanism:
-    """The arm with links between nearly parallel axes measured within it, where their normal is farther along an axis
-    than all lengths a together."""
+    """The arm with links between nearly parallel axes measured within it, where their normal lies far outside.
+
+    Far is farther along an axis than all lengths a together. Such entries differ by much where axes differ by little.
+
+    Parameters
+    ----------
+    mechanism : with common normals
+
+    Returns
+    -------
+    mechanism : the same axes, with beta other than 0 in such links
+    """
     angles, far = mechanism.between, float(np.abs(mechanism.a).sum())
     for k in np.flatnonzero((angles > 0) & (angles < NEARLY_PARALLEL)):
         d = mechanism.d
@@ -200,7 +236,17 @@ def without_far_normals(mechanism: Mechanism) -> Mechanism:
 
 
 def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanism:
-    """The same arm with axes turned over (senses (m,), +1 or -1) and normals turned over (normals (m - 1,))."""
+    """The same arm with axes and common normals turned over: signs, and half turns of alpha and theta [1]_ [2]_.
+
+    Parameters
+    ----------
+    senses : (m,), +1 or -1, of the axes
+    normals : (m - 1,), +1 or -1, of the common normals between them
+
+    Returns
+    -------
+    mechanism : base and flange turned by half a turn about x where the first or last axis is turned over
+    """
     folded = senses[:-1] * senses[1:] < 0
     beside = np.concatenate([[1.0], normals, [1.0]])
     over = [HALF_TURN if senses[k] < 0 else np.eye(4) for k in (0, -1)]
@@ -324,7 +370,7 @@ class EntryDifference:
 
     @property
     def size(self) -> float:
-        """By how much it differs, m or rad."""
+        """By how much the entry differs, m or rad, angles within half a turn."""
         gap = self.other - self.one
         return abs(gap if self.column in ("a", "d") else float(wrap_to_pi(np.array(gap))))
 
@@ -365,8 +411,13 @@ class Match:
 
     @property
     def rank(self) -> tuple[float, int, float, float]:
-        """Less is a better match: fewer entries (beta, which few tables have, counts more), fewer conventions, smaller
-        differences."""
+        """What less of is a better match.
+
+        Returns
+        -------
+        entries, layers : how many entries differ (beta, which few tables have, counts more), and how many conventions
+        size, turns : sum of the entries' differences (m and rad), and turns of base and flange (rad)
+        """
         entries = sum(1.5 if each.column == "beta" else 1.0 for each in self.differences)
         size = sum(each.size for each in self.differences)
         turns = turn_of(self.base) + turn_of(self.flange)
@@ -376,7 +427,14 @@ class Match:
 def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
     """The match by which the fewest entries differ, and of those the one with the fewest differences of convention.
 
-    Both need the same number of rows, of the same kinds.
+    Parameters
+    ----------
+    one, other : with the same number of rows, of the same kinds
+    tolerances : in m and rad
+
+    Returns
+    -------
+    match : of ``other`` brought onto ``one``
     """
     found = _best_match(one, other, tolerances)
     assert found is not None
@@ -384,14 +442,35 @@ def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
 
 
 def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
-    """Whether no entry of geometry differs; much faster than :func:`match` where many do."""
+    """Whether no entry of geometry differs; much faster than :func:`match` where many do.
+
+    Parameters
+    ----------
+    one, other : with the same number of rows, of the same kinds
+    tolerances : in m and rad
+
+    Returns
+    -------
+    same : zeros, directions, base and flange may differ
+    """
     if _links_differ(one, other, tolerances):
         return False
     return _best_match(one, other, tolerances, may_differ=False) is not None
 
 
 def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_layers: int) -> bool:
-    """Whether geometry, zeros and directions agree, with ``most_layers`` of base and flange at most."""
+    """Whether geometry, zeros and directions agree, so that equal joint values move both arms alike.
+
+    Parameters
+    ----------
+    one, other : with the same number of rows, of the same kinds
+    tolerances : in m and rad
+    most_layers : how many of base and flange may differ
+
+    Returns
+    -------
+    agree : for any of the likely senses of axes and normals
+    """
     least = np.where(one.sliding, tolerances.length, tolerances.angle)
     return any(
         found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
@@ -545,12 +624,31 @@ def _settled_at(
 
 
 def is_identity(T: Reals, tolerances: Tolerances) -> bool:
-    """Whether a transform moves nothing by more than the tolerances."""
+    """Whether a transform moves nothing by more than the tolerances.
+
+    Parameters
+    ----------
+    T : (4, 4), m
+    tolerances : m for its position, rad for its rotation
+
+    Returns
+    -------
+    identity : True also exactly at a tolerance
+    """
     return bool(np.linalg.norm(T[:3, 3]) <= tolerances.length and turn_of(T) <= tolerances.angle)
 
 
 def turn_of(T: Reals) -> float:
-    """Angle (rad) by which a transform (4, 4) turns."""
+    """Angle by which a transform turns, from sine and cosine both.
+
+    Parameters
+    ----------
+    T : (4, 4)
+
+    Returns
+    -------
+    angle : rad, 0 to pi
+    """
     R = T[:3, :3]
     skew = math.hypot(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
     return math.atan2(skew, R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
@@ -762,6 +860,10 @@ def mechanism_from_axes(directions: Reals, points: Reals, flange: Reals, angle: 
     directions, points : (m, 3), of positive rotation, and on each line, m, in the base's frame
     flange : (4, 4) at these joint values
     angle : rad, below which neighbouring axes are parallel
+
+    Returns
+    -------
+    mechanism : of m rows that turn, its links along common normals
     """
     m = len(directions)
     z = directions / np.linalg.norm(directions, axis=1)[:, None]

@@ -89,12 +89,15 @@ class Conventions:
 
 
 def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
-    """How references define zeros, directions, base and flange of a table otherwise; None if that is not the reason
-    why they are missed, or if they don't state all joint axes.
+    """How references define zeros, directions, base and flange of a table otherwise.
 
     Parameters
     ----------
     references : that all state a value; limits don't count here, but are set right besides
+
+    Returns
+    -------
+    conventions : None if that is not the reason why references are missed, or if they don't state all joint axes
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
         return None
@@ -110,12 +113,17 @@ def counted_from_ground(
     robot: Robot, references: Sequence[Reference], limits_besides: bool = False
 ) -> list[Conventions]:
     """Which joint references count from the ground (J3 - J2), so that all of them are met, in each way that does it.
+
     Its limits may be stated either way: of the table's joint, or of the one counted so.
 
     Parameters
     ----------
     references : as of :func:`conventions_of`
-    limits_besides : where positions tell, limits that are other ones, as those of a linkage often are, are set right
+    limits_besides : where positions show it, limits that are other ones, as those of a linkage often are, are set right
+
+    Returns
+    -------
+    conventions : one for each way; empty for arms with coupled or sliding joints
     """
     if robot.coupling is not None or robot.sliding.any():
         return []
@@ -163,8 +171,17 @@ def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer:
 
 
 def described_by(robot: Robot, references: Sequence[Reference]) -> Robot | None:
-    """The table corrected by comparison with the arm whose axes references state, with its base moved to theirs; None
-    if they don't state all axes."""
+    """The table corrected by comparison with the arm whose axes references state.
+
+    Parameters
+    ----------
+    references : those that do not depend on the table are left out
+
+    Returns
+    -------
+    robot : with its base moved to the stated one
+        None if they don't state all axes, or for arms with coupled or sliding joints
+    """
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = None if robot.coupling is not None or robot.rows != robot.joints else _lines(stated, robot.joints)
     return _matched(robot, stated, lines, lines[-1])[1] if lines and not robot.sliding.any() else None

@@ -29,13 +29,22 @@ from er3a.references.reference import (
 )
 from er3a.robots.robot import Robot
 
-REACH_STARTS = 40
+REACH_STARTS = 40  # local searches for each extreme
 TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5
 
 
 def unseen_of(case: Case) -> tuple[str, ...]:
-    """Entries that no reference reacts to at any value, and joints that could be reversed."""
+    """Entries that no reference reacts to at any value tried, and joints that could be reversed.
+
+    Parameters
+    ----------
+    case : a table and its references
+
+    Returns
+    -------
+    names : such as ``alpha6`` and ``direction5``; all entries if no reference is about the arm's shape
+    """
     before = case.difference(case.given)[0]
     entries = [number for number in case.numbers if number.joint]
     if not entries:
@@ -60,7 +69,18 @@ def _reversible(case: Case, before: Reals) -> list[str]:
 
 
 def missed(case: Case, number: Entry, amounts: Reals, before: Reals | float = 0.0) -> Flags:
-    """Whether (H,) some reference is missed with amounts (H,) added to an entry, a difference ``before`` apart."""
+    """Whether some reference reacts when an entry is changed.
+
+    Parameters
+    ----------
+    number : the entry
+    amounts : (H,), m or rad, added to it
+    before : (n,), differences to the references from which changes are counted; 0 to count misses
+
+    Returns
+    -------
+    missed : (H,) bool, whether a change, or miss, is larger than a reference's uncertainty
+    """
     tables = case.given[np.zeros(len(amounts), dtype=int)]
     changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
     found: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
@@ -77,7 +97,12 @@ class Hypothesis(ByValue, Displayed, conclusions.RankedHypothesis):
     corrected: Robot
 
     def sheet(self) -> Sheet:
-        """A line: the faults and what remains without them."""
+        """What the notebook shows: the faults, and the greatest difference before and after, in the unit named.
+
+        Returns
+        -------
+        sheet : one line
+        """
         remains = f"{shortly(self.residual_before)} -> {shortly(self.residual_after)} {self.unit}"
         return Sheet(f"Hypothesis: {shortly(self.faults)}; greatest difference {remains}")
 
@@ -104,7 +129,12 @@ class Hypotheses(list[Hypothesis], Displayed):
     __repr__ = Displayed.__repr__
 
     def sheet(self) -> Sheet:
-        """A row for each, and what an empty list says nothing about."""
+        """What the notebook shows: a row for each hypothesis, and what an empty list says nothing about.
+
+        Returns
+        -------
+        sheet : best first
+        """
         heading = f"{len(self)} hypotheses" if self else "No hypothesis"
         if self.missed:
             heading += f"; reach that is missed: {len(self.missed)}"
@@ -114,7 +144,17 @@ class Hypotheses(list[Hypothesis], Displayed):
 
 
 def sheet_of(hypotheses: Sequence[Hypothesis], heading: str) -> Sheet:
-    """Hypotheses as a table."""
+    """Hypotheses as a table for the notebook.
+
+    Parameters
+    ----------
+    hypotheses : best first
+    heading : its first line
+
+    Returns
+    -------
+    sheet : their greatest differences before and after, in each one's unit
+    """
     rows = (
         (place + 1, each.faults, each.residual_before, each.residual_after, each.unit, each.explains)
         for place, each in enumerate(hypotheses)
@@ -144,7 +184,12 @@ class Diagnosis(ByValue, Displayed):
         return isinstance(self.conclusion, conclusions.MostLikelyFault | conclusions.MainFault)
 
     def sheet(self) -> Sheet:
-        """The conclusion, and a row for each hypothesis."""
+        """What the notebook shows: the conclusion, and a row for each hypothesis.
+
+        Returns
+        -------
+        sheet : best first
+        """
         heading = f"Diagnosis by {self.references} references, {self.tried} hypotheses tried"
         return sheet_of(self.hypotheses, f"{heading}: {shortly(self.conclusion)}")
 
@@ -169,14 +214,31 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hy
 
 
 def every_entry(robot: Robot) -> tuple[str, ...]:
-    """Names of all entries and directions of a table."""
+    """Names of all entries and directions of a table.
+
+    Parameters
+    ----------
+    robot : with m rows
+
+    Returns
+    -------
+    names : 5 m, such as ``a1`` and ``direction6``
+    """
     names = ("a", "alpha", "d", "offset", "direction")
     return tuple(f"{name}{row}" for name in names for row in range(1, robot.rows + 1))
 
 
 def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
-    """References about extremes over the limits, such as reach, that a table misses: authoritative ones if there are
-    any, without those that contradict each other; none of limits that are crossed."""
+    """References about extremes over the limits, such as reach, that a table misses.
+
+    Parameters
+    ----------
+    references : authoritative ones count alone if there are any; those that contradict each other don't count
+
+    Returns
+    -------
+    missed : by more than their uncertainty; none for arms whose limits are crossed
+    """
     if (robot.lower > robot.upper).any():
         return ()
     every = references.checkable if isinstance(references, ReferenceSet) else references
@@ -194,7 +256,16 @@ def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]
 
 
 def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:
-    """Hypotheses, and what they amount to."""
+    """Hypotheses about a table's faults, and what they amount to.
+
+    Parameters
+    ----------
+    references : those that state no value are left out
+
+    Returns
+    -------
+    diagnosis : the conclusion, with the hypotheses best first
+    """
     stated = usable(references)
     if not stated:
         return Diagnosis(conclusions.NothingToRestOn(), 0, 0, ())
@@ -289,9 +360,15 @@ def _best_left(ranking: Ranking, unit: Unit) -> float:
 
 
 def residuals(ranking: Ranking, difference: Reals) -> tuple[Reals, Reals, list[Unit]]:
-    """Differences (..., n) as lengths of vectors: residual (..., m), uncertainty (m,), and their units.
+    """Differences as lengths of vectors: the coordinates of one point are one residual.
 
-    The uncertainty of a vector is the largest of its coordinates'.
+    Parameters
+    ----------
+    difference : (..., n), to the ranking's references, in their units
+
+    Returns
+    -------
+    residual, uncertainty, units : (..., m), (m,) and m units; a vector's uncertainty is the largest of its coordinates'
     """
     vectors = vectors_of(ranking.references)
     _, uncertainty = expected_of(ranking.references)

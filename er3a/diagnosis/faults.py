@@ -175,7 +175,16 @@ CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere, Co
 
 
 def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
-    """What was wrong with an entry that is given with one value (m or rad; 1 for the scale) where another fits."""
+    """The fault of an entry that is given with one value where another fits.
+
+    Parameters
+    ----------
+    given, fits : m or rad; for the scale 1, and the factor that fits
+
+    Returns
+    -------
+    fault : its numbers in mm or deg
+    """
     given, fits = (float(value * entry.in_unit) for value in (given, fits))
     if entry.column == "scale":
         return WrongScale(fits)
@@ -185,7 +194,16 @@ def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
 
 
 def rounded(fault: Fault) -> Fault:
-    """The fault with fitted numbers to four digits and given ones to six: equal ones are the same fault."""
+    """The fault with fitted numbers to four digits and given ones to six: equal ones are the same fault.
+
+    Parameters
+    ----------
+    fault : of any kind
+
+    Returns
+    -------
+    fault : unchanged if it has no such numbers; the scale's factor to six digits
+    """
     if isinstance(fault, WrongLength):
         return replace(fault, given_mm=_digits(fault.given_mm, 6), fits_mm=_digits(fault.fits_mm, 4))
     if isinstance(fault, WrongOffset | WrongAlpha | WrongAlphaSign | WrongLimit):
@@ -196,7 +214,16 @@ def rounded(fault: Fault) -> Fault:
 
 
 def entry_of(fault: Fault) -> str | None:
-    """The one entry of the table that a fault is in, such as "d4", "alpha3", "lower2"; None if it is in several."""
+    """The one entry of the table that a fault is in.
+
+    Parameters
+    ----------
+    fault : of any kind
+
+    Returns
+    -------
+    name : such as ``d4``, ``alpha3`` or ``lower2``; None if it is in several
+    """
     match fault:
         case WrongLength(joint, column):
             return f"{column}{joint}"
@@ -214,7 +241,16 @@ def entry_of(fault: Fault) -> str | None:
 
 
 def place_of(fault: Fault) -> str | Fault:
-    """The entry that a fault is in; the fault itself if it is in several."""
+    """Where a fault is, to gather faults at one place.
+
+    Parameters
+    ----------
+    fault : of any kind
+
+    Returns
+    -------
+    place : the name of its entry; the rounded fault itself if it is in several
+    """
     return entry_of(fault) or rounded(fault)
 
 
@@ -247,11 +283,16 @@ class Repair:
 
 
 def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repair]:
-    """All repairs that change the given table (a batch of one).
+    """All repairs without free number that change the given table.
 
     Parameters
     ----------
+    given : a batch of one
     references : a limit that they contradict is a repair, with the value that they state
+
+    Returns
+    -------
+    repairs : each with the fault that it corrects
     """
     joints, alphas = range(given.a.shape[-1]), np.degrees(given.alpha[0]).tolist()
     candidates = [
@@ -271,8 +312,16 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
 
 
 def limit_repairs(given: Tables, references: Sequence[Reference]) -> list[Repair]:
-    """Each limit that references contradict, at the middle of what they leave open; where they state no limit, at the
-    farthest pose that they show."""
+    """Repairs of limits that references contradict.
+
+    Parameters
+    ----------
+    given : a batch of one table
+
+    Returns
+    -------
+    repairs : to the middle of what references leave open; where they state no limit, to the farthest pose shown
+    """
     found = []
     for joint in range(given.a.shape[-1]):
         for side in SIDES:
@@ -285,7 +334,18 @@ def limit_repairs(given: Tables, references: Sequence[Reference]) -> list[Repair
 
 
 def limit_stated(joint: int, side: Side, now: float, references: Sequence[Reference]) -> float | None:
-    """What references say (deg) about a limit that is ``now``; None if they don't contradict it."""
+    """What references say about a joint's limit, if they contradict it.
+
+    Parameters
+    ----------
+    joint : from 0
+    side : ``lower`` or ``upper``
+    now : deg, the table's limit
+
+    Returns
+    -------
+    limit : deg, the middle of what they leave open, or the farthest pose shown; None if they don't contradict it
+    """
     stated = [r for r in references if r.quantity == Limit(joint + 1, side) and r.expected is not None]
     if stated:
         expected, uncertainty = expected_of(stated)

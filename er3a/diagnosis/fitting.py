@@ -30,7 +30,16 @@ ANGLES = ("alpha", "offset")
 
 
 def free_numbers(joints: int) -> tuple[Entry, ...]:
-    """All free numbers of a table; the scale first, so that it is applied before a length is set."""
+    """All free numbers of a table; the scale first, so that it is applied before a length is set.
+
+    Parameters
+    ----------
+    joints : number of rows
+
+    Returns
+    -------
+    entries : the scale, then each column from row 1 on
+    """
     return (Entry("scale"), *(Entry(column, joint) for column in COLUMNS for joint in range(1, joints + 1)))
 
 
@@ -39,19 +48,24 @@ def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Re
 
     Parameters
     ----------
+    tables : one, or H
     which : (H, k), the places among ``numbers`` of the k entries to change in each table
     amounts : (H, k), m or rad; relative for the scale
+
+    Returns
+    -------
+    tables : H
     """
     every = np.zeros((len(which), len(numbers)))
     np.put_along_axis(every, which, amounts, axis=1)
     return shifted(tables, numbers, every)
 
 
-PROBE = 1e-6
-MEETS = 1.0 + 1e-6
+PROBE = 1e-6  # m or rad, of one-sided differences
+MEETS = 1.0 + 1e-6  # half-widths, with what rounding may add
 CURVED = 1.5
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e4
-EASED, STIFFENED = 0.1, 10.0
+EASED, STIFFENED = 0.1, 10.0  # factors of the damping after a step that lowers residuals, and after another
 TINY = 1e-12
 STALLED = 1e-4  # of the squares, by which a step has to lower them
 QUIET = 0.03  # weight of what is met
@@ -86,7 +100,17 @@ class Fits:
         return Fits(self.start[rows], self.which[rows], self.amounts[rows], self.left[rows])
 
     def with_rows(self, rows: Integers, better: Fits) -> Fits:
-        """A copy with some rows replaced."""
+        """A copy with some rows replaced.
+
+        Parameters
+        ----------
+        rows : (R,), numbers
+        better : R fits, of the same free numbers
+
+        Returns
+        -------
+        fits : with their amounts and residuals
+        """
         amounts, left = self.amounts.copy(), self.left.copy()
         amounts[rows], left[rows] = better.amounts, better.left
         return Fits(self.start, self.which, amounts, left)
@@ -113,12 +137,32 @@ class Search:
     residual: Residual
 
     def at(self, start: Integers, which: Integers, amounts: Reals) -> Fits:
-        """Free numbers with given values."""
+        """Tables with amounts added to free numbers, and their residuals.
+
+        Parameters
+        ----------
+        start : (B,), numbers of start tables
+        which : (B, k), places in ``numbers``
+        amounts : (B, k), m or rad; for the scale, the factor's share beyond 1
+
+        Returns
+        -------
+        fits : with residuals (B, n) in half-widths
+        """
         tables = moved(self.starts[start], self.numbers, which, amounts)
         return Fits(start, which, amounts, self.residual(tables))
 
     def of(self, fits: Fits) -> Model:
-        """Residuals of the rows of fits with other amounts."""
+        """Residuals as a function of the amounts, for solvers.
+
+        Parameters
+        ----------
+        fits : B of them, whose start tables and free numbers are kept
+
+        Returns
+        -------
+        model : from amounts (R, k) and rows (R,) of the fits to residuals (R, n)
+        """
         return lambda amounts, rows: self.at(fits.start[rows], fits.which[rows], amounts).left
 
 
@@ -127,7 +171,19 @@ Model = Callable[[Reals, Integers], Reals]
 
 
 def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers | None = None) -> Reals:
-    """Derivatives (R, n, k) of residuals (R, n) with respect to amounts (R, k)."""
+    """Derivatives of residuals by one-sided differences.
+
+    Parameters
+    ----------
+    model : of amounts and rows
+    amounts : (R, k), m or rad
+    left : (R, n), residuals there
+    rows : (R,), which the amounts belong to; None for 0 to R - 1
+
+    Returns
+    -------
+    slopes : (R, n, k), half-widths per m or rad
+    """
     rows, k = np.arange(len(amounts)) if rows is None else rows, amounts.shape[1]
     ahead = (amounts[:, None] + PROBE * np.eye(k)).reshape(-1, k)
     beside = model(ahead, np.repeat(rows, k)).reshape(len(rows), k, -1)
@@ -145,14 +201,19 @@ def lowered(
     floor: float = FLOOR,
     widest: Reals | float = np.inf,
 ) -> tuple[Reals, Reals]:
-    """Damped least squares from many starts at once; none gets worse.
+    """Damped least squares from many starts at once [1]_; none gets worse.
 
     Parameters
     ----------
     amounts : (R, k), where to start; held : (R, k), those that stay
     within : what of residuals (R, n) counts; what does not, being met, is moved as little as will do
+    passes : steps at most
     floor : of the largest slope squared, as which smaller ones are damped
     widest : (k,), by how much amounts may be away from 0
+
+    Returns
+    -------
+    amounts, off : (R, k), and the model's residuals (R, n) there
     """
     amounts = np.clip(amounts, -widest, widest)
     off = model(amounts, np.arange(len(amounts)))
@@ -181,14 +242,35 @@ def lowered(
 
 
 def descend(search: Search, fits: Fits, passes: int) -> Fits:
-    """Smallest sum of squares from where ``fits`` are; no row gets worse."""
+    """Smallest sum of squares from where fits are, by damped least squares [1]_.
+
+    Parameters
+    ----------
+    fits : B of them
+    passes : how many steps at most
+
+    Returns
+    -------
+    fits : no row is worse than before
+    """
     if not len(fits):
         return fits
     return Fits(fits.start, fits.which, *lowered(search.of(fits), fits.amounts, passes=passes))
 
 
 def meet(search: Search, fits: Fits) -> Fits:
-    """Minimax residual, where some reference is missed although the sum of squares leaves open that none is."""
+    """Smallest greatest residual, by Lawson's weights [2]_.
+
+    Only where some reference is missed although the sum of squares leaves open that none is.
+
+    Parameters
+    ----------
+    fits : B of them, at least sums of squares
+
+    Returns
+    -------
+    fits : no row's greatest residual is larger than before
+    """
     for _ in range(ROUNDS):
         open_rows = np.flatnonzero((fits.greatest > MEETS) & (fits.squares <= CURVED * fits.left.shape[1]))
         if not len(open_rows):
@@ -204,11 +286,16 @@ def meet(search: Search, fits: Fits) -> Fits:
 
 
 def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
-    """Steps (B, k) that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``.
+    """Steps that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``, by Lawson's weights [2]_.
 
     Parameters
     ----------
     slopes : (B, n, k); left : (B, n)
+    enough : in the unit of ``left``
+
+    Returns
+    -------
+    steps : (B, k); 0 where none lowers the largest
     """
     weights = np.full(left.shape, 1 / left.shape[1])
     best, least = np.zeros((len(left), slopes.shape[2])), np.abs(left).max(axis=1)
@@ -264,7 +351,17 @@ DENSE = ScanGrid(24, (-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.03, 0.1, 0.25, 0.5,
 
 
 def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanGrid) -> Fits:
-    """The lowest places of the grid, for every start table and every combination of as many free numbers."""
+    """The lowest places of a grid, for every start table and every combination of free numbers.
+
+    Parameters
+    ----------
+    combinations : places in ``search.numbers``, of equally many each
+    grid : how finely to look
+
+    Returns
+    -------
+    fits : up to ``grid.basins`` for each start table and combination
+    """
     reach, starts = arm_lengths(search.starts), len(search.starts)
     amounts, which, sizes = list[Reals](), list[Integers](), list[tuple[int, ...]]()
     for combination in combinations:
@@ -287,14 +384,33 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
 
 
 def grid_of(number: Entry, grid: ScanGrid) -> Reals:
-    """Amounts to try: rad, or in units of the arm's length."""
+    """Amounts of a free number to try.
+
+    Parameters
+    ----------
+    number : an angle, a length, or the scale
+    grid : how finely to look
+
+    Returns
+    -------
+    amounts : (k,), rad over a whole turn, or lengths in units of the arm's length; 0 alone for the scale
+    """
     if number.column in ANGLES:
         return 2 * np.pi * np.arange(grid.angles) / grid.angles
     return np.array(grid.lengths if number.joint else (0.0,))
 
 
 def arm_lengths(tables: Tables) -> Reals:
-    """Sum (m) of all lengths of each table, (H,)."""
+    """Sum of the sizes of all lengths a and d of each table.
+
+    Parameters
+    ----------
+    tables : H of them
+
+    Returns
+    -------
+    lengths : (H,), m; 1 for a table whose lengths are all 0
+    """
     lengths: Reals = np.abs(tables.a).sum(axis=1) + np.abs(tables.d).sum(axis=1)
     return np.where(lengths > 0, lengths, 1.0)
 

@@ -40,7 +40,7 @@ from er3a.references.quantities import Extreme, Speed, Unit
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
-FREE_NUMBER = 1.5
+FREE_NUMBER = 1.5  # cost of a fault with a free number, in those of one without
 UNCHANGED = 1e-9
 MIN_SCALE = 1e-3
 DECIMALS = 12
@@ -74,7 +74,16 @@ class Pool:
         return np.array([len(faults) for faults in self.faults])
 
     def explains(self, uncertainty: Reals) -> Flags:
-        """Whether each hypothesis meets all references, (H,)."""
+        """Whether each hypothesis meets all references.
+
+        Parameters
+        ----------
+        uncertainty : (n,), half-widths in the references' units
+
+        Returns
+        -------
+        explains : (H,) bool
+        """
         met: Flags = np.all(np.abs(self.difference) <= uncertainty * fitting.MEETS, axis=1)
         return met
 
@@ -118,16 +127,45 @@ class Case:
         return np.array([each.quantity.depends_on_table for each in self.references])
 
     def search(self, starts: Tables) -> fitting.Search:
-        """A search from start tables; what is said about limits depends on no free number and is left out."""
+        """A search from start tables; what is said about limits depends on no free number and is left out.
+
+        Parameters
+        ----------
+        starts : one table or more
+
+        Returns
+        -------
+        search : over all free numbers of the table
+        """
         return fitting.Search(starts, self.numbers, self._residual)
 
     def pool(self, tables: Tables, faults: list[Faults], cost: Reals) -> Pool:
-        """Hypotheses with what is left."""
+        """Hypotheses with what is left between their tables and the references.
+
+        Parameters
+        ----------
+        tables : H, repaired
+        faults : H, of each
+        cost : (H,), of the faults
+
+        Returns
+        -------
+        pool : with differences (H, n) in the references' units
+        """
         return Pool(tables, self.difference(tables), faults, cost)
 
 
 def single_faults(case: Case) -> Pool:
-    """All single faults, free numbers at their best values."""
+    """All single faults, free numbers at their best values.
+
+    Parameters
+    ----------
+    case : a table and its references
+
+    Returns
+    -------
+    pool : repairs first, then free numbers
+    """
     repairs = case.repairs
     pools = [case.pool(join([repair.apply(case.given) for repair in repairs]), *_named([(each,) for each in repairs]))]
     if case.numbers:
@@ -138,18 +176,46 @@ def single_faults(case: Case) -> Pool:
 
 
 def double_faults(case: Case) -> Pool:
-    """All pairs of faults, free numbers at their best values."""
+    """All pairs of faults, free numbers at their best values.
+
+    Parameters
+    ----------
+    case : a table and its references
+
+    Returns
+    -------
+    pool : two repairs, a repair and a number, two numbers
+    """
     return joined_pools([_two_repairs(case), *((_repair_and_number(case), _two_numbers(case)) if case.numbers else ())])
 
 
 def every_pair_refitted(case: Case) -> Pool:
-    """All pairs with a free number, from more places and to the end, however little promise they show: what tells
-    whether the pairs that explain are all that do."""
+    """All pairs with a free number, from more places and to the end, however little promise they show.
+
+    This shows whether the pairs that explain the references are all that do.
+
+    Parameters
+    ----------
+    case : a table and its references, of which one at least is about the arm's shape
+
+    Returns
+    -------
+    pool : a repair and a number, two numbers
+    """
     return joined_pools([_repair_and_number(case, thorough=True), _two_numbers(case, thorough=True)])
 
 
 def joined_pools(pools: Sequence[Pool]) -> Pool:
-    """All hypotheses of several pools, in order."""
+    """All hypotheses of several pools, in order.
+
+    Parameters
+    ----------
+    pools : at least one, of the same references
+
+    Returns
+    -------
+    pool : one after another
+    """
     return Pool(
         tables=join([pool.tables for pool in pools]),
         difference=np.concatenate([pool.difference for pool in pools]),
@@ -266,7 +332,7 @@ def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
     return fits[kept]
 
 
-SHOWN = 10
+SHOWN = 10  # groups of hypotheses
 UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
@@ -293,7 +359,12 @@ class Ranking(Displayed):
     references: tuple[Reference, ...]
 
     def sheet(self) -> Sheet:
-        """A line: how many were tried, and how many groups of them explain something."""
+        """What the notebook shows: how many hypotheses were tried, and how many groups of them explain something.
+
+        Returns
+        -------
+        sheet : one line
+        """
         tried, stated = len(self.pool.faults), len(self.references)
         return Sheet(
             f"Ranking of {tried} hypotheses by {stated} references: {len(self.groups)} groups explain them better"
@@ -301,13 +372,31 @@ class Ranking(Displayed):
 
 
 def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
-    """Rank all hypotheses; None if there is nothing to explain."""
+    """Rank single and double faults of a table, by the score of the module's text.
+
+    Parameters
+    ----------
+    references : those that state no value are left out
+
+    Returns
+    -------
+    ranking : None if there is nothing to explain
+    """
     stated = usable(references)
     return rank_case(case_of(robot, stated)) if stated else None
 
 
 def rank_case(case: Case) -> Ranking | None:
-    """Rank all hypotheses about a table; None if there is nothing to explain."""
+    """Rank all hypotheses about a table: pairs only if no single fault meets all references.
+
+    Parameters
+    ----------
+    case : a table and its references
+
+    Returns
+    -------
+    ranking : None if the table meets all references
+    """
     stated = case.references
     before = case.difference(case.given)[0]
     if (np.abs(before) <= case.uncertainty * fitting.MEETS).all():
@@ -327,7 +416,16 @@ def rank_case(case: Case) -> Ranking | None:
 
 
 def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
-    """A robot's table and the references that it is held against."""
+    """A robot's table and the references that it is held against.
+
+    Parameters
+    ----------
+    stated : n references, which all state a value
+
+    Returns
+    -------
+    case : its difference predicts each distinct quantity once
+    """
     expected, _ = expected_of(stated)
     measured = [(type(each), tuple(vars(each).values())) for each in quantities_of(stated)]
     first = {key: each for key, each in reversed(list(zip(measured, quantities_of(stated))))}
@@ -342,8 +440,16 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
     """The references that a diagnosis rests on: single poses and limits, authoritative ones if there are any.
 
-    Extremes over the limits are left out, because they take a search for every hypothesis, and so are references that
+    Extremes over the limits are left out, because they take a search for every hypothesis. So are references that
     contradict each other, which no table could meet.
+
+    Parameters
+    ----------
+    references : of which those that state no value are left out
+
+    Returns
+    -------
+    references : in the given order
     """
     every = references.checkable if isinstance(references, ReferenceSet) else references
     stated = [r for r in every if r.expected is not None and not isinstance(r.quantity, Extreme | Speed)]
@@ -374,7 +480,16 @@ class _Groups:
     uncertainty: Reals
 
     def found(self, untouched: float) -> tuple[tuple[int, ...], ...]:
-        """The sets, best first."""
+        """The sets, best first: those that explain everything are one set.
+
+        Parameters
+        ----------
+        untouched : score of the unchanged table; hypotheses that score no better are dropped
+
+        Returns
+        -------
+        groups : up to ``SHOWN``, rows of the pool, the best row first
+        """
         groups = [self._explaining()] if self.explains.any() else []
         placed = {row for group in groups for row in group}
         alone: set[Fault] = set()

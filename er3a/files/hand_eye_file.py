@@ -157,7 +157,7 @@ class StandardDeviations(StrictModel):
         return self
 
     def covariance(self) -> Reals:
-        """Covariance (6, 6) of a pose, m^2 and rad^2: first the position, then the rotation, about the axes of its frame."""
+        """Covariance (6, 6) of a pose, m^2 and rad^2: of its position, then of its rotation about its own axes."""
         position = np.broadcast_to(np.array(self.position_mm) / 1000, 3)
         return np.diag(np.concatenate([position, np.broadcast_to(np.radians(self.rotation_deg), 3)]) ** 2)
 

@@ -28,7 +28,7 @@ from er3a.references.quantities import Quantity, value_at
 from er3a.references.seen import TableEntry
 from er3a.robots.robot import Robot
 
-MAX_TOGETHER = 4
+MAX_TOGETHER = 4  # flips in a combination
 PATTERNS_UP_TO = 6
 MAX_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
@@ -59,7 +59,16 @@ class Flip:
         return (self.entry.name,)
 
     def apply(self, table: Tables) -> Tables:
-        """Tables with it."""
+        """Tables with the change.
+
+        Parameters
+        ----------
+        table : H of them
+
+        Returns
+        -------
+        tables : H, rad
+        """
         if self.entry is None:
             return replace(table, modified=~table.modified)
         j = self.entry.joint - 1
@@ -74,13 +83,31 @@ class Flip:
 
 
 def half_turn(angle: Reals) -> Reals:
-    """Half a turn further, kept within (-pi, pi] as people write angles."""
+    """Half a turn further, kept within (-pi, pi] as people write angles.
+
+    Parameters
+    ----------
+    angle : (...,), rad
+
+    Returns
+    -------
+    angle : (...,), rad
+    """
     turned = angle + np.pi
     return np.where(turned > np.pi + FITTED_RAD, turned - 2 * np.pi, turned)
 
 
 def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
-    """The changes of a robot's table, the likeliest to be mistaken first."""
+    """The discrete changes of a robot's table, the likeliest to be mistaken first.
+
+    Parameters
+    ----------
+    quantities : of references; joints may also be reversed about the angles at which these look
+
+    Returns
+    -------
+    flips : directions, half turns, signs, and last the convention
+    """
     joints = range(1, len(robot.a) + 1)
     found = [Flip("reversed", Entry("direction", j)) for j in joints]
     for j in joints:
@@ -96,8 +123,17 @@ def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
 
 
 def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
-    """Combinations to try, by how many flips are in them: all up to four; of directions and half turns of offsets, for
-    arms of up to six joints, all of them."""
+    """Combinations of flips to try, by how many flips are in them.
+
+    Parameters
+    ----------
+    flips : as of :func:`flips_of`
+
+    Yields
+    ------
+    combinations : places of flips, of one size; all up to four, of directions and half turns of offsets all of them for
+        arms of up to six joints
+    """
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg and flip.entry is not None]
     turning = [i for i in basic if flips[i].entry.column in ("direction", "offset")]  # type: ignore[union-attr]
     most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MAX_TOGETHER
@@ -118,7 +154,17 @@ def _apart(flips: Sequence[Flip], chosen: tuple[int, ...]) -> bool:
 
 
 def changed(table: Tables, flips: Sequence[Flip], chosen: Sequence[tuple[int, ...]]) -> Tables:
-    """Tables with each combination of flips."""
+    """Tables with each combination of flips.
+
+    Parameters
+    ----------
+    table : a batch of one
+    chosen : H combinations, places of flips
+
+    Returns
+    -------
+    tables : H
+    """
     batch = table[np.zeros(len(chosen), dtype=np.int64)]
     for i, flip in enumerate(flips):
         rows = np.array([i in each for each in chosen])
@@ -136,8 +182,8 @@ def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
     return join([batch[~rows], own])[order]
 
 
-CHUNK = 1024
-NO_WORSE = 1e-6
+CHUNK = 1024  # combinations that are tried at once
+NO_WORSE = 1e-6  # half-widths, by which an alternative may miss more than the table does
 SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of another robot
 MAX_COMPOSED = 2048
 
@@ -166,7 +212,17 @@ class Alternative(ByValue):
 
 
 def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]:
-    """Minimal combinations of discrete changes that are the same robot."""
+    """Minimal combinations of discrete changes that are the same robot.
+
+    Parameters
+    ----------
+    tool : of the robot, over its joint ranges
+    flips : as of :func:`flips_of`
+
+    Returns
+    -------
+    names : of the entries that each combination changes
+    """
     own = tool.signature(tool.table)[0]
     found: list[tuple[int, ...]] = []
     basic = [i for i, flip in enumerate(flips) if not flip.about_deg]
@@ -179,7 +235,17 @@ def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]
 
 
 def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) -> Tables:
-    """A table (a batch of one) with the entries of several alternatives."""
+    """A table with the entries of several alternatives.
+
+    Parameters
+    ----------
+    table : a batch of one
+    readings : no two with the same entry; names that are no entries of the robot are left out
+
+    Returns
+    -------
+    table : a batch of one, SI
+    """
     by_name = {entry.name: entry for entry in entries_of(robot)}
     for name, value in (pair for each in readings for pair in each.entries):
         if name in by_name:
@@ -189,8 +255,18 @@ def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) 
 
 
 def alternatives_to(table: Tables, asked: Asked, tool: ToolRange) -> list[Alternative]:
-    """Minimal alternatives to a table (a batch of one) that requirements allow: all that the table meets are met, and
-    none is missed by more; without those that move no tool."""
+    """Minimal alternatives to a table that requirements allow.
+
+    All that the table meets are met, and none is missed by more; without those that move no tool.
+
+    Parameters
+    ----------
+    table : a batch of one
+
+    Returns
+    -------
+    alternatives : smallest combinations first
+    """
     flips = flips_of(asked.robot, [each.quantity for each in asked.order])
     search = _AlternativeSearch(table, asked, tool, flips)
     for chosen in sets_of(flips):
@@ -218,7 +294,12 @@ class _AlternativeSearch:
         self.allowed: list[tuple[int, ...]] = []
 
     def try_all(self, chosen: list[tuple[int, ...]]) -> None:
-        """Try combinations of one size."""
+        """Try combinations of one size, and keep those that are allowed.
+
+        Parameters
+        ----------
+        chosen : places of flips; those that contain an allowed combination are left out
+        """
         candidates = [each for each in chosen if not _holds(each, self.allowed)]
         for start in range(0, len(candidates), CHUNK):
             part = candidates[start : start + CHUNK]

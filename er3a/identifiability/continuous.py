@@ -44,8 +44,17 @@ FIRST_PUSH, FINE, MOST_PUSHES = 0.1, 0.01, 26  # of an entry's scale; of what wa
 
 
 def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Tables:
-    """A robot's rows (a batch of one) as near as they can be written to a region's table, above all in the entries at
-    places ``watched``; of equals those with fewer joints reversed."""
+    """A robot's rows as near as they can be written to a region's table.
+
+    Parameters
+    ----------
+    own : a batch of one
+    watched : places of the region's entries that count most
+
+    Returns
+    -------
+    rows : a batch of one, the same robot; of equally near ones those with fewer joints reversed
+    """
     every = same_robots(own)
     apart = list(REVERSED_RAD * (every.direction != region.table.direction).T)
     for place, entry in enumerate(region.entries):
@@ -55,8 +64,16 @@ def nearest_rows(own: Tables, region: Region, watched: Collection[int]) -> Table
 
 
 def same_robots(table: Tables) -> Tables:
-    """The rows (a batch) that are the same robot as a table's (a batch of one), itself first; of arms with more than
-    eight joints the first ``MAX_ROWS`` of them."""
+    """All ways to write a robot's rows, by axes turned round.
+
+    Parameters
+    ----------
+    table : a batch of one
+
+    Returns
+    -------
+    rows : a batch, itself first; of arms with more than eight joints the first ``MAX_ROWS`` of them
+    """
     found = table
     for turn in _turns(table):
         found = join([found, turn(found)]) if len(found) < MAX_ROWS else found
@@ -64,7 +81,16 @@ def same_robots(table: Tables) -> Tables:
 
 
 def turned_once(table: Tables) -> Tables:
-    """Rows (a batch) of the same robot as a table's, with one axis turned round in each; itself first."""
+    """Rows of the same robot with one axis turned round in each.
+
+    Parameters
+    ----------
+    table : a batch
+
+    Returns
+    -------
+    rows : a batch, the given ones first
+    """
     return join([table, *(turn(table) for turn in _turns(table))])
 
 
@@ -245,11 +271,29 @@ class Extents:
             self.region.chi2 = float((off[likely] ** 2).sum())
 
     def of(self, entry: Entry) -> Extent:
-        """The interval of an entry."""
+        """The interval of an entry, the others free.
+
+        Parameters
+        ----------
+        entry : one of ``entries``
+
+        Returns
+        -------
+        extent : in the entry's unit
+        """
         return self.along(np.eye(len(self.entries))[self.entries.index(entry)])
 
     def along(self, factors: Reals) -> Extent:
-        """The interval of a combination of entries, ``factors`` (k,) of their steps."""
+        """The interval of a combination of entries, the others free.
+
+        Parameters
+        ----------
+        factors : (k,), of the entries' steps; one at least is not 0
+
+        Returns
+        -------
+        extent : in the unit of the first entry that occurs
+        """
         first = self.entries[int(np.flatnonzero(factors)[0])]
         weights = factors * first.scale / np.array([each.scale for each in self.entries])
         value = float(sum(w * each.of(self.table)[0] for w, each in zip(weights, self.entries) if w))
@@ -271,7 +315,16 @@ class Extents:
         return Extent(*ends, off, excluded, at_least)
 
     def free_choice(self, entry: Entry) -> Extent:
-        """The interval of an entry that moves no tool if others are changed with it."""
+        """The interval of an entry that moves no tool if others are changed with it.
+
+        Parameters
+        ----------
+        entry : any value of it is allowed
+
+        Returns
+        -------
+        extent : in the entry's unit
+        """
         return self._anything(entry, float(entry.of(self.table)[0]), NOT_OFF)
 
     def _anything(self, entry: Entry, value: float, off: ToolOff) -> Extent:
@@ -397,9 +450,22 @@ class Extents:
         return any(self.region.confirmed(direction[i], reached[i], held[i]) is not None for i in rows)
 
     def may_reverse(self, joint: int) -> bool:
-        """Whether a table was found whose joint (from 1) turns the other way, or the table's robot has rows in which it
-        does that differ, of all to which requirements react, in angles alone that are open by half a turn: what is left
-        of such an angle about its value and what is left about half a turn from it meet."""
+        """Whether a joint may turn the other way.
+
+        Parameters
+        ----------
+        joint : from 1
+
+        Returns
+        -------
+        reverse : True if a table was found in which it does; also if rows of the same robot in which it does differ in
+            open angles alone
+
+        Notes
+        -----
+        Only entries to which requirements react count. An angle is open by half a turn if what is left about its value
+        meets what is left about half a turn from it.
+        """
         own = self.direction
         if any(direction[joint - 1] != own[joint - 1] for direction, _ in self.elsewhere):
             return True

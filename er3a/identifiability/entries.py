@@ -28,7 +28,16 @@ GROUP_OF: dict[str, str] = {
 
 
 def entries_of(robot: Robot) -> tuple[Entry, ...]:
-    """All entries of a robot's table: geometry, zero and directions, limits, and the speeds that it gives."""
+    """All entries of a robot's table: geometry, zero and directions, limits, and the speeds that it gives.
+
+    Parameters
+    ----------
+    robot : with m rows
+
+    Returns
+    -------
+    entries : rows from 1, those that can take any value first
+    """
     joints = range(1, len(robot.a) + 1)
     columns = "direction", "lower", "upper"
     speeds = [Entry("speed", j) for j in joints if np.isfinite(robot.speed[j - 1])]
@@ -36,28 +45,55 @@ def entries_of(robot: Robot) -> tuple[Entry, ...]:
 
 
 def continuous_of(robot: Robot) -> tuple[Entry, ...]:
-    """Entries that can take any value; Hayati's beta where the table has it."""
+    """Entries of the table that can take any value; Hayati's beta only where the table has it.
+
+    Parameters
+    ----------
+    robot : with m rows
+
+    Returns
+    -------
+    entries : column by column, rows from 1
+    """
     joints = range(1, len(robot.a) + 1)
     found = [Entry(column, j) for column in CONTINUOUS for j in joints]
     return (*found, *(Entry("beta", j) for j in joints if robot.beta[j - 1]))
 
 
 def column_of(name: str) -> str:
-    """The column that an entry's name is of."""
+    """The column that an entry's name is of.
+
+    Parameters
+    ----------
+    name : such as ``alpha3``
+
+    Returns
+    -------
+    column : such as ``alpha``
+    """
     return name.rstrip("0123456789")
 
 
 def document_of(robot: Robot, entry: Entry) -> str:
-    """The document that an entry rests on: its own, else its group's, else the group's source, else the table."""
+    """The document that an entry rests on: its own, else its group's, else the group's source, else the table.
+
+    Parameters
+    ----------
+    entry : of the robot's table
+
+    Returns
+    -------
+    document : its name
+    """
     if entry.name in robot.origins:
         return robot.origins[entry.name]
     source = robot.sources.get(GROUP_OF[entry.column])
     return (source.origin or source.source) if source else f"the table of {robot.name}"
 
 
-POSES = 32
-STEP = 1e-5
-NOTHING = 1e-7
+POSES = 32  # all over the joint range, at which the tool is looked at
+STEP = 1e-5  # of an entry's scale, of central differences
+NOTHING = 1e-7  # of the largest singular value, below which a combination moves no tool
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +116,27 @@ class Gauge:
         return [int(np.flatnonzero(row)[0]) for row in self.directions]
 
     def support(self) -> Flags:
-        """(k,), whether an entry occurs in a combination that moves nothing."""
+        """Which entries occur in a combination that moves nothing.
+
+        Returns
+        -------
+        support : (k,) bool
+        """
         found: Flags = np.asarray((np.abs(self.directions) > NOTHING).any(axis=0))
         return found
 
 
 def gauge_of(robot: Robot, entries: Sequence[Entry]) -> Gauge:
-    """Which combinations of entries leave the tool's pose as the table has it."""
+    """Which combinations of entries leave the tool's pose as the table has it, to first order.
+
+    Parameters
+    ----------
+    entries : k that can take any value
+
+    Returns
+    -------
+    gauge : from the null space of the derivatives of tool poses (m, and entries of rotations) all over the joint range
+    """
     k = len(entries)
     scale = np.array([entry.scale for entry in entries])
     q = quasi_random_points(np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper), POSES)

@@ -126,7 +126,12 @@ class Evidence(ByValue, Displayed):
         return {each.entry: each for each in (*self.entries, *self.combinations)}
 
     def sheet(self) -> Sheet:
-        """A row for each status: how many entries have it, and which; the most important first."""
+        """What the notebook shows: how many entries have each status, and which; the most important first.
+
+        Returns
+        -------
+        sheet : with the tolerance in mm and deg
+        """
         judged = (*self.entries, *self.combinations)
         names = {status: [each.entry for each in judged if each.status == status] for status in _SHOWN}
         kept = {"other_table": self.other.code if self.other else None, "unmet": self.unmet or None}

@@ -26,7 +26,7 @@ from er3a.robots.robot import Robot
 
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
-ROUNDING = 1e-9
+ROUNDING = 1e-9  # in an entry's unit
 OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12
@@ -35,12 +35,16 @@ FIRST_STEP, HALVINGS = 0.05, 12
 def judge_limit(
     robot: Robot, entry: Entry, independent: Sequence[Reference], reacts: bool
 ) -> tuple[LimitStatus, tuple[float, float]]:
-    """Status of a limit or speed, and what independent references leave open for it, in its unit.
+    """Status of a limit or speed, and what independent references leave open for it.
 
     Parameters
     ----------
     independent : references that react to it and rest on other documents than it does
     reacts : whether any reference reacts to it
+
+    Returns
+    -------
+    status, interval : and lower and upper bound, in the entry's unit
     """
     value = entry.value(robot)
     direct = [r for r in independent if isinstance(r.quantity, Limit | Speed)]
@@ -145,6 +149,7 @@ class _View:
 
     @cached_property
     def repairs(self) -> list[Alternative]:
+        """Discrete changes by which a table that misses references misses less, smallest first; else none."""
         if self.asked.missed_by(self.judge.table) <= MET:
             return []
         found = alternatives_to(self.judge.table, self.asked, self.judge.tool)
@@ -152,6 +157,7 @@ class _View:
 
     @cached_property
     def extents(self) -> Extents:
+        """Intervals of all free entries under these references."""
         judge = self.judge
         relevant = [k for k, entry in enumerate(judge.free) if judge.relevant(entry, self.own)]
         nearer = [each.table for each in self.repairs[:1]]
@@ -173,6 +179,7 @@ class _View:
 
     @cached_property
     def alternatives(self) -> list[Alternative]:
+        """Discrete changes that these references allow, of the table or of one near it that meets them."""
         extents = self.extents
         tool = self.judge.tool if extents.table_meets else ToolRange(self.judge.robot, extents.met_by)
         return alternatives_to(extents.met_by, self.asked, tool)
@@ -189,7 +196,16 @@ class _View:
         return set.intersection(*fewest) if fewest else set()
 
     def excludes(self, entry: Entry) -> bool:
-        """Whether they exclude the table's value of an entry."""
+        """Whether the references exclude the table's value of an entry.
+
+        Parameters
+        ----------
+        entry : of the table
+
+        Returns
+        -------
+        excluded : True also for an entry that every smallest discrete repair changes
+        """
         if entry.name in self.repaired:
             return True
         return entry.column != "direction" and not self.extents.table_meets and self.extents.of(entry).excluded
@@ -215,7 +231,16 @@ class _Judge:
         self._readings: dict[Alternative, OtherReading] = {}
 
     def evidence(self, only: Sequence[str] | None = None) -> Evidence:
-        """All of it, or about some entries."""
+        """Evidence of all entries, or of some.
+
+        Parameters
+        ----------
+        only : names of entries and combinations; None for all
+
+        Returns
+        -------
+        evidence : values in the entries' units
+        """
         judged = [self._judged(entry) for entry in self.entries if only is None or entry.name in only]
         sums = [self._combination(row) for row in self.gauge.determined]
         trusted = self.view(self.trusted)
@@ -245,7 +270,16 @@ class _Judge:
         return OtherTable(table, "allowed") if taken else None
 
     def view(self, own: tuple[int, ...]) -> _View:
-        """What references leave open; one for all that ask for the same."""
+        """What references leave open; one view for all sets that ask for the same.
+
+        Parameters
+        ----------
+        own : places of the references
+
+        Returns
+        -------
+        view : kept for further calls
+        """
         if own not in self._views:
             asked = Asked(self.robot, requirements_of([self.references[i] for i in own], own))
             asking = {i for each in asked.order for i in each.references}
@@ -281,7 +315,17 @@ class _Judge:
         return found
 
     def relevant(self, entry: Entry, among: Sequence[int]) -> tuple[int, ...]:
-        """Those of references that react to an entry."""
+        """References that react to an entry.
+
+        Parameters
+        ----------
+        entry : of the table
+        among : places of the references that count
+
+        Returns
+        -------
+        places : of those that do
+        """
         row: Flags = self.reacts[:, self.entries.index(entry)]
         return tuple(i for i in among if row[i])
 
@@ -482,7 +526,16 @@ MAX_COMBINED = 256
 
 
 def together(evidence: Evidence, names: list[str]) -> ToolOff:
-    """How far the tool is off at most if any of the discrete readings of these entries hold together."""
+    """How far the tool is off at most if any of the discrete readings of some entries hold together.
+
+    Parameters
+    ----------
+    names : of entries; readings that change others too are left out
+
+    Returns
+    -------
+    off : mm and deg, over ``MAX_COMBINED`` combinations at most
+    """
     readings = [each for each in evidence.readings if set(each.names) <= set(names)]
     tool = ToolRange(evidence.robot, tables_of(evidence.robot))
     combined: list[tuple[Alternative, ...]] = [()]

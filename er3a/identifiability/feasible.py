@@ -22,18 +22,27 @@ from er3a.identifiability.requirements import Asked
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
 
-PROFILE = 1.959963984540054
+PROFILE = 1.959963984540054  # its square is 3.84, the 95 % point of chi squared with one degree of freedom
 MET = 1e-3  # of a half-width
 NEAR = 0.05  # of a half-width, by which an extreme that was followed may be missed once it is sought afresh
 INSIDE = 1.0 - MET / 2
 MIN_M = 1.0
 PASSES, DAMPING = 30, 1e-2
-CHUNK = 96
+CHUNK = 96  # starts that are led on at once
 FOLLOWED = 8  # times that extremes are sought afresh
 
 
 def largest_length(table: Tables) -> float:
-    """Search range in m around the table's length: all its lengths together, at least a metre."""
+    """How far lengths are searched around the table's.
+
+    Parameters
+    ----------
+    table : a batch of one
+
+    Returns
+    -------
+    length : m, all its lengths together, at least ``MIN_M``
+    """
     return max(float(np.abs(table.a).sum() + np.abs(table.d).sum()), MIN_M)
 
 
@@ -52,19 +61,35 @@ class Region:
         self.scale = np.array([each.scale for each in entries])
 
     def tables(self, direction: Reals, amounts: Reals) -> Tables:
-        """Tables with directions (R, n), and amounts (R, k), m and rad, added."""
+        """Tables with directions, and with amounts added to the region's entries.
+
+        Parameters
+        ----------
+        direction : (R, n), +1 or -1
+        amounts : (R, k), m or rad
+
+        Returns
+        -------
+        tables : R
+        """
         return shifted(self.table, self.entries, amounts).with_column("direction", slice(None), direction)
 
     def reached(
         self, direction: Reals, amounts: Reals, held: Flags | None = None, *, inner: float = INSIDE, near: bool = False
     ) -> tuple[Reals, Flags]:
-        """Amounts (R, k) that each start leads to, and whether (R,) they meet what is asked but for extremes.
+        """Amounts that starts lead to, and whether these meet what is asked but for extremes.
 
         Parameters
         ----------
+        direction : (R, n), +1 or -1
+        amounts : (R, k), m or rad, of the starts
         held : (R, k), entries that keep their amounts
         inner : of the half-widths, to which steps lead
         near : whether extremes count, where they were attained last
+
+        Returns
+        -------
+        amounts, met : (R, k), m or rad, and (R,) bool
         """
         found, met = amounts.copy(), np.zeros(len(amounts), dtype=bool)
         for begun in range(0, len(amounts), CHUNK):
@@ -90,12 +115,33 @@ class Region:
         return found, (self.asked.excess(off) <= MET) & (chi2 <= self.chi2 + PROFILE**2 * (1 + MET) + MET)
 
     def meets(self, direction: Reals, amounts: Reals) -> bool:
-        """Whether a table, by its directions (n,) and amounts (k,), meets what is asked but for extremes."""
+        """Whether a table meets what is asked but for extremes.
+
+        Parameters
+        ----------
+        direction : (n,), +1 or -1
+        amounts : (k,), m or rad
+
+        Returns
+        -------
+        meets : within half-widths, and ``NEAR`` more; what has a standard deviation does not count
+        """
         off = self.asked.plain_off(self.tables(direction[None], amounts[None]))
         return bool(self.asked.excess(off)[0] <= NEAR)
 
     def confirmed(self, direction: Reals, amounts: Reals, held: Flags | None = None) -> Reals | None:
-        """Amounts (k,) near others that meet what is asked, with extremes sought afresh; None if none were found."""
+        """A table near another one that meets what is asked, with extremes sought afresh.
+
+        Parameters
+        ----------
+        direction : (n,), +1 or -1
+        amounts : (k,), m or rad
+        held : (k,) bool, entries that keep their amounts; None for none
+
+        Returns
+        -------
+        amounts : (k,), m or rad; None if none were found in ``FOLLOWED`` rounds
+        """
         for _ in range(FOLLOWED if self.asked.extreme else 0):
             table = self.tables(direction[None], amounts[None])
             if all(float(self.asked.excess(self.asked.off(table, afresh))) <= NEAR for afresh in (False, True)):

@@ -87,8 +87,16 @@ Proposal = LookAtMotion | ReadLimit | TimeJoint | MeasureAngle | MeasureLength
 
 
 def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
-    """For each entry that isn't settled, the cheapest measurement that would settle it, by the entry's name; entries
-    that no single measurement of these kinds settles are left out."""
+    """For each entry that isn't settled, the cheapest measurement that would settle it.
+
+    Parameters
+    ----------
+    evidence : of all entries
+
+    Returns
+    -------
+    proposals : by the entry's name; entries that no single measurement of these kinds settles are left out
+    """
     robot = evidence.robot
     tool = ToolRange(robot, tables_of(robot))
     by_name = {entry.name: entry for entry in entries_of(robot)}

@@ -18,7 +18,7 @@ from er3a.references.quantities import Extreme, LimitExcess, Quantity, Speed, va
 from er3a.references.reference import Documents, Reference, quantities_of
 from er3a.robots.robot import Robot
 
-PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)
+PROBE_M, PROBE_RAD = 0.01, np.radians(5.0)  # by which entries are moved to see what reacts
 REACTS = 1e-6  # of the quantity's unit
 REACTS_MM = 1e-4  # of an extreme, which is searched for
 
@@ -69,7 +69,16 @@ class CheckCounts:
 
 
 def count_checks(kinds: Sequence[CheckKind], statuses: Sequence[Literal["pass", "fail", "conflict"]]) -> CheckCounts:
-    """Counts of checks, each with its kind and status."""
+    """Counts of checks by kind and status.
+
+    Parameters
+    ----------
+    kinds, statuses : of each check
+
+    Returns
+    -------
+    counts : a tally for each kind
+    """
 
     def tally(kind: CheckKind) -> CheckTally:
         own = [status for each, status in zip(kinds, statuses) if each == kind]
@@ -79,7 +88,17 @@ def count_checks(kinds: Sequence[CheckKind], statuses: Sequence[Literal["pass", 
 
 
 def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents) -> list[CheckBasis]:
-    """What the check against each reference rests on."""
+    """What the check against each reference rests on.
+
+    Parameters
+    ----------
+    references : n of them
+    documents : which say what is independent of what
+
+    Returns
+    -------
+    bases : n; independent if a reference reacts to an entry whose document is independent of its own
+    """
     entries = entries_of(robot)
     reacts = reactions(robot, references, entries)
     found = []
@@ -93,14 +112,33 @@ def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents
 
 
 def undeclared_bases(references: Sequence[Reference]) -> list[CheckBasis]:
-    """Likewise for arms whose entries are not varied: nothing is called independent."""
+    """What checks rest on, for arms whose entries are not varied: nothing is called independent.
+
+    Parameters
+    ----------
+    references : n of them
+
+    Returns
+    -------
+    bases : n, consistency for authoritative references, else claims
+    """
     return [CheckBasis("consistency" if each.is_authoritative else "claim", (), (), ()) for each in references]
 
 
 def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[Entry]) -> Flags:
-    """Whether the model's value (n, k) for each reference changes with each entry, the others as they are.
+    """Whether the model's value for each reference changes with each entry, the others as they are.
 
-    Lengths are moved by 10 mm and angles by 5 deg to either side, because extremes and axes in line have no slope."""
+    Lengths are moved by 10 mm and angles by 5 deg to either side, because extremes and axes in line have no slope.
+
+    Parameters
+    ----------
+    references : n of them
+    entries : k of the table
+
+    Returns
+    -------
+    reacts : (n, k) bool
+    """
     quantities = quantities_of(references)
     reacts = np.zeros((len(quantities), len(entries)), dtype=bool)
     table = tables_of(robot)

@@ -30,8 +30,8 @@ Function = Callable[[Reals], Reals]
 """Values (P,) at points (P, d)."""
 STEP = 1e-4
 LONGEST_STEP = 0.5
-SCAN, WATCHED = 384, 48
-CORNERS_UP_TO = 6
+SCAN, WATCHED = 384, 48  # points of a box where an extreme is sought afresh, and where it is followed
+CORNERS_UP_TO = 6  # dimensions of boxes whose corners are looked at, too: 64 at most
 CLIMBS = 6
 PEAK_STEPS = 25
 GAINS_NOTHING = 1e-10
@@ -42,7 +42,17 @@ TINY = 1e-300
 
 
 def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
-    """Points (P, d) all over a box, with its middle and, of few dimensions, its corners."""
+    """Points all over a box, with its middle and, of few dimensions, its corners.
+
+    Parameters
+    ----------
+    lower, upper : (d,), in any unit
+    count : of quasi-random points
+
+    Returns
+    -------
+    points : (P, d)
+    """
     points = [quasi_random_points(lower, upper, count), (lower + upper)[None] / 2]
     if len(lower) <= CORNERS_UP_TO:
         points.append(np.array(list(product(*zip(lower, upper)))))
@@ -50,7 +60,19 @@ def box_points(lower: Reals, upper: Reals, count: int = SCAN) -> Reals:
 
 
 def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: int = CLIMBS) -> tuple[Reals, float]:
-    """Where a function is largest, and its value there; ``points`` (P, d): where to look first."""
+    """Where a function is largest in a box, by Newton's method from the best of given points.
+
+    Parameters
+    ----------
+    function : from points (P, d) to values (P,)
+    lower, upper : (d,), of the box
+    points : (P, d), where to look first
+    climbs : how many starts
+
+    Returns
+    -------
+    at, value : (d,), and the function there; the largest that was found, not proven
+    """
     starts = points[_best_apart(points, function(points), climbs)]
     ends = [_climb(function, start, lower, upper) for start in starts]
     return max(ends, key=lambda end: end[1])
@@ -129,7 +151,16 @@ class SoughtExtreme:
         self.q: Reals | None = None
 
     def at(self, table: Tables) -> float:
-        """The extreme in mm of a table (a batch of one)."""
+        """The extreme of a table, sought over the joint ranges; where it is attained is kept in ``q``.
+
+        Parameters
+        ----------
+        table : a batch of one
+
+        Returns
+        -------
+        extreme : mm
+        """
         ends = np.sort(np.stack([table.lower[0], table.upper[0]]), axis=0)
         lower, upper = ends[:, self.joints]
         points = box_points(lower, upper, SCAN if self.q is None else WATCHED)
@@ -144,7 +175,16 @@ class SoughtExtreme:
         return self.sign * value * quantities.MM
 
     def along(self, tables: Tables) -> Reals:
-        """The measure (H,) in mm of many tables where the extreme was attained last."""
+        """The measure of many tables where the extreme was attained last.
+
+        Parameters
+        ----------
+        tables : H of them
+
+        Returns
+        -------
+        measure : (H,), mm
+        """
         if self.q is None:
             self.at(tables[[0]])
         assert self.q is not None
@@ -180,9 +220,15 @@ class Requirement:
 def requirements_of(references: Sequence[Reference], places: Sequence[int] | None = None) -> list[Requirement]:
     """What references ask of a table; those about limits and speeds ask nothing of it.
 
+    Of references that contradict each other only the hull of the values that they allow is required.
+
     Parameters
     ----------
     places : by which requirements name the references; by default their order
+
+    Returns
+    -------
+    requirements : one for each reference, or for each set that contradicts itself
     """
     places = range(len(references)) if places is None else places
     asked = [i for i, each in enumerate(references) if each.expected is not None and each.quantity.depends_on_table]
@@ -250,7 +296,16 @@ class Asked:
         return len(self.order)
 
     def plain_off(self, tables: Tables) -> Reals:
-        """Components (H, m) of many tables, of the requirements that are no extremes (the first ones)."""
+        """How far tables are off the requirements that are no extremes.
+
+        Parameters
+        ----------
+        tables : H of them
+
+        Returns
+        -------
+        off : (H, m), components in half-widths or standard deviations
+        """
         if not self.plain:
             return np.empty((len(tables), 0))
         state = self._state.of(tables)
@@ -258,42 +313,106 @@ class Asked:
         return np.concatenate(parts, axis=-1)
 
     def near_off(self, tables: Tables) -> Reals:
-        """Components (H, m) of many tables, extremes where they were attained last."""
+        """How far tables are off all requirements, extremes where they were attained last.
+
+        Parameters
+        ----------
+        tables : H of them
+
+        Returns
+        -------
+        off : (H, m), components in half-widths or standard deviations
+        """
         extremes = [(sought.along(tables) - each.expected) / each.half_width for each, sought in self.extreme]
         return np.column_stack([self.plain_off(tables), *extremes])
 
     def off(self, table: Tables, afresh: bool = True) -> Reals:
-        """Components (m,) of a table (a batch of one); extremes are sought all over the joint ranges, or, if not
-        ``afresh``, from where they were attained last and a few places more."""
+        """How far a table is off all requirements.
+
+        Parameters
+        ----------
+        table : a batch of one
+        afresh : True to seek extremes all over the joint ranges; False from where they were attained last, and few more
+
+        Returns
+        -------
+        off : (m,), components in half-widths or standard deviations
+        """
         for _, sought in self.extreme:
             sought.q = None if afresh else sought.q
         extremes = [(sought.at(table) - each.expected) / each.half_width for each, sought in self.extreme]
         return np.append(self.plain_off(table)[0], extremes)
 
     def missed_by(self, table: Tables) -> float:
-        """The largest violation of a table (a batch of one); 0 if nothing is asked."""
+        """The largest violation of a table.
+
+        Parameters
+        ----------
+        table : a batch of one
+
+        Returns
+        -------
+        violation : as of :meth:`violation`, not above 0 if all is met; 0 if nothing is asked
+        """
         return float(self.violation(self.off(table)).max(initial=-1.0)) if len(self) else 0.0
 
     def excluding(self, table: Tables, nominal: Tables) -> tuple[int, ...]:
-        """Places of references that a table misses though another one meets them."""
+        """References that a table misses though another one meets them.
+
+        Parameters
+        ----------
+        table, nominal : batches of one
+
+        Returns
+        -------
+        places : of the references
+        """
         violations = [self.violation(self.off(each)) for each in (table, nominal)]
         missed = (violations[0] > SLIGHT) & (violations[1] <= SLIGHT)
         return tuple(i for each, own in zip(self.order, missed) if own for i in each.references)
 
     def violation(self, off: Reals) -> Reals:
-        """How far each requirement is exceeded (..., r), in half-widths (or four standard deviations) less one."""
+        """How far each requirement is exceeded.
+
+        Parameters
+        ----------
+        off : (..., m), components
+
+        Returns
+        -------
+        violation : (..., r), in half-widths (or ``LIKELY`` standard deviations) less one; not above 0 where it is met
+        """
         lengths = self._lengths(off)
         return lengths / self._most[: lengths.shape[-1]] - 1.0
 
     def excess(self, off: Reals) -> Reals:
-        """How far (...,) the requirement with a half-width that is exceeded most is, in half-widths less one."""
+        """How far the requirement with a half-width that is exceeded most is exceeded.
+
+        Parameters
+        ----------
+        off : (..., m), components
+
+        Returns
+        -------
+        excess : (...,), in half-widths less one; those with a standard deviation don't count
+        """
         lengths = self._lengths(off)
         bounded = lengths[..., ~self.gaussian[: lengths.shape[-1]]]
         most: Reals = bounded.max(axis=-1, initial=0.0) - 1.0
         return most
 
     def rest(self, off: Reals, inner: float) -> Reals:
-        """Components (..., m) of what lies outside ``inner`` half-widths; of a likelihood all."""
+        """Components of what lies outside a share of the half-widths, for least squares steps to just within them.
+
+        Parameters
+        ----------
+        off : (..., m), components
+        inner : half-widths within which nothing is left
+
+        Returns
+        -------
+        rest : (..., m); components with a standard deviation are left as they are
+        """
         lengths = self._lengths(off)
         share = np.where(lengths > inner, 1.0 - inner / np.maximum(lengths, TINY), 0.0)
         share = np.where(self.gaussian[: lengths.shape[-1]], 1.0, share)

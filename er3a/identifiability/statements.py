@@ -65,19 +65,45 @@ class InconsistentWithOwnText(Finding):
 
 
 def is_unexplained(conclusion: Conclusion | None) -> bool:
-    """Whether references are missed by a table, and neither one or two faults nor any zeros, directions, base and
-    flange explain it; False without a diagnosis."""
+    """Whether references are missed by a table, and nothing explains it.
+
+    Parameters
+    ----------
+    conclusion : of a diagnosis; None without one
+
+    Returns
+    -------
+    unexplained : neither by one or two faults nor by any zeros, directions, base and flange; False without a diagnosis
+    """
     return isinstance(conclusion, NoFaultStandsOut | NoFewFaultsExplain)
 
 
 def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bool:
-    """Whether references describe another arm than a table: most of them are missed, and nothing explains it."""
+    """Whether references describe another arm than a table: most of them are missed, and nothing explains it.
+
+    Parameters
+    ----------
+    failed, total : checks
+    conclusion : of a diagnosis; None without one
+
+    Returns
+    -------
+    another : False without a diagnosis
+    """
     return failed > total / 2 and is_unexplained(conclusion)
 
 
 def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRobotDescribed | None:
-    """Whether trusted documents of another origin describe another robot; None if they don't, or if a correction or two
-    would make it theirs."""
+    """Whether trusted documents of another origin describe another robot.
+
+    Parameters
+    ----------
+    references : of which authoritative ones count that were not made from the table
+
+    Returns
+    -------
+    statement : lengths in mm; None if they don't, or if a correction or two would make it theirs
+    """
     foreign = [
         reference
         for reference in references.checkable
@@ -100,7 +126,16 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
 
 
 def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> InconsistentWithOwnText | None:
-    """Whether a table misses what its own publisher claims in other words; None if it doesn't, or nothing is."""
+    """Whether a table misses what its own publisher claims in other words.
+
+    Parameters
+    ----------
+    references : of which claims of the table's own text count, unless they contradict each other
+
+    Returns
+    -------
+    statement : with the one entry that would mend it, in its unit; None if the table misses none, or nothing is claimed
+    """
     stated = references.checkable
     contested = {i for pair in conflicts(stated) for i in pair}
     own = [
@@ -153,17 +188,36 @@ def _own_text(robot: Robot, reference: Reference, documents: Documents) -> bool:
 
 
 def title_of(document: str, documents: Documents) -> str:
-    """A document's title, or if none is known its name."""
+    """A document's title.
+
+    Parameters
+    ----------
+    document : its name
+
+    Returns
+    -------
+    title : the name itself if none is known
+    """
     return documents.by_name[document].title if document in documents.by_name else document
 
 
 def made_from_table(robot: Robot, document: str, documents: Documents) -> bool:
-    """Whether a document is one that a table's geometry was taken from, or that was made from one of these."""
+    """Whether a document is one that a table's geometry was taken from, or that was made from one of these.
+
+    Parameters
+    ----------
+    document : its name
+    documents : which say what is independent of what
+
+    Returns
+    -------
+    made : True if it is not independent of any document of the table
+    """
     return not all(documents.independent(document, own) for own in _documents_of(robot))
 
 
 SAME_MM, SAME_DEG = 1e-6, 1e-7
-SEEN_AT = 12
+SEEN_AT = 12  # joint vectors, at which the tools of tables are compared
 
 
 @dataclass(frozen=True)
@@ -179,11 +233,29 @@ class ToolOff:
         return self.mm > SAME_MM or self.deg > SAME_DEG
 
     def within(self, mm: float, deg: float) -> bool:
-        """Whether it stays below a tolerance."""
+        """Whether the tool stays below a tolerance.
+
+        Parameters
+        ----------
+        mm, deg : of position and orientation
+
+        Returns
+        -------
+        within : both are less
+        """
         return self.mm < mm and self.deg < deg
 
     def worse(self, other: ToolOff) -> ToolOff:
-        """The worse of both, in position and in orientation."""
+        """The worse of both, in position and in orientation.
+
+        Parameters
+        ----------
+        other : of another table
+
+        Returns
+        -------
+        off : mm and deg
+        """
         return ToolOff(max(self.mm, other.mm), max(self.deg, other.deg))
 
 
@@ -200,13 +272,23 @@ class ToolRange:
         self._own = self._tool(table, self.points)[0]
 
     def off(self, other: Tables) -> ToolOff:
-        """How far the tool of another table (a batch of one) is off at most."""
+        """How far the tool of another table is off at most over the joint ranges, by :func:`peak`.
+
+        Parameters
+        ----------
+        other : a batch of one
+
+        Returns
+        -------
+        off : mm and deg, each at its own worst pose; the largest that was found, not proven
+        """
         both = join([self.table, other])
         theirs = self._tool(other, self.points)[0]
         best: list[float] = []
         for measure, factor in ((_distance, MM), (rotation_off, 180 / np.pi)):
 
             def apart(q: Reals, measure=measure) -> Reals:  # type: ignore[no-untyped-def]
+                """Difference (N,), m or rad, of both tools at joint values (N, n)."""
                 T = self._tool(both, q)
                 result: Reals = measure(T[0], T[1])
                 return result
@@ -217,7 +299,16 @@ class ToolRange:
         return ToolOff(*best)
 
     def signature(self, tables: Tables) -> Reals:
-        """Numbers (H, k), in mm and thousandths, that are equal for tables whose tools move alike."""
+        """Numbers that are equal for tables whose tools move alike.
+
+        Parameters
+        ----------
+        tables : H of them
+
+        Returns
+        -------
+        signature : (H, k), positions in mm and entries of rotations in thousandths, at fixed poses
+        """
         q = quasi_random_points(self.lower, self.upper, SEEN_AT)
         T = self._tool(tables, q)
         return np.concatenate([T[..., :3, 3] * MM, T[..., :3, :3].reshape(*T.shape[:2], 9) * MM], axis=-1).reshape(
@@ -235,5 +326,14 @@ def _distance(one: Reals, other: Reals) -> Reals:
 
 
 def rotation_off(one: Reals, other: Reals) -> Reals:
-    """Angle (...,) in rad between the orientations of transforms (..., 4, 4)."""
+    """Angle between the orientations of transforms.
+
+    Parameters
+    ----------
+    one, other : (..., 4, 4)
+
+    Returns
+    -------
+    angle : (...,), rad, 0 to pi
+    """
     return rotation_angle(one[..., :3, :3], other[..., :3, :3])

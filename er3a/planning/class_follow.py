@@ -63,20 +63,33 @@ class ArmAngleLaw:
     margin: float
 
     def at(self, share: Reals) -> Reals:
-        """Arm angles (N, 1) at shares (N,) of the path."""
+        """Arm angles along the path, by the quadratic through the three values.
+
+        Parameters
+        ----------
+        share : (N,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        angles : (N, 1), rad
+        """
         return _quadratic(self.values, share)[:, None]
 
 
 def laws_with_most_margin(
     robot: Robot, T: Reals, share: Reals, start: tuple[float, Reals] | None, slots: Integers
 ) -> list[ArmAngleLaw]:
-    """The best law of each slot, largest margin first; without slots that miss a pose.
+    """The best arm-angle law of each slot.
 
     Parameters
     ----------
     T : (K, 4, 4), poses of the tool, m, at shares (K,) of the path
     start : the arm angle at the start, rad, and the joints (n,), rad; None leaves them open, whole turns too
     slots : (s,), those that may be taken
+
+    Returns
+    -------
+    laws : largest margin first; slots that miss a pose have none
     """
     search = _LawSearch(robot, T, share, slots, None if start is None else start[1])
     begun = -np.pi + TURN * np.arange(BEGUN_AT) / BEGUN_AT if start is None else np.array([start[0]])
@@ -105,19 +118,47 @@ class _LawSearch:
     start: Reals | None
 
     def rows(self, angles: Reals) -> Reals:
-        """Joints (K, A, s, n) of all poses at all arm angles (A,); NaN where there are none."""
+        """Joint solutions of all poses at all arm angles.
+
+        Parameters
+        ----------
+        angles : (A,), rad
+
+        Returns
+        -------
+        q : (K, A, s, n), rad or m; NaN where there is none
+        """
         count = len(angles)
         q = class_rows(self.robot, np.repeat(self.T, count, axis=0), np.tile(angles, len(self.T))[:, None]).q
         return q.reshape(len(self.T), count, *q.shape[1:])[:, :, self.slots]
 
     def on_grid(self, laws: Reals) -> Reals:
-        """About the margins (L, s) of laws (L, 3), by the nearest of ``ANGLES`` arm angles."""
+        """About the margins of laws, by the nearest of ``ANGLES`` arm angles.
+
+        Parameters
+        ----------
+        laws : (L, 3), rad, arm angles at the start, halfway and at the end
+
+        Returns
+        -------
+        margins : (L, s), rad or m, as :class:`ArmAngleLaw` has them
+        """
         angles = _quadratic(laws.T[:, None], self.share[:, None])
         place = np.round((angles + np.pi) * ANGLES / TURN).astype(np.int64) % ANGLES
         return self._margins(self.rows(-np.pi + TURN * np.arange(ANGLES) / ANGLES), place)
 
     def margin(self, angles: Reals, s: int) -> float:
-        """The margin of arm angles (K,) by the slot of this number, as :class:`ArmAngleLaw` has it."""
+        """Smallest distance from the joint limits that a slot keeps at given arm angles.
+
+        Parameters
+        ----------
+        angles : (K,), rad, one for each pose
+        s : number of the slot among ``slots``
+
+        Returns
+        -------
+        margin : rad or m; negative where a joint jumps, -inf where a pose is not reached
+        """
         q = class_rows(self.robot, self.T, angles[:, None]).q
         return float(self._margins(q[:, None, self.slots[s : s + 1]], np.zeros((len(q), 1), np.int64))[0, 0])
 
@@ -196,7 +237,7 @@ def _improved(search: _LawSearch, s: int, law: ArmAngleLaw) -> ArmAngleLaw:
     return law
 
 
-DEGREE = 9
+DEGREE = 9  # of the polynomials, piece by piece
 FIRST_PIECES, MAX_PIECES = 4, 1024  # between two corners of the path or of its law of time
 CLOSE = 1e-10  # rad, m
 SAME_TIME = 1e-9  # share of the duration
@@ -214,19 +255,32 @@ class PathEndsError(Er3aError):
 
 
 def follows_tool_paths(robot: Robot) -> bool:
-    """Whether paths of the tool are followed: by arms with all solutions at a pose, or with an arm angle to choose."""
+    """Whether tool paths can be followed: by arms with all solutions at a pose, or with an arm angle to choose.
+
+    Parameters
+    ----------
+    robot : any arm
+
+    Returns
+    -------
+    follows : False for arms that only iteration solves, and for other redundant arms
+    """
     solver = arm_solver(robot).chain
     by_class = not (isinstance(solver, Unsolved) or solver.parameters)
     return by_class or solver.code == "arm_angle" or wrist_partition_missing(robot) is None
 
 
 def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:
-    """The joints' motion (n) along a path.
+    """The joints' motion along a tool path, for the part of the pose that the arm's class can meet.
 
     Parameters
     ----------
     q_start : (n,), rad or m, joints whose tool meets the path's first pose; None for those of the closed form that keep
         the limits longest, then with the largest margin
+
+    Returns
+    -------
+    motion : of n joints, rad or m, within 1e-10 of the closed form at the points between its nodes
 
     Raises
     ------

@@ -33,7 +33,17 @@ class CommandSource:
     field: str = ""
 
     def error(self, part: str, problem: str, remedy: str) -> InputError:
-        """What is wrong with a part of the command."""
+        """An input error that names the file and field in which the command was read.
+
+        Parameters
+        ----------
+        part : field within the command, such as ``"via"`` or ``"[3]"``
+        problem, remedy : what is wrong with it, and what the user can do
+
+        Returns
+        -------
+        error : to be raised by the caller
+        """
         separator = "." if self.field and not part.startswith("[") else ""
         return InputError(self.file, f"{self.field}{separator}{part}", problem, remedy)
 
@@ -217,6 +227,10 @@ def build(robot: Robot, command: Command, ends: Mapping[str, Reals]) -> Built:
     Parameters
     ----------
     ends : joint angles (6,) in rad at the end of each earlier path, NaN where it is not reached
+
+    Returns
+    -------
+    built : a joint move or a tool path, with what it starts from
 
     Raises
     ------

@@ -49,8 +49,8 @@ from er3a.robots.joint_limits import limit_margin, nearest_equivalent, within
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
-WIDE_STEP = np.radians(20.0)
-SHORTEST_INTERVAL = 1e-10
+WIDE_STEP = np.radians(20.0)  # of a joint between two grid points: beyond it branches can't be matched without doubt
+SHORTEST_INTERVAL = 1e-10  # share of the duration, below which times are not halved further
 FREE_WRIST = 1e-10  # rad; below it rounding decides joint 4
 FREE_SHOULDER = 1e-10  # m; below it rounding decides joint 1
 STRAIGHT_ELBOW = 1e-3  # rad; the angle of the elbow grows with the root of the distance from the edge of reach
@@ -95,7 +95,19 @@ class Branches:
 
 
 def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
-    """Solve a line at times (N,) in s (rising, both ends included) and at as many more as its branches need."""
+    """Solve a line for all branches at given times, and at as many more as the branches need.
+
+    Intervals in which a branch moves by a wide step, begins or ends are halved, down to ``SHORTEST_INTERVAL``.
+
+    Parameters
+    ----------
+    line : path of the tool, T_base_tool
+    t : (N,), s, rising, both ends of the path included
+
+    Returns
+    -------
+    branches : at N times or more
+    """
     grid = _solve_at(robot, line, t)
     grid = _merge(grid, _solve_at(robot, line, _closest_passes(grid)))
     while True:
@@ -110,17 +122,45 @@ def branches_along(robot: Robot, line: ToolPath, t: Reals) -> Branches:
 
 
 def wrist_joints(robot: Robot) -> list[int]:
-    """Joints (from 0) that can turn with the tool at rest where the wrist is singular."""
+    """Joints that can turn with the tool at rest where the wrist is singular.
+
+    Parameters
+    ----------
+    robot : six joints, with a spherical wrist or with parallel axes 2, 3 and 4
+
+    Returns
+    -------
+    joints : numbers from 0
+    """
     return [3, 5] if parallel_axes_arm(robot) is None else [1, 2, 3, 5]
 
 
 def turned_difference(a: Reals, b: Reals) -> Reals:
-    """b - a with whole turns removed, in (-pi, pi]."""
+    """Difference of joint angles with whole turns removed.
+
+    Parameters
+    ----------
+    a, b : (...,), rad
+
+    Returns
+    -------
+    difference : (...,), rad, b - a in (-pi, pi]
+    """
     return wrap_to_pi(b - a)
 
 
 def align_wrist(robot: Robot, q: Reals, joint_4: Reals) -> Reals:
-    """Turn joint 4 to given angles (...,) with the tool at rest, for arms q (..., 6) with axes 4 and 6 aligned."""
+    """Turn joint 4 to given angles with the tool at rest, for arms with axes 4 and 6 aligned.
+
+    Parameters
+    ----------
+    q : (..., 6), rad, manufacturer's angles, at wrist singularities
+    joint_4 : (...,), rad, the angles of joint 4 wanted
+
+    Returns
+    -------
+    q : (..., 6), rad, with joint 6 turned back by the same amount
+    """
     T = frames(robot, q)
     same = np.sign(np.einsum("...i,...i->...", T[..., 3, :3, 2], T[..., 5, :3, 2]))
     same = same * robot.direction[3] * robot.direction[5]
@@ -131,7 +171,16 @@ def align_wrist(robot: Robot, q: Reals, joint_4: Reals) -> Reals:
 
 
 def onto_axis_1(robot: Robot, T: Reals) -> Reals:
-    """Poses (N, 4, 4) shifted so that the wrist centre, which is next to axis 1, lies exactly on it."""
+    """Poses shifted so that the wrist centre, which is next to axis 1, lies exactly on it.
+
+    Parameters
+    ----------
+    T : (N, 4, 4), T_base_tool, m
+
+    Returns
+    -------
+    T : (N, 4, 4), moved across axis 1 only; orientation and height along the axis are kept
+    """
     arm = wrist_partitioned_arm(robot)
     centre = T[:, :3, 3] + T[:, :3, :3] @ arm.wrist_in_tool
     from_axis = centre - arm.points[0]
@@ -174,7 +223,17 @@ def _closest_passes(grid: Branches) -> Reals:
 
 
 def vertex(x: Reals, y: Reals, i: Integers) -> Reals:
-    """Lowest points of the parabolas through the points i - 1, i, i + 1, each kept between its outer points."""
+    """Lowest points of the parabolas through three neighbouring points, each kept between its outer points.
+
+    Parameters
+    ----------
+    x, y : (N,), abscissas (rising) and values
+    i : (k,), indices of the middle points, from 1 to N - 2
+
+    Returns
+    -------
+    lowest : (m,), m <= k, in the unit of x; parabolas that are not curved upwards have none
+    """
     left, right = x[i] - x[i - 1], x[i + 1] - x[i]
     rise, fall = (y[i + 1] - y[i]) / right, (y[i] - y[i - 1]) / left
     slope, curvature = (fall * right + rise * left) / (left + right), (rise - fall) / (left + right)
@@ -273,14 +332,27 @@ class Followed(ByValue, Displayed):
     jumps: tuple[BranchJump, ...]
 
     def sheet(self) -> Sheet:
-        """Times, and joints in degrees."""
+        """What the notebook shows: times in s, and joints in degrees.
+
+        Returns
+        -------
+        sheet : a row for each grid point
+        """
         rows = np.column_stack([self.t, np.degrees(self.q)])
         found = f"Joints along a line: {len(self.t)} rows over {self.line.duration:g} s, {len(self.jumps)} jump(s)"
         columns = ("t (s)", *(f"J{joint + 1} (deg)" for joint in range(self.q.shape[1])))
         return Sheet.of_table(found, columns, rows, len(rows), ("a row for each time of yours: .joints(t), in rad",))
 
     def joints(self, t: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at times (...,) in s; NaN where unreachable.
+        """Joint angles at times, by the closed form of the branch followed there.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to the line's duration
+
+        Returns
+        -------
+        q : (..., 6), rad, manufacturer's angles; NaN where unreachable
 
         Raises
         ------
@@ -290,7 +362,16 @@ class Followed(ByValue, Displayed):
         return self.joints_at(self.line.progress(t)[0])
 
     def joints_at(self, progress: Reals) -> Reals:
-        """Joint angles (..., 6) in rad at shares of the path (...,); NaN where unreachable."""
+        """Joint angles at shares of the path, by the closed form of the branch followed there.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        q : (..., 6), rad, manufacturer's angles; NaN where unreachable
+        """
         progress = np.asarray(progress, float)
         return self._solve(progress.reshape(-1)).reshape(*progress.shape, 6)
 
@@ -335,15 +416,19 @@ class Followed(ByValue, Displayed):
         return nearest
 
     def derivatives(self, progress: Reals) -> tuple[Reals, Reals, Reals]:
-        """Joint angles and their first and second derivative by progress, at shares of the path (n,) [2]_.
+        """Joint angles and their first and second derivative by progress, at shares of the path [2]_.
 
         With the tool's twist per unit of progress, J q' = twist and J q'' = twist' - J' q'. Where the Jacobian is
-        singular, the derivatives are those just beside, if both sides agree; else NaN: no finite joint speed follows
-        the line through there.
+        singular, the derivatives are those next to it, if both sides agree. Else they are NaN: no finite joint speed
+        follows the line through there.
+
+        Parameters
+        ----------
+        progress : (n,), shares of the path, 0 to 1
 
         Returns
         -------
-        q, dq, ddq : (n, 6), rad
+        q, dq, ddq : (n, 6), rad, rad per unit of progress, and rad per its square
         """
         q = self.joints_at(progress)
         dq, ddq = self.through_jacobian(q, progress)
@@ -354,7 +439,16 @@ class Followed(ByValue, Displayed):
         return q, dq, ddq
 
     def rates(self, t: Reals) -> tuple[Reals, Reals, Reals]:
-        """Joint angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (n,) in s; each (n, 6)."""
+        """Joint angles, velocities and accelerations, by the chain rule from derivatives along the path.
+
+        Parameters
+        ----------
+        t : (n,), s
+
+        Returns
+        -------
+        q, velocity, acceleration : (n, 6), rad, rad/s and rad/s^2; NaN where unreachable or unknown
+        """
         progress, speed, acceleration = (part[:, None] for part in self.line.progress(np.asarray(t, float)))
         q, dq, ddq = self.derivatives(progress[:, 0])
         return q, dq * speed, ddq * speed**2 + dq * acceleration
@@ -377,7 +471,21 @@ class Followed(ByValue, Displayed):
         return merged[0], merged[1]
 
     def through_jacobian(self, q: Reals, progress: Reals) -> tuple[Reals, Reals]:
-        """First and second derivative of joints (n, 6) by progress; NaN where the Jacobian is singular."""
+        """First and second derivative of the joints by progress: ``J q' = v`` and ``J q'' = v' - J' q'``.
+
+        Parameters
+        ----------
+        q : (n, 6), rad, joints at these shares
+        progress : (n,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        dq, ddq : (n, 6), rad per unit of progress and of its square; NaN where the Jacobian is singular
+
+        Notes
+        -----
+        Linear rows are divided by the arm's characteristic length, so that singular values compare like with like.
+        """
         length = characteristic_length(self.robot)
         dq, ddq = np.full_like(q, np.nan), np.full_like(q, np.nan)
         rows = np.flatnonzero(np.isfinite(q[:, 0]))
@@ -411,7 +519,7 @@ def _jacobian_rate(robot: Robot, J: Reals, dq: Reals) -> Reals:
 
 JUMP_COST = 1e7
 OUTSIDE_COST = 1e4  # for the whole duration
-SAME_JOINTS = 1e-6
+SAME_JOINTS = 1e-6  # rad, by which equal joints differ by rounding
 SWITCH_STEP = 1e-4
 EQUAL = 6  # digits of rad to which travel and margin count
 
@@ -429,7 +537,7 @@ class _Sequence:
 def follow(
     robot: Robot, line: ToolPath, t: Reals, q_start: Reals | None = None, start_slot: int | None = None
 ) -> Followed:
-    """Follow a line.
+    """Follow a line by the best sequence of closed-form branches as a whole.
 
     Parameters
     ----------
@@ -437,6 +545,10 @@ def follow(
         near to each other
     q_start : (6,), rad, joints at the start, whose tool pose is the line's first
     start_slot : closed-form branch (0..7) at the start; None for the best one
+
+    Returns
+    -------
+    followed : joints (M, 6) in rad, manufacturer's angles, M >= N; NaN where no branch reaches the pose
 
     Raises
     ------
@@ -498,8 +610,22 @@ def _best(robot: Robot, grid: Branches, part: slice, starts: Integers, before: R
 def with_whole_turns(
     robot: Robot, q: Reals, slot: Integers, jumps: Flags, share: Reals, before: Reals | None
 ) -> _Sequence:
-    """Make angles continuous and choose each joint's whole turns: those with the shortest time outside the limits of
-    joints and of sums of joints, then the nearest."""
+    """Make angles continuous and choose each joint's whole turns.
+
+    Those with the shortest time outside the limits of joints and of sums of joints come first, then the nearest.
+
+    Parameters
+    ----------
+    q : (N, 6), rad, the joints of the chosen branches
+    slot : (N,), closed-form branch of each row
+    jumps : (N - 1,), where the sequence jumps; only counted
+    share : (N,), share of the path's time that each row accounts for
+    before : (6,), rad, joints before this stretch; None for none
+
+    Returns
+    -------
+    sequence : with continuous angles, and its cost: jumps, time outside, joint travel, limit margin
+    """
     steps = turned_difference(q[:-1], q[1:])
     unwound = q[0] + np.concatenate([np.zeros((1, 6)), np.cumsum(steps, axis=0)])
     reference = np.zeros(6) if before is None else before

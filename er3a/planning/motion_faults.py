@@ -57,7 +57,17 @@ class SingularEvent:
 
 
 def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
-    """Spans, sorted by their starts, with those put together that are no more than a gap apart."""
+    """Join spans that are no farther from each other than a gap.
+
+    Parameters
+    ----------
+    spans : (start, end) pairs, sorted by their starts, in s or any other unit
+    gap : in the same unit
+
+    Returns
+    -------
+    spans : sorted, with larger gaps than that between them
+    """
     kept: list[tuple[float, float]] = []
     for start, until in spans:
         if kept and start - kept[-1][1] <= gap:
@@ -93,7 +103,7 @@ class NeededSpeed(Finding, code=""):
 
     @property
     def ratio(self) -> float:
-        """What is needed over what is allowed."""
+        """Speed needed over speed allowed, greater than 1."""
         return self.needed_deg_s / self.limit_deg_s
 
 
@@ -115,7 +125,7 @@ class NeededAcceleration(Finding, code=""):
 
     @property
     def ratio(self) -> float:
-        """What is needed over what is allowed."""
+        """Acceleration needed over acceleration allowed, greater than 1."""
         return self.needed_deg_s2 / self.limit_deg_s2
 
 
@@ -137,7 +147,7 @@ class JerkTooGreat(Finding):
 
     @property
     def ratio(self) -> float:
-        """What is needed over what is allowed."""
+        """Jerk needed over jerk allowed; infinite where the acceleration steps."""
         return np.inf if self.needed_deg_s3 is None else self.needed_deg_s3 / self.limit_deg_s3
 
 
@@ -185,14 +195,27 @@ class RateLimit:
 
     @property
     def allowed(self) -> Reals:
-        """(n,), what rounding may make of the limit."""
+        """(n,), the limit with what rounding may add to it; rad/s, rad/s^2 or rad/s^3."""
         return self.most * (1 + OVER)
 
 
 def rate_interval(
     limit: RateLimit, joint: int, start: float, end: float, most: float, worst: float
 ) -> Interval[RateCause]:
-    """A stretch on which a joint (from 0) exceeds a limit, by its largest value there, at time ``worst``."""
+    """A stretch on which a joint exceeds a limit of its rate.
+
+    Parameters
+    ----------
+    limit : of all joints
+    joint : number from 0
+    start, end : s
+    most : largest size of the rate there, rad/s^k or m/s^k; infinite for a step of the acceleration
+    worst : s, when it is met
+
+    Returns
+    -------
+    interval : its cause names the joint from 1, in degrees, or in mm for a sliding joint
+    """
     slides = limit.sliding is not None and bool(limit.sliding[joint])
     needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
     cause: RateCause
@@ -210,7 +233,16 @@ LimitCause = AboveLimit | BelowLimit | SlideExceeded | CombinationExceeded
 
 
 def joints_of(cause: LimitCause) -> tuple[int, ...]:
-    """The joints (from 1) whose limit is left; more than one for a limit of their sum."""
+    """The joints whose limit is left; more than one for a limit of their sum.
+
+    Parameters
+    ----------
+    cause : of an interval of :func:`limit_intervals`
+
+    Returns
+    -------
+    joints : numbers from 1
+    """
     return cause.joints if isinstance(cause, CombinationExceeded) else (cause.joint,)
 
 
@@ -224,14 +256,32 @@ class LimitSide:
     limit: float
 
     def of(self, q: Reals) -> Reals:
-        """``sign`` times the joint or the sum, (...,), at joint values (..., n)."""
+        """What is compared with the limit: ``sign`` times the joint, or times the sum of joints.
+
+        Parameters
+        ----------
+        q : (..., n), rad or m
+
+        Returns
+        -------
+        value : (...,), rad or m
+        """
         used = np.flatnonzero(self.factors)
         alone = len(used) == 1 and self.factors[used[0]] == 1
         value: Reals = self.sign * (q[..., used[0]] if alone else q @ self.factors)
         return value
 
     def cause(self, most: float) -> LimitCause:
-        """What is to be said where it gets beyond: its largest :meth:`of`."""
+        """The finding for a motion that gets beyond this side.
+
+        Parameters
+        ----------
+        most : largest :meth:`of`, rad or m
+
+        Returns
+        -------
+        cause : joint numbers from 1, values in degrees, or in mm for sliding joints
+        """
         used = np.flatnonzero(self.factors)
         side: Literal["above", "below"] = "above" if self.sign > 0 else "below"
         slides = bool(self.robot.slides[used].all())
@@ -249,7 +299,16 @@ class LimitSide:
 
 
 def limit_sides(robot: Robot) -> list[LimitSide]:
-    """Both sides of each limit of a joint and of each limit of a sum."""
+    """Both sides of each limit of a joint and of each limit of a sum of joints.
+
+    Parameters
+    ----------
+    robot : its continuous joints have no limits
+
+    Returns
+    -------
+    sides : upper before lower of each limit, joints before sums
+    """
     lines = [
         (row, robot.lower[j], robot.upper[j]) for j, row in enumerate(np.eye(robot.joints)) if not robot.continuous[j]
     ]
@@ -262,7 +321,17 @@ def limit_sides(robot: Robot) -> list[LimitSide]:
 
 
 def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReach]]:
-    """Where no branch of the closed form reaches the pose, with the distance that is missing at the worst point."""
+    """Where no branch of the closed form reaches the pose, with the distance missing at the worst grid point.
+
+    Parameters
+    ----------
+    robot : six joints, solved in closed form
+    followed : the path, with NaN joints where it is out of reach
+
+    Returns
+    -------
+    intervals : from the first to the last grid point out of reach, s
+    """
     found = []
     for first, last in runs(np.isnan(followed.q[:, 0])):
         poses = followed.line.poses(followed.progress[first:last])
@@ -274,7 +343,16 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReac
 
 
 def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[LimitCause]]:
-    """Where joints, or sums of joints, leave their limits, one interval per limit, side and stretch, by start."""
+    """Where joints, or sums of joints, leave their limits.
+
+    Parameters
+    ----------
+    motion : of n joints, rad or m
+
+    Returns
+    -------
+    intervals : one per limit, side and stretch, sorted by start (s), then by joint
+    """
     found = [
         Interval(start, end, side.cause(most), worst)
         for side in limit_sides(robot)
@@ -286,8 +364,17 @@ def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Limi
 
 
 def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[RateCause]]:
-    """Where joints exceed a limit of speed, acceleration or jerk, by start; a step of the acceleration exceeds any of
-    jerk. None for joints without that limit."""
+    """Where joints exceed a limit of speed, acceleration or jerk.
+
+    Parameters
+    ----------
+    motion : of n joints, rad or m
+    limit : of one order; NaN for joints without that limit
+
+    Returns
+    -------
+    intervals : sorted by start (s), then by joint; a step of the acceleration exceeds any limit of jerk
+    """
     found = []
     for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
         series = motion.velocity if limit.order == 1 else motion.acceleration if limit.order == 2 else motion.jerk
@@ -306,13 +393,18 @@ SAMPLES = 500  # of a motion of an arm without the three sets
 
 
 def singular_events(robot: Robot, motion: PiecewiseMotion, near: singularity.NearSingular) -> list[SingularEvent]:
-    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold, by time.
+    """All crossings of singular sets, and the nearest pass of each stretch below its type's threshold.
+
+    Of arms without the three sets the losses of rank are reported (:func:`er3a.kinematics.singularity.rank_losses`).
 
     Parameters
     ----------
-    near : distances below which a pass is reported
+    motion : of n joints, rad or m
+    near : distances below which a pass is reported, rad, and m for the shoulder
 
-    Of arms without the three sets the losses of rank are reported (:func:`er3a.kinematics.singularity.rank_losses`).
+    Returns
+    -------
+    events : sorted by time (s), then by type
     """
     if not has_branches(robot):
         t = np.union1d(motion.times, np.linspace(0.0, motion.duration, SAMPLES))

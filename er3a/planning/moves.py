@@ -45,35 +45,80 @@ class ToolPath(Protocol):
     """
 
     @property
-    def duration(self) -> float: ...
+    def duration(self) -> float:
+        """Duration, s."""
 
     @property
-    def length(self) -> float: ...
+    def length(self) -> float:
+        """Length of the tool point's path, m."""
 
     @property
-    def turned(self) -> float: ...
+    def turned(self) -> float:
+        """By how much the tool turns in all, rad."""
 
     def progress(self, t: Reals) -> Rates:
-        """Share of the path done (0..1, never falling) at times (...,) in s, with first and second derivative."""
+        """Share of the path done, which never falls, with its derivatives by time.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        progress, first, second : (...,), 0 to 1, 1/s and 1/s^2
+        """
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
+        """Poses of the tool along the path.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """Velocity of the tool per unit of progress, and its derivative by progress: (..., 6), m then rad, base."""
+        """Velocity of the tool per unit of progress, and its derivative by progress.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
 
     def arc_length(self, progress: Reals) -> Reals:
-        """Length of the tool point's path so far, m, at shares of the path (...,)."""
+        """Length of the tool point's path so far.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        length : (...,), m
+        """
 
     @property
-    def law(self) -> TimeLaw: ...
+    def law(self) -> TimeLaw:
+        """When the tool is where: the share of the path as a function of time."""
 
     @property
     def edges(self) -> Reals:
         """Shares of the path (m,), from 0 to 1, between which the twist and its derivative are continuous."""
 
     def half_turns(self) -> tuple[tuple[int, Reals], ...]:
-        """Turns by exactly 180 deg: number of the segment (from 1), and the axis (3,) in the base frame taken."""
+        """Turns by exactly 180 deg, whose sense had to be chosen.
+
+        Returns
+        -------
+        turns : number of the segment (from 1), and the axis taken, a unit vector (3,) in the base frame
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +139,32 @@ class JointMove(ByValue):
     accelerations: Ends = (0.0, 0.0)
 
     def joints(self, t: Reals) -> tuple[Reals, Reals, Reals]:
-        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6).
-        :class:`er3a.Er3aError` beyond start and end."""
+        """Angles, velocities and accelerations of the quintic.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., 6), rad, rad/s and rad/s^2, manufacturer's angles
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         t = np.asarray(t, float)
         check_times(t, 0.0, self.duration)
         return quintic(t, self.duration, self.start, self.end, self.velocities, self.accelerations)
 
     def polynomials(self) -> PiecewiseMotion:
-        """The move as one polynomial."""
+        """The move as one polynomial of fifth degree.
+
+        Returns
+        -------
+        motion : one piece from 0 to ``duration``, rad and s
+        """
         return polynomial_motion(self.joints, np.array([0.0, self.duration]), 5)
 
 
@@ -131,37 +194,97 @@ class Segment(ByValue, ABC):
 
     @abstractmethod
     def points(self, progress: Reals) -> Reals:
-        """The tool point (..., 3), m, at shares of the path (...,)."""
+        """The tool point along the path.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        points : (..., 3), m, base frame
+        """
 
     @abstractmethod
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`ToolPath`."""
+        """Velocity of the tool per unit of progress, and its derivative, as of :class:`ToolPath`.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
 
     @property
     def turned(self) -> float:
-        """See :class:`ToolPath`."""
+        """Size of the rotation from start to end, rad."""
         return float(np.linalg.norm(self.rotation))
 
     def progress(self, t: Reals) -> Rates:
-        """See :class:`ToolPath`."""
+        """Share of the path done, with its derivatives by time.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        progress, first, second : (...,), 0 to 1, 1/s and 1/s^2
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.law(t)
 
     @property
     def law(self) -> TimeLaw:
-        """See :class:`ToolPath`."""
+        """From rest to rest over the duration: quintic, or trapezoid if ``ramp`` is given."""
         return FromRestToRest(np.array([0.0, self.duration]), np.array([0.0, 1.0]), self.ramp)
 
     @property
     def edges(self) -> Reals:
-        """See :class:`ToolPath`."""
+        """(2,), 0 and 1: the twist is continuous all along."""
         return np.array([0.0, 1.0])
 
     def at(self, t: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at times (...,) in s; :class:`er3a.Er3aError` beyond start and end."""
+        """Poses of the tool at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.poses(self.progress(t)[0])
 
     def poses(self, progress: Reals) -> Reals:
-        """See :class:`ToolPath`; :class:`er3a.Er3aError` for shares beyond 0 and 1, such as times in s."""
+        """Poses of the tool along the path.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+
+        Raises
+        ------
+        Er3aError
+            for shares beyond 0 and 1, such as times in s
+        """
         progress = np.asarray(progress, float)
         if progress.size and (progress.min() < -BEYOND or progress.max() > 1 + BEYOND):
             ends = f"{progress.min():g} to {progress.max():g}"
@@ -169,11 +292,25 @@ class Segment(ByValue, ABC):
         return turning_poses(self.T_start, self.points(progress), self.rotation, progress)
 
     def arc_length(self, progress: Reals) -> Reals:
-        """See :class:`ToolPath`."""
+        """Length of the tool point's path so far; it grows evenly with the share.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        length : (...,), m
+        """
         return self.length * np.asarray(progress)
 
     def half_turns(self) -> tuple[tuple[int, Reals], ...]:
-        """See :class:`ToolPath`."""
+        """The rotation if it is by exactly 180 deg, so that its sense had to be chosen.
+
+        Returns
+        -------
+        turns : empty, or one pair: 1, and the axis taken, a unit vector (3,) in the base frame
+        """
         return ((1, self.rotation / np.pi),) if self.half_turn else ()
 
 
@@ -185,15 +322,33 @@ class Line(Segment):
 
     @property
     def length(self) -> float:
-        """See :class:`ToolPath`."""
+        """Distance from start to end, m."""
         return float(np.linalg.norm(self.translation))
 
     def points(self, progress: Reals) -> Reals:
-        """See :class:`Segment`."""
+        """The tool point along the line.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        points : (..., 3), m, base frame
+        """
         return self.T_start[:3, 3] + np.asarray(progress)[..., None] * self.translation
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`ToolPath`."""
+        """Velocity of the tool per unit of progress, and its derivative, which is 0: both rates are constant.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
         shape = (*np.shape(progress), 6)
         return np.broadcast_to(np.concatenate([self.translation, self.rotation]), shape), np.zeros(shape)
 
@@ -210,6 +365,10 @@ def line(
     half_turn_axis : (3,), base frame; for rotations by exactly half a turn, the side to which the axis shall point
     ramp : share of the time of each ramp of a trapezoid; None for the quintic
 
+    Returns
+    -------
+    line : from rest to rest
+
     Raises
     ------
     Er3aError
@@ -225,7 +384,16 @@ def line(
 
 
 def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None = None) -> tuple[Reals, bool]:
-    """Rotation vector (3,) in rad in the base frame, in the shorter direction, and whether it is half a turn.
+    """Rotation of the tool from one pose to another, in the shorter direction.
+
+    Parameters
+    ----------
+    T_start, T_end : (4, 4), T_base_tool
+    half_turn_axis : (3,), base frame, the side to which the axis of exactly half a turn shall point; None for upwards
+
+    Returns
+    -------
+    rotation, half_turn : (3,), rotation vector, rad, base frame; and whether it is by half a turn
 
     Raises
     ------
@@ -243,7 +411,19 @@ def rotation_between(T_start: Reals, T_end: Reals, half_turn_axis: Reals | None 
 
 
 def turning_poses(T_start: Reals, points: Reals, rotation: Reals, progress: Reals) -> Reals:
-    """T_base_tool (..., 4, 4) at points (..., 3), turned from ``T_start`` by shares (...,) of a rotation vector."""
+    """Poses at given points, turned evenly about one axis of the base frame.
+
+    Parameters
+    ----------
+    T_start : (4, 4), T_base_tool with the orientation at the start
+    points : (..., 3), m, base frame
+    rotation : (3,), rad, rotation vector of the whole way, base frame
+    progress : (...,), shares of that rotation, 0 to 1
+
+    Returns
+    -------
+    T : (..., 4, 4), T_base_tool, with ``R = exp(progress [rotation]x) R_start``
+    """
     return posed(exp_rotation(progress[..., None] * rotation) @ T_start[:3, :3], points)
 
 

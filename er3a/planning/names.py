@@ -26,7 +26,16 @@ NOT_TO_BE_RUN = PATH_VERDICTS[: PATH_VERDICTS.index("undecided")]
 
 
 def gravest(found: Iterable[PathVerdict]) -> PathVerdict:
-    """The most serious of what a path came to; safe if that is nothing."""
+    """The most serious of what a path came to.
+
+    Parameters
+    ----------
+    found : verdicts, in any order
+
+    Returns
+    -------
+    verdict : the first of them in the order of ``PATH_VERDICTS``; safe if there are none
+    """
     return min(found, key=PATH_VERDICTS.index, default="safe")
 
 

@@ -51,12 +51,21 @@ class Pieces:
 
     @cached_property
     def range(self) -> tuple[Reals, Reals]:
-        """Bounds (m,) from below and above on each piece."""
+        """Bounds (m,) from below and above on each piece, by the sum of its coefficients' sizes."""
         beside = np.abs(self.series[:, 1:]).sum(axis=1)
         return self.series[:, 0] - beside, self.series[:, 0] + beside
 
     def nodes(self, i: int) -> tuple[Reals, Reals]:
-        """Times at which piece i begins, turns and ends, and the values there; it is monotone between them."""
+        """Points between which one piece is monotone.
+
+        Parameters
+        ----------
+        i : number of the piece, from 0
+
+        Returns
+        -------
+        t, values : (k,), s, when the piece begins, turns and ends, and its values there
+        """
         x = np.concatenate([[-1.0], turning_points(self.series[i]), [1.0]])
         a, b = self.times[i], self.times[i + 1]
         t = a + (b - a) * (x + 1) / 2
@@ -64,7 +73,18 @@ class Pieces:
         return t, chebyshev.chebval(x, self.series[i])
 
     def root(self, i: int, start: float, end: float, level: float) -> float:
-        """When piece i passes a level between two times at which it is on either side of it."""
+        """When a piece passes a level, by Brent's method.
+
+        Parameters
+        ----------
+        i : number of the piece, from 0
+        start, end : s, within the piece, which is monotone between them
+        level : in the function's unit
+
+        Returns
+        -------
+        t : s; the end that is nearer to the level if both are on one side of it by rounding
+        """
         a, b = self.times[i], self.times[i + 1]
         series = self.series[i].copy()
         series[0] -= level
@@ -80,9 +100,15 @@ class Pieces:
         )
 
     def above(self, level: float) -> list[Stretch]:
-        """Stretches on which the function is greater than a level: start, end, its largest value there, and when.
+        """Stretches on which the function is greater than a level.
 
-        Those that only a gap of the shortest pieces parts are one.
+        Parameters
+        ----------
+        level : in the function's unit
+
+        Returns
+        -------
+        stretches : start (s), end (s), largest value there, and when (s); two with a gap below ``GAP`` between are one
         """
         found: list[Stretch] = []
         gap = GAP * self.times[-1]
@@ -103,7 +129,12 @@ class Pieces:
         return found
 
     def peak(self) -> tuple[float, float]:
-        """The largest value, and a time at which it is met; minus infinity if no piece is known."""
+        """The largest value, and when it is met.
+
+        Returns
+        -------
+        most, at : in the function's unit, and s; minus infinity if no piece is known
+        """
         ends = np.nan_to_num(np.stack([chebyshev.chebval(x, self.series.T) for x in (-1.0, 1.0)]), nan=-np.inf)
         side, piece = np.unravel_index(int(ends.argmax()), ends.shape)
         most, at = float(ends.max()), float(self.times[piece + side])
@@ -133,7 +164,7 @@ class PiecewiseMotion(ByValue):
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Time of the last piece's end, s."""
         return float(self.times[-1])
 
     @cached_property
@@ -151,8 +182,21 @@ class PiecewiseMotion(ByValue):
         return steps
 
     def rates(self, t: Reals) -> Rates:
-        """Angles, velocities and accelerations at times (...,), each (..., n); :class:`er3a.Er3aError` beyond start and
-        end."""
+        """Angles, velocities and accelerations at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., n), rad, rad/s and rad/s^2, or m for sliding joints; NaN in gaps
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         t = np.asarray(t, float)
         check_times(t, self.times[0], self.times[-1])
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
@@ -164,20 +208,63 @@ class PiecewiseMotion(ByValue):
         return q, velocity, acceleration
 
     def joints(self, t: Reals) -> Reals:
-        """Angles (..., n) at times (...,)."""
+        """Angles at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q : (..., n), rad, or m for sliding joints
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.rates(t)[0]
 
     def of_joint(self, series: Reals, j: int, sign: float = 1.0) -> Pieces:
-        """One joint's function of time."""
+        """One joint's angle or rate as a function of time.
+
+        Parameters
+        ----------
+        series : (m, d + 1, n), one of the motion's series
+        j : number of the joint, from 0
+        sign : -1 for the function turned over, whose peak is the joint's smallest value
+
+        Returns
+        -------
+        pieces : in the unit of the series
+        """
         return Pieces(self.times, sign * series[:, :, j])
 
     def max_abs(self, series: Reals) -> Reals:
-        """Largest size (n,) of angle, velocity, acceleration or jerk of each joint."""
+        """Largest size of each joint's angle or rate over the whole motion.
+
+        Parameters
+        ----------
+        series : (m, d + 1, n), one of the motion's series, ``jerk`` included
+
+        Returns
+        -------
+        largest : (n,), in the unit of the series
+        """
         joints = range(series.shape[2])
         return np.array([max(self.of_joint(series, j, sign).peak()[0] for sign in (1.0, -1.0)) for j in joints])
 
     def rate_bounds(self, start: Reals, end: Reals) -> tuple[Reals, Reals]:
-        """Bounds (k, n) of the sizes of velocity and acceleration between times (k,) and (k,), s; infinite in gaps."""
+        """Bounds of the sizes of velocity and acceleration between times.
+
+        Parameters
+        ----------
+        start, end : (k,), s
+
+        Returns
+        -------
+        velocity, acceleration : (k, n), rad/s and rad/s^2, of all pieces that the stretch touches; infinite in gaps
+        """
         first = np.clip(np.searchsorted(self.times, start, side="right") - 1, 0, len(self.times) - 2)
         last = np.clip(np.searchsorted(self.times, end, side="left") - 1, first, len(self.times) - 2)
         velocity, acceleration = (_max_between(most, first, last) for most in self._bounds)
@@ -192,7 +279,16 @@ class PiecewiseMotion(ByValue):
         return velocity, acceleration
 
     def scaled(self, factor: float) -> PiecewiseMotion:
-        """The same path in ``factor`` times the time."""
+        """The same path in another time: rates of order k are divided by the factor's power k.
+
+        Parameters
+        ----------
+        factor : new duration over the old one, greater than 0
+
+        Returns
+        -------
+        motion : through the same angles
+        """
         return PiecewiseMotion(self.times * factor, self.angle, self.velocity / factor, self.acceleration / factor**2)
 
 
@@ -204,6 +300,10 @@ def polynomial_motion(rates: Callable[[Reals], Rates], breaks: Reals, degree: in
     rates : angles, velocities and accelerations (..., n) at times (...,) in s
     breaks : (m + 1,), s, rising; those that repeat the one before, to rounding, are left out
     degree : of the angles
+
+    Returns
+    -------
+    motion : of m pieces at most; each series interpolates its own values
     """
     breaks = np.asarray(breaks, float)
     times = breaks[np.concatenate([[True], np.diff(breaks) > SAME_TIME * (breaks[-1] - breaks[0])])]
@@ -234,7 +334,16 @@ def chebyshev_times(start: Reals, end: Reals, degree: int) -> tuple[Reals, Reals
 
 
 def evaluated_between(series: Reals) -> Reals:
-    """Series (m, d + 1, n) at the points between the nodes, (m, d + 2, n), of :func:`chebyshev_times`."""
+    """Series at the points between the nodes of :func:`chebyshev_times`, where an interpolation misses most.
+
+    Parameters
+    ----------
+    series : (m, d + 1, n)
+
+    Returns
+    -------
+    values : (m, d + 2, n)
+    """
     degree = series.shape[1] - 1
     x = np.cos(np.pi * np.arange(degree + 2) / (degree + 1)) * (1 - INSET)
     values: Reals = np.einsum("xk,mkn->mxn", chebyshev.chebvander(x, degree), series)
@@ -242,14 +351,33 @@ def evaluated_between(series: Reals) -> Reals:
 
 
 def motion_through(angles: Reals, times: Reals) -> PiecewiseMotion:
-    """The motion through angles (m, d + 1, n) at the Chebyshev points of pieces with ends (m + 1,) in s."""
+    """The motion through joint angles at the Chebyshev points of its pieces; rates are its derivatives.
+
+    Parameters
+    ----------
+    angles : (m, d + 1, n), rad or m, at the nodes of :func:`chebyshev_times`
+    times : (m + 1,), s, ends of the pieces, rising
+
+    Returns
+    -------
+    motion : of degree d at most
+    """
     angle = _trimmed(interpolated(angles))
     velocity = _slope(times, angle)
     return PiecewiseMotion(times, angle, velocity, _slope(times, velocity))
 
 
 def turning_points(series: Reals) -> Reals:
-    """Where (x within -1..1) a Chebyshev series (d + 1,) has slope 0, and perhaps some points more."""
+    """Where a Chebyshev series may turn: the real roots of its derivative, as eigenvalues of the colleague matrix [1]_.
+
+    Parameters
+    ----------
+    series : (d + 1,), over -1 to 1
+
+    Returns
+    -------
+    x : (k,), rising, inside -1 to 1; a few points where it does not turn may be among them
+    """
     slope = chebyshev.chebder(series)
     size = np.abs(slope)
     if not size.max() > 0 or abs(slope[0]) > size[1:].sum():
@@ -271,7 +399,16 @@ def _max_between(values: Reals, first: Integers, last: Integers) -> Reals:
 
 
 def interpolated(values: Reals) -> Reals:
-    """Chebyshev coefficients (m, d + 1, n) through values (m, d + 1, n) at the Chebyshev points."""
+    """Chebyshev coefficients of the polynomials through values at the Chebyshev points (the roots of T_{d+1}).
+
+    Parameters
+    ----------
+    values : (m, d + 1, n), from x = 1 downwards, as of :func:`chebyshev_times`
+
+    Returns
+    -------
+    series : (m, d + 1, n)
+    """
     count = values.shape[1]
     angles = np.pi * (np.arange(count) + 0.5) / count
     basis = np.cos(np.outer(np.arange(count), angles)) * 2 / count
@@ -295,7 +432,18 @@ def _slope(times: Reals, series: Reals) -> Reals:
 
 
 def evaluated(series: Reals, i: Integers, x: Reals) -> Reals:
-    """Series (m, d + 1, n) of pieces i (...,) at x (...,), by Clenshaw's recurrence; (..., n)."""
+    """Values of pieces by Clenshaw's recurrence.
+
+    Parameters
+    ----------
+    series : (m, d + 1, n), Chebyshev coefficients
+    i : (...,), numbers of the pieces
+    x : (...,), -1 to 1, places in them
+
+    Returns
+    -------
+    values : (..., n)
+    """
     x = x[..., None]
     b1 = b2 = np.zeros(series.shape[2])
     for k in range(series.shape[1] - 1, 0, -1):

@@ -19,8 +19,8 @@ from er3a.errors import Er3aError
 from er3a.numerics.arrays import Integers, Reals
 
 Rates = tuple[Reals, Reals, Reals]
-HALVINGS = 60
-SAME_SHARE = 1e-13
+HALVINGS = 60  # more than a time has binary digits
+SAME_SHARE = 1e-13  # of the path, within which a share is that of a break
 BEYOND = 1e-6  # by which times and shares may miss a motion's ends, of the whole
 Ends = tuple[Reals | float, Reals | float]
 
@@ -54,7 +54,18 @@ class LegTimes:
 
 
 def check_times(t: Reals, start: float, end: float) -> None:
-    """:class:`er3a.Er3aError` for times (...,) in s before the start or after the end of a motion; NaN passes."""
+    """Refuse times before the start or after the end of a motion; NaN passes.
+
+    Parameters
+    ----------
+    t : (...,), s
+    start, end : s; a share ``BEYOND`` of the duration is left for rounding
+
+    Raises
+    ------
+    Er3aError
+        for a time beyond them
+    """
     slack = BEYOND * (end - start)
     if t.size and (t.min() < start - slack or t.max() > end + slack):
         raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from {start:g} to {end:g} s")
@@ -124,10 +135,12 @@ class TimeLaw(Protocol):
     """
 
     @property
-    def breaks(self) -> Reals: ...
+    def breaks(self) -> Reals:
+        """(m,), s, from start to end, between which the share is a polynomial."""
 
     @property
-    def degree(self) -> int: ...
+    def degree(self) -> int:
+        """Degree of the polynomials, at most."""
 
     def __call__(self, t: Reals) -> Rates: ...
 
@@ -148,7 +161,7 @@ class FromRestToRest:
 
     @property
     def breaks(self) -> Reals:
-        """See :class:`TimeLaw`."""
+        """(m,), s, the halts, and the ends of a trapezoid's ramps."""
         if self.ramp is None:
             return self.times
         part = self.ramp * np.diff(self.times)
@@ -156,7 +169,7 @@ class FromRestToRest:
 
     @property
     def degree(self) -> int:
-        """See :class:`TimeLaw`."""
+        """5 for the quintic, 2 for the trapezoid."""
         return 5 if self.ramp is None else 2
 
     def __call__(self, t: Reals) -> Rates:
@@ -193,12 +206,12 @@ class Timetable:
 
     @property
     def breaks(self) -> Reals:
-        """See :class:`TimeLaw`."""
+        """(k,), s, the given times."""
         return self.times
 
     @property
     def degree(self) -> int:
-        """See :class:`TimeLaw`."""
+        """3: cubic between the given times."""
         return 3
 
     def __call__(self, t: Reals) -> Rates:
@@ -216,7 +229,16 @@ class Timetable:
 
 
 def times_at(law: TimeLaw, shares: Reals) -> Reals:
-    """When a law has done shares (k,) of the way, s; the first such time to rounding."""
+    """When a law has done given shares of the way; the first such time to rounding.
+
+    Parameters
+    ----------
+    shares : (k,), 0 to 1
+
+    Returns
+    -------
+    t : (k,), s
+    """
     breaks = law.breaks
     done = law(breaks)[0]
     after = np.clip(np.searchsorted(done, shares, side="left"), 1, len(breaks) - 1)

@@ -56,15 +56,33 @@ class Arc(Segment):
 
     @property
     def length(self) -> float:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Radius times angle, m."""
         return self.radius * self.angle
 
     def points(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.Segment`."""
+        """The tool point along the circle.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        points : (..., 3), m, base frame
+        """
         return self.centre + self._spokes(np.asarray(progress, float))
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Velocity of the tool per unit of progress, and its derivative.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
         spokes = self._spokes(np.asarray(progress, float))
         turning = np.broadcast_to(self.rotation, spokes.shape)
         first = np.concatenate([self.angle * np.cross(self.normal, spokes), turning], axis=-1)
@@ -87,17 +105,35 @@ class ArcWithPath(Arc):
 
     @property
     def turned(self) -> float:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Size of the angular velocity, which is constant, per unit of progress: rad."""
         return float(np.linalg.norm(self._turning))
 
     def poses(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Poses of the tool, which the circle carries along.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         beside = super().poses(progress)
         beside[..., :3, :3] = self._carried(np.asarray(progress, float)) @ beside[..., :3, :3]
         return beside
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Velocity of the tool per unit of progress, and its derivative.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
         first, second = super().twists(progress)
         first[..., 3:] = self._carried(np.asarray(progress, float)) @ self._turning
         second[..., 3:] = self.angle * np.cross(self.normal, first[..., 3:])
@@ -120,9 +156,19 @@ def arc(
     half_turn_axis: Reals | None = None,
     ramp: float | None = None,
 ) -> Arc:
-    """The arc from a pose of the tool through a point ``via`` (3,) in m to another pose.
+    """The arc from a pose of the tool through a point to another pose.
 
-    The rest is as for :func:`er3a.planning.moves.line`.
+    Parameters
+    ----------
+    T_start, T_end : (4, 4), T_base_tool, m
+    via : (3,), m, base frame
+    duration : s
+    half_turn_axis : (3,), base frame; for rotations by exactly half a turn, the side to which the axis shall point
+    ramp : share of the time of each ramp of a trapezoid; None for the quintic
+
+    Returns
+    -------
+    arc : from rest to rest, by less than a full circle
 
     Raises
     ------
@@ -147,7 +193,7 @@ def arc(
     return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))
 
 
-POWERS = 6
+POWERS = 6  # of a quintic, 0 to 5
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -165,7 +211,16 @@ class Curve:
     coefficients: Reals
 
     def piece(self, s: Reals) -> tuple[Integers, Reals]:
-        """Number of the piece, and the share of it, at parameters (...,)."""
+        """Which piece a parameter is in, and where in it.
+
+        Parameters
+        ----------
+        s : (...,), 0 to 1
+
+        Returns
+        -------
+        i, share : (...,), number of the piece from 0, and the share of it, 0 to 1
+        """
         s = np.asarray(s, float)
         i = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, len(self.coefficients) - 1)
         return i, (s - self.edges[i]) / (self.edges[i + 1] - self.edges[i])
@@ -186,19 +241,33 @@ class Curve:
 
 
 def straight(start: Reals, end: Reals) -> Reals:
-    """Coefficients (6, k) of the straight piece between two points (k,)."""
+    """The straight piece between two points, as coefficients of powers.
+
+    Parameters
+    ----------
+    start, end : (k,), in any unit
+
+    Returns
+    -------
+    coefficients : (6, k), of the powers 0 to 5 of the piece's share; those from 2 on are 0
+    """
     found = np.zeros((POWERS, len(start)))
     found[0], found[1] = start, np.subtract(end, start)
     return found
 
 
 def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float | Reals) -> Reals:
-    """Coefficients (6, k) of the piece that takes over value and derivatives (k,) ``before`` and ends with ``after``.
+    """The quintic piece that takes over value and derivatives on one side and joins those on the other.
 
     Parameters
     ----------
+    before, after : value, first and second derivative, each (k,)
     span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
-        values are (m, k) and coefficients (6, m, k)
+        values are (m, k)
+
+    Returns
+    -------
+    coefficients : (6, k), of the powers 0 to 5 of the piece's share; (6, m, k) of m pieces
     """
     x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
     x1, v1, a1 = after[0], after[1] * span, after[2] * span**2
@@ -296,28 +365,64 @@ class SegmentPath(ByValue):
 
     @property
     def edges(self) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """(m,), shares of the path, 0 to 1, where its pieces meet."""
         return self.curve.edges
 
     def progress(self, t: Reals) -> Rates:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Share of the path done, with its derivatives by time.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        progress, first, second : (...,), 0 to 1, 1/s and 1/s^2
+        """
         return self.law(t)
 
     def poses(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Poses of the tool along the path.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         progress = np.asarray(progress, float)
         values = self._values(progress)[0]
         i = self.curve.piece(progress)[0]
         return posed(exp_rotation(values[..., 3:]) @ self.origins[i], values[..., :3])
 
     def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Velocity of the tool per unit of progress, and its derivative.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
+        """
         x, dx, ddx = self._values(np.asarray(progress, float))
         omega, slope = spin(x[..., 3:], dx[..., 3:], ddx[..., 3:])
         return np.concatenate([dx[..., :3], omega], axis=-1), np.concatenate([ddx[..., :3], slope], axis=-1)
 
     def arc_length(self, progress: Reals) -> Reals:
-        """See :class:`er3a.planning.moves.ToolPath`; by Gauss quadrature with 12 points per piece."""
+        """Length of the tool point's path so far, by Gauss quadrature with 12 points per piece.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        length : (...,), m
+        """
         progress = np.asarray(progress, float)
         edges = self.curve.edges
         whole = np.concatenate([[0.0], np.cumsum(self._lengths(edges[:-1], edges[1:]))])
@@ -325,7 +430,12 @@ class SegmentPath(ByValue):
         return whole[i] + self._lengths(edges[i], progress)
 
     def half_turns(self) -> tuple[tuple[int, Reals], ...]:
-        """See :class:`er3a.planning.moves.ToolPath`."""
+        """Turns by exactly 180 deg, whose sense had to be chosen.
+
+        Returns
+        -------
+        turns : number of the segment (from 1), and the axis taken, a unit vector (3,) in the base frame
+        """
         return self.turns
 
     def _lengths(self, start: Reals, end: Reals) -> Reals:
@@ -369,14 +479,28 @@ class JointSequence:
     misses: Reals
 
     def joints(self, t: Reals) -> Rates:
-        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., 6)."""
+        """Angles, velocities and accelerations at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., 6), rad, rad/s and rad/s^2
+        """
         progress, speed, acceleration = self.law(t)
         q, dq, ddq = self.curve(progress)
         speed, acceleration = speed[..., None], acceleration[..., None]
         return q, dq * speed, ddq * speed**2 + dq * acceleration
 
     def polynomials(self) -> PiecewiseMotion:
-        """The sequence as polynomials in time: of each piece of the curve within each piece of the law."""
+        """The sequence as polynomials in time, one for each piece of the curve within each piece of the law.
+
+        Returns
+        -------
+        motion : rad and s
+        """
         breaks = np.unique(np.concatenate([self.law.breaks, times_at(self.law, self.curve.edges[1:-1])]))
         return polynomial_motion(self.joints, breaks, self.law.degree * (POWERS - 1))
 
@@ -395,14 +519,18 @@ class _Piece:
 def segment_path(
     segments: Many[Segment], blends: Reals, timing: float | Times | LegTimes, ramp: float | None = None
 ) -> SegmentPath:
-    """Put segments together.
+    """Put lines and arcs together to one path, with rounded corners or stops between them.
 
     Parameters
     ----------
-    segments : each starting where the one before ends, none of length 0; their durations are ignored
+    segments : n, each starting where the one before ends, none of length 0; their durations are ignored
     blends : (n - 1,), m, over which length on either side each corner is rounded; 0 for a corner to stop at
     timing : s, divided between halts by path length; or the times of the corners; or those of the legs
     ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
+
+    Returns
+    -------
+    path : in m, rad and s
 
     Raises
     ------
@@ -450,9 +578,23 @@ def segment_path(
 def joint_sequence(
     points: Reals, blends: Reals, timing: float | Times | LegTimes, ramp: float | None = None
 ) -> JointSequence:
-    """The path through joint angles ``points`` (n, 6) in rad; ``blends`` in rad of the joint that turns most.
+    """The path through joint angles, with rounded corners.
 
-    The rest is as for :func:`segment_path`.
+    Parameters
+    ----------
+    points : (n, 6), rad
+    blends : (n - 2,), rad of the joint that turns most, over which each corner is rounded on either side; 0 stops there
+    timing : s, divided between halts by joint travel; or the times of the corners; or those of the legs
+    ramp : share of the time of each ramp of a trapezoid between halts; None for the quintic
+
+    Returns
+    -------
+    sequence : in rad and s
+
+    Raises
+    ------
+    PathError
+        for two equal points, or a rounding longer than half of a side
     """
     steps = np.diff(points, axis=0)
     sizes = np.abs(steps).max(axis=1)

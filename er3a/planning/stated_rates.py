@@ -73,24 +73,54 @@ class StatedMotion:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Time of the last point, s."""
         return float(self.curve.edges[-1])
 
     def joints(self, t: Reals) -> Rates:
-        """Joint values, velocities and accelerations at times (...,) in s, each (..., n);
-        :class:`er3a.Er3aError` beyond start and end."""
+        """Joint values, velocities and accelerations at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., n), rad or m, per s and per s^2
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         t = np.asarray(t, float)
         check_times(t, 0.0, self.duration)
         return self.curve(t)
 
     def polynomials(self) -> PiecewiseMotion:
-        """The motion as its polynomials."""
+        """The motion as its polynomials of fifth degree.
+
+        Returns
+        -------
+        motion : one piece between each two points, rad or m
+        """
         return polynomial_motion(self.curve, self.curve.edges, POWERS - 1)
 
 
 def stated_motion(times: Reals, points: Reals, rates: StatedRates) -> StatedMotion:
-    """The motion through points (k, n) at times (k,) in s, rising from 0.
+    """The motion through points at their times, by the interpolation of ros2_control [1]_.
 
+    Parameters
+    ----------
+    times : (k,), s, rising from 0
+    points : (k, n), rad or m
+    rates : velocities and accelerations (k, n) that the points state, NaN where they state none
+
+    Returns
+    -------
+    motion : quintics, and what the stated rates contradict
+
+    Notes
+    -----
     A polynomial of lower degree is the quintic whose missing rates are those of that polynomial at its ends.
     """
     span = np.diff(times)[:, None]

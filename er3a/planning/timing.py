@@ -35,7 +35,7 @@ SHARPEST_BEND = 0.15  # rad, between two steps in joint space measured in full s
 SHORTEST_STEP = 2e-4  # s at full speed; bends sharper than this count as corners
 SAME_NODE = 1e-5  # s at full speed
 MAX_ROUNDS = 30
-STRAIGHT_NODES = 81
+STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
@@ -113,31 +113,40 @@ class Timed:
 
     @property
     def t(self) -> Reals:
-        """See above."""
+        """(N,), s, rising from 0: where the pieces meet."""
         return self.curve.times
 
     @property
     def q(self) -> Reals:
-        """See above."""
+        """(N, n), rad, at the times ``t``."""
         return self._rates[0]
 
     @property
     def velocity(self) -> Reals:
-        """See above."""
+        """(N, n), rad/s, at the times ``t``."""
         return self._rates[1]
 
     @property
     def acceleration(self) -> Reals:
-        """See above."""
+        """(N, n), rad/s^2, at the times ``t``."""
         return self._rates[2]
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration, s."""
         return self.curve.duration
 
     def ratios(self, limits: JointLimits) -> tuple[float, float]:
-        """Largest ratio of a joint's speed to its limit, and of its acceleration to its limit, on the whole curve."""
+        """Largest ratios of rates to their limits, over all joints and the whole curve.
+
+        Parameters
+        ----------
+        limits : of speed (rad/s) and acceleration (rad/s^2), each (n,)
+
+        Returns
+        -------
+        speed, acceleration : 1 for a joint that is as fast as its limit
+        """
         speed, acceleration = self.max_rates
         return float((speed / limits.speed).max()), float((acceleration / limits.acceleration).max())
 
@@ -154,10 +163,18 @@ def joint_limits(
     acceleration: Reals | None = None,
     jerk: Reals | None = None,
 ) -> JointLimits:
-    """The robot's joint speeds, with ``assumed_speed`` (n,) in rad/s where they are unknown.
+    """The limits of a robot's joint rates, assumed where its table gives none.
 
-    Tables give no accelerations: where none are given (n,), each joint is taken to reach its full speed in
-    ``acceleration_time`` seconds.
+    Parameters
+    ----------
+    assumed_speed : (n,), rad/s or m/s, where a speed is unknown
+    acceleration_time : s, in which each joint is taken to reach its full speed where no accelerations are given
+    acceleration : (n,), rad/s^2 or m/s^2; None where none are given, as in tables
+    jerk : (n,), rad/s^3 or m/s^3; None for no limit
+
+    Returns
+    -------
+    limits : which of them are assumed is noted
     """
     known = np.isfinite(robot.speed)
     speed = np.where(known, robot.speed, assumed_speed)
@@ -173,6 +190,10 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
     ----------
     joints : angles (n, 6) in rad at times (n,)
     t, q : (N,) s and (N, 6) rad, to begin with
+
+    Returns
+    -------
+    t, q : (M,) s and (M, 6) rad, M >= N, the given points among them
     """
     for _ in range(MAX_ROUNDS):
         steps = np.diff(q, axis=0) / limits.speed
@@ -193,12 +214,18 @@ def nodes_along(joints: Callable[[Reals], Reals], t: Reals, q: Reals, limits: Jo
 
 
 def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> Timed:
-    """Run along nodes (N, 6) in rad from rest to rest, as fast as the limits allow.
+    """Run along nodes from rest to rest, as fast as the limits allow, by TOPP-RA [1]_.
 
     Parameters
     ----------
+    q : (N, n), rad
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
     programmed : (N,), s, rising: times at which the programme is at the nodes; no stretch is run faster, but for
         what the nodes leave open of the programme's speed, and the whole takes no less time
+
+    Returns
+    -------
+    motion : on cubic splines through the nodes
 
     Raises
     ------
@@ -224,11 +251,17 @@ def fastest(q: Reals, limits: JointLimits, programmed: Reals | None = None) -> T
 
 
 def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate.CubicSpline] | None:
-    """The spline through nodes (N, n) at path parameters ``s`` (N,), without those of one place; None of a single one.
+    """The cubic spline through nodes, without those of one place.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    s : (N,), path parameter, not falling
 
     Returns
     -------
     kept : which nodes are left; s : (k,), their places, or more places on a path of two; spline
+        None in place of all if a single node is left
     """
     kept = np.flatnonzero(np.concatenate([[True], np.diff(s) > SAME_NODE]))
     if len(kept) < 2:
@@ -241,7 +274,17 @@ def path_through(q: Reals, s: Reals) -> tuple[Integers, Reals, scipy.interpolate
 
 
 def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float = 0.0) -> Timed:
-    """A motion, evenly slowed down if it exceeds a limit of speed or acceleration anywhere, or takes less than s."""
+    """A motion, evenly slowed down where it exceeds a limit or is too short.
+
+    Parameters
+    ----------
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
+    smallest : s, the duration at least
+
+    Returns
+    -------
+    motion : the curve as it is if it keeps both, else in as little time as they allow
+    """
     motion = Timed(curve)
     speed, acceleration = motion.ratios(limits)
     factor = max(speed, np.sqrt(acceleration), smallest / motion.duration)
@@ -249,7 +292,19 @@ def within_limits(curve: PiecewiseMotion, limits: JointLimits, smallest: float =
 
 
 def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: Reals) -> Callable[[Reals], Rates]:
-    """The path run at speeds (N,) at its nodes at times (N,), evenly accelerated between them."""
+    """The path run at given speeds at its nodes, evenly accelerated between them.
+
+    Parameters
+    ----------
+    s : (N,), path parameter at the nodes, rising
+    spline : joints (n,), rad, over the path parameter
+    speed : (N,), of the path parameter, per s
+    t : (N,), s, when it is at the nodes
+
+    Returns
+    -------
+    rates : from times (...,) in s to angles, velocities and accelerations, each (..., n)
+    """
     pull = np.diff(speed**2) / (2 * np.diff(s))
 
     def rates(at: Reals) -> Rates:
@@ -264,18 +319,52 @@ def run_along(s: Reals, spline: scipy.interpolate.CubicSpline, speed: Reals, t: 
 
 
 def straight(start: Reals, end: Reals, limits: JointLimits) -> Timed:
-    """The fastest synchronised joint move between two joint vectors (6,) in rad, from rest to rest."""
+    """The fastest synchronised joint move between two joint vectors, from rest to rest.
+
+    Parameters
+    ----------
+    start, end : (n,), rad
+    limits : of speed (rad/s) and acceleration (rad/s^2) of each joint
+
+    Returns
+    -------
+    motion : through ``STRAIGHT_NODES`` nodes
+
+    Raises
+    ------
+    TimingError
+        if there is no such time law
+    """
     return fastest(np.linspace(start, end, STRAIGHT_NODES), limits)
 
 
 def standing(q: Reals, duration: float) -> Timed:
-    """Rest at joint angles (n,)."""
+    """Rest at joint angles.
+
+    Parameters
+    ----------
+    q : (n,), rad
+    duration : s
+
+    Returns
+    -------
+    motion : one piece with all rates 0
+    """
     still = np.zeros((1, 1, len(q)))
     return Timed(PiecewiseMotion(np.array([0.0, duration]), q[None, None], still, still))
 
 
 def joined(parts: list[Timed]) -> Timed:
-    """Motions one after another, each starting at rest where the one before ended at rest."""
+    """Motions one after another, each starting at rest where the one before ended at rest.
+
+    Parameters
+    ----------
+    parts : at least one; those without duration are left out
+
+    Returns
+    -------
+    motion : its duration is the sum of theirs, s
+    """
     curves = [part.curve for part in parts if part.duration > 0] or [parts[-1].curve]
     starts = np.concatenate([[0.0], np.cumsum([curve.duration for curve in curves])])
     times = np.concatenate([[0.0], *(curve.times[1:] + start for curve, start in zip(curves, starts))])
@@ -310,7 +399,18 @@ def toppra_library() -> Any:
 
 
 def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
-    """The path as toppra takes it; a joint whose slope is no more than ``at_rest`` is at rest and has no friction."""
+    """The path in the form that toppra takes.
+
+    Parameters
+    ----------
+    s : (N,), path parameter at the nodes, rising
+    spline : joints (n,), rad, over the path parameter
+    at_rest : slope, rad per unit of s, up to which a joint counts as at rest and has no friction
+
+    Returns
+    -------
+    path : an ``AbstractGeometricPath`` of toppra
+    """
     count: int = spline.c.shape[-1]
 
     class Path(toppra_library().interpolator.AbstractGeometricPath):  # type: ignore[misc]
@@ -329,20 +429,33 @@ def _programmed_speed(cap: Reals, joints: int) -> Any:
 
     class Programme(toppra_library().constraint.LinearConstraint):  # type: ignore[misc]
         def get_dof(self) -> int:
+            """Number of joints."""
             return joints
 
         def compute_constraint_params(self, path: Any, gridpoints: Any) -> tuple[Reals | None, ...]:
+            """What toppra asks for: a, b, c, F, g, bounds of u and bounds of x, the squared speed along the path."""
             return None, None, None, None, None, None, np.stack([np.zeros_like(cap), cap**2], axis=1)
 
     return Programme()
 
 
 def solved(path: Any, s: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
-    """Speeds along the path and times (s) at its nodes (N,), from rest to rest; :class:`TimingError` if there are none.
+    """The fastest speeds along a path from rest to rest, by toppra's solver.
 
     Parameters
     ----------
-    path : see :func:`toppra_path`; constraints : of toppra
+    path : see :func:`toppra_path`
+    s : (N,), path parameter at the nodes, rising
+    constraints : of toppra
+
+    Returns
+    -------
+    speed, t : (N,), of the path parameter per s, and s from 0, at the nodes
+
+    Raises
+    ------
+    TimingError
+        if there is no time law, or one that has to wait on the way
     """
     solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=s, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0, 0)

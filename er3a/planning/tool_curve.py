@@ -28,8 +28,8 @@ from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, evaluated_
 from er3a.planning.profiles import times_at
 from er3a.robots.robot import Robot
 
-DEGREE = 16
-FIRST_PIECES = 32
+DEGREE = 16  # of the polynomials, piece by piece
+FIRST_PIECES = 32  # evenly over the path, before any is halved
 SHORTEST = 1e-6, 1e-9  # share of the duration and of the path, of pieces that miss rates, and that miss angles or reach
 SAME_TIME = 1e-9  # share of the duration
 CLOSE = np.array([1e-9, 1e-8, 1e-7])[:, None]  # rad, rad/s, rad/s^2; relative where a rate is greater than 1
@@ -80,13 +80,32 @@ def follow_as_curve(
 
 
 def open_stretches(curve: PiecewiseMotion) -> list[Interval[Undecided]]:
-    """The gaps of a curve: where the closed form could not be met, or does not reach."""
+    """The gaps of a curve: where the closed form could not be met, or does not reach.
+
+    Parameters
+    ----------
+    curve : of n joints, with NaN rates in the gaps
+
+    Returns
+    -------
+    intervals : from start to end of each gap, s
+    """
     times = curve.times.tolist()
     return [Interval(times[a], times[b], Undecided()) for a, b in runs(np.isnan(curve.velocity[:, 0, 0]))]
 
 
 def curve_of(followed: Followed) -> tuple[PiecewiseMotion, Reals]:
-    """The motion along a followed path, and times out of reach between two of its own that are not."""
+    """The motion of the joints along a followed path, as polynomials that equal the closed form.
+
+    Parameters
+    ----------
+    followed : the path, and the branches along it
+
+    Returns
+    -------
+    motion : (6 joints), rad and s, with NaN rates in gaps
+    lost : (k,), s, times out of reach between two grid points of the path that are not
+    """
     law, duration = followed.line.law, followed.line.duration
     even = np.linspace(0.0, duration, FIRST_PIECES + 1)
     edges = np.unique(np.concatenate([even, law.breaks, times_at(law, followed.line.edges)]))

@@ -106,7 +106,15 @@ def zyz(T: Reals) -> Reals:
 
 
 def quaternion(T: Reals) -> Reals:
-    """Unit quaternions (..., 4), w, x, y, z with w at least 0, of poses (..., 4, 4).
+    """Unit quaternions of poses.
+
+    Parameters
+    ----------
+    T : (..., 4, 4), m
+
+    Returns
+    -------
+    q : (..., 4), in the order w, x, y, z with w >= 0
 
     Raises
     ------

@@ -41,18 +41,18 @@ from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
 from er3a.robots.robot import Robot
 
 ROUNDS = 4000
-SHORT_CUTS = 50
+SHORT_CUTS = 50  # random ones that are tried
 LONGEST_MOVE = 1.5  # rad of all joints together, by which a tree grows at a time
 SHORTEST_STEP = 2e-3  # rad of the joint that turns most, by which a move advances beside an obstacle
 MARGINS = (0.008, 0.003, 0.0)  # m beyond the tolerance, tried in this order
 FROM_LIMITS, FROM_ENDS = np.radians(2.0), 0.002  # rad, m of those that slide: drawn joints keep from their limits
 ROUNDINGS = (1.0, 0.5, 0.2, 0.0)  # of half of the shorter side
 NODES = 240
-SHOWN = 101
+SHOWN = 101  # times at which the clearance of a way is returned
 STILL = 1e-9  # rad
 SPARE = 0.25  # of the clearance at the ends, to within which that of the motion is found
 STREAM = 17
-MAX_PAIRS = 4
+MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its rounds
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
@@ -129,7 +129,20 @@ class PlanningTask:
 
 
 def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWayAround:
-    """Find a motion from joint angles (n,) to (n,) in rad."""
+    """Find a motion between two joint vectors that is proven clear.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+
+    Returns
+    -------
+    found : the timed motion with its proven clearance, or why there is none
+
+    References
+    ----------
+    RRT-Connect [1]_ as OMPL has it [2]_.
+    """
     if task.bodies is None:
         return NothingMeasured()
     clear = _clear_at_ends(task, task.bodies, start, end)
@@ -182,20 +195,48 @@ class PlannedMove:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration, s."""
         return self.curve.duration
 
     def joints(self, t: Reals) -> Rates:
-        """Angles (rad), velocities (rad/s) and accelerations (rad/s^2) at times (...,) in s; each (..., n)."""
+        """Angles, velocities and accelerations at times.
+
+        Parameters
+        ----------
+        t : (...,), s, from 0 to ``duration``
+
+        Returns
+        -------
+        q, velocity, acceleration : (..., n), rad, rad/s and rad/s^2
+
+        Raises
+        ------
+        Er3aError
+            for times beyond start and end
+        """
         return self.curve.rates(t)
 
     def polynomials(self) -> PiecewiseMotion:
-        """The motion itself."""
+        """The motion itself, piece by piece.
+
+        Returns
+        -------
+        motion : rad and s
+        """
         return self.curve
 
 
 def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | NoWayAround:
-    """The motion between the nearest pair of starts (k, n) and ends (m, n) in rad between which one is found."""
+    """The motion between the nearest start and end for which one is found.
+
+    Parameters
+    ----------
+    starts, ends : (k, n) and (m, n), rad or m: joint solutions of the two poses
+
+    Returns
+    -------
+    found : of the ``MAX_PAIRS`` nearest pairs the first with a motion; else why the last one has none
+    """
     pairs = sorted(
         (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
     )
@@ -222,11 +263,29 @@ class _Moves:
         self.levers = reach + np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
 
     def clear(self, q: Reals) -> float:
-        """Smallest distance of an arm, m."""
+        """Smallest distance of an arm from itself and the scene.
+
+        Parameters
+        ----------
+        q : (n,), rad or m
+
+        Returns
+        -------
+        distance : m, negative by the depth of overlap
+        """
         return float(self.bodies.min_distance(q[None])[0][0])
 
     def free(self, a: Reals, b: Reals) -> bool:
-        """Whether the move from a to b (n,) keeps the margin."""
+        """Whether the straight joint move between two arms keeps the margin, by conservative advancement.
+
+        Parameters
+        ----------
+        a, b : (n,), rad or m
+
+        Returns
+        -------
+        free : steps are no shorter than ``SHORTEST_STEP``, so that a thin violation may pass; the final proof sees it
+        """
         turn, of_rows = np.abs(b - a), np.abs(self.coupling @ (b - a))
         swing, smallest = float(self.levers @ of_rows), SHORTEST_STEP / max(float(turn.max()), SHORTEST_STEP)
         if any(self.clear(a + share * (b - a)) < self.margin for share in LIKELY):
@@ -263,6 +322,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
 
     class Advancement(base.MotionValidator):  # type: ignore[misc]
         def checkMotion(self, first: Any, second: Any) -> bool:
+            """Whether the straight move between two states of OMPL keeps the margin."""
             return moves.free(joints(first), joints(second))
 
     info.setStateValidityChecker(lambda state: moves.clear(joints(state)) >= moves.margin)

@@ -134,11 +134,17 @@ class BoardNotFoundError(Er3aError):
 def board_views(
     images: Sequence[Image], board: Board, camera: Camera | None = None, pixel_deviation: float = 0.3
 ) -> BoardViews:
-    """Poses of a board in grey images (h, w).
+    """Poses of a board in grey images, with their covariances.
 
     Parameters
     ----------
+    images : (h, w) each, all of one size
     camera : intrinsics; None to estimate them from these images
+    pixel_deviation : standard deviation of a corner in each direction, pixels
+
+    Returns
+    -------
+    views : of the N images that show the board, T_camera_board (N, 4, 4), m
 
     Raises
     ------
@@ -168,7 +174,25 @@ def views_of_corners(
     camera: Camera | None = None,
     pixel_deviation: float = 0.3,
 ) -> BoardViews:
-    """Poses of a board of corners (k, 3), m, that were found at (k, 2) pixels; otherwise as :func:`board_views`."""
+    """Poses of a board from corners that were found in images, with their covariances.
+
+    Parameters
+    ----------
+    points : N arrays (k, 3), m, on the board
+    corners : N arrays (k, 2), pixels, where they were found
+    size : width and height of the images, pixels
+    camera : intrinsics; None to estimate them from these corners
+    pixel_deviation : standard deviation of a corner in each direction, pixels
+
+    Returns
+    -------
+    views : T_camera_board (N, 4, 4), m, with covariances by the camera's axes
+
+    Raises
+    ------
+    Er3aError
+        if OpenCV is missing, or too few images are to give intrinsics too
+    """
     estimated = camera is None
     camera = estimated_camera(points, corners, size) if camera is None else camera
     found = [_pose(P, c, camera, pixel_deviation) for P, c in zip(points, corners)]
@@ -191,7 +215,17 @@ def views_of_corners(
 
 
 def intrinsics_covariance(found: Sequence[_Pose], corners: Sequence[Reals]) -> Reals:
-    """Covariance (k, k) of intrinsics that are estimated from all corners: of fx, fy, cx, cy and the distortion."""
+    """Covariance of intrinsics that are estimated from all corners, the poses eliminated by Schur's complement.
+
+    Parameters
+    ----------
+    found : N poses, with the derivatives of their corners
+    corners : N arrays (k, 2), pixels, where they were found; their misfit gives the scale
+
+    Returns
+    -------
+    covariance : (c, c), of fx, fy, cx, cy (pixels) and the distortion
+    """
     k = found[0].by_camera.shape[1]
     information, squares = np.zeros((k, k)), 0.0
     for each, seen in zip(found, corners):
@@ -204,13 +238,43 @@ def intrinsics_covariance(found: Sequence[_Pose], corners: Sequence[Reals]) -> R
 
 
 def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousTilt, ...]:
-    """The images that leave open which way the board is tilted; ``names`` of the samples, N."""
+    """The images that leave open which way the board is tilted.
+
+    Parameters
+    ----------
+    views : N of them
+    names : N, of the samples
+
+    Returns
+    -------
+    findings : where the other pose's reprojection errors are less than ``MIN_RATIO`` times as large
+    """
     found = zip(names, views.ambiguous.tolist())
     return tuple(AmbiguousTilt(name, ratio) for name, ratio in found if ratio < MIN_RATIO)
 
 
 def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:
-    """Intrinsics, after Zhang, from corners of at least five images of (width, height)."""
+    """Intrinsics and distortion from corners of a flat board, as OpenCV estimates them.
+
+    Parameters
+    ----------
+    points : N arrays (k, 3), m, on the board
+    corners : N arrays (k, 2), pixels
+    size : width and height of the images, pixels
+
+    Returns
+    -------
+    camera : matrix (3, 3) in pixels, and distortion
+
+    Raises
+    ------
+    Er3aError
+        for fewer than ``MIN_IMAGES`` images, or if OpenCV is missing
+
+    Notes
+    -----
+    The method is that of Z. Zhang, "A flexible new technique for camera calibration", IEEE T-PAMI 22(11), 2000.
+    """
     if len(points) < MIN_IMAGES:
         raise Er3aError(f"{len(points)} images can't give the camera's intrinsics too; take {MIN_IMAGES}, or give them")
     cv2 = opencv()
@@ -220,7 +284,17 @@ def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tu
 
 
 def projected(points: Reals, T_camera_board: Reals, camera: Camera) -> Reals:
-    """Where points (k, 3), m, of a board at T_camera_board (4, 4) stand in the image, (k, 2) pixels."""
+    """Pixels at which points of a board are seen.
+
+    Parameters
+    ----------
+    points : (k, 3), m, on the board
+    T_camera_board : (4, 4), m; the camera looks along its z axis, x to the right and y down
+
+    Returns
+    -------
+    pixels : (k, 2), distortion included
+    """
     turn = log_rotation(T_camera_board[:3, :3])
     pixels = opencv().projectPoints(points, turn, T_camera_board[:3, 3], camera.matrix, camera.distortion)[0]
     found: Reals = pixels.reshape(-1, 2)
@@ -228,14 +302,37 @@ def projected(points: Reals, T_camera_board: Reals, camera: Camera) -> Reals:
 
 
 def board_points(board: Board) -> Reals:
-    """The corners (k, 3), m, that detectors find on a chessboard or ChArUco board: its inner ones."""
+    """The corners that detectors find on a chessboard or ChArUco board: its inner ones.
+
+    Parameters
+    ----------
+    board : with squares along x and y
+
+    Returns
+    -------
+    points : (k, 3), m, in the board's frame, x fastest
+    """
     x, y = board.squares
     grid = np.stack(np.meshgrid(np.arange(x - 1), np.arange(y - 1)), axis=-1).reshape(-1, 2)
     return np.column_stack([grid * board.square, np.zeros(len(grid))])
 
 
 def board_drawing(board: Board) -> Any:
-    """OpenCV's own board, which can draw itself; chessboards have none."""
+    """OpenCV's own board, which can draw itself; chessboards have none.
+
+    Parameters
+    ----------
+    board : a grid of tags, or else taken as ChArUco; lengths in m
+
+    Returns
+    -------
+    drawing : a ``GridBoard`` or ``CharucoBoard``
+
+    Raises
+    ------
+    Er3aError
+        if OpenCV is missing, or knows no such dictionary of markers
+    """
     cv2 = opencv()
     dictionary = cv2.aruco.getPredefinedDictionary(_dictionary(board.dictionary))
     marker = float(board.marker or board.square / 2)
@@ -259,6 +356,7 @@ def _detector(board: Board) -> Any:
         inner = (board.squares[0] - 1, board.squares[1] - 1)
 
         def chessboard(image: Image) -> tuple[Reals, Reals]:
+            """Inner corners, all or none."""
             found, corners = cv2.findChessboardCornersSB(image, inner, flags=cv2.CALIB_CB_ACCURACY)
             return (board_points(board), corners.reshape(-1, 2).astype(float)) if found else _NOTHING
 
@@ -269,6 +367,7 @@ def _detector(board: Board) -> Any:
         origin = np.array([board.square, board.square, 0.0])
 
         def charuco(image: Image) -> tuple[Reals, Reals]:
+            """Inner corners that are seen, counted from the first one, a square in from the board's edge."""
             corners, numbers, _, _ = detector.detectBoard(image)
             if numbers is None:
                 return _NOTHING

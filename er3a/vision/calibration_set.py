@@ -80,7 +80,12 @@ class CalibrationSet(ByValue, Displayed):
         return len(self.flange)
 
     def sheet(self) -> Sheet:
-        """Where flange and board were, in mm."""
+        """What the notebook shows: where flange and board were, in mm.
+
+        Returns
+        -------
+        sheet : a row for each sample
+        """
         rows = zip(self.names, *(1000 * self.flange[:, :3, 3].T), *(1000 * self.target[:, :3, 3].T))
         columns = ("sample", *(f"{part}_{c}_mm" for part in ("flange", "board") for c in "xyz"))
         return Sheet.of_table(f"{len(self)} samples, {self.setup.replace('_', ' ')}", columns, rows, len(self))
@@ -101,8 +106,18 @@ class CalibrationSet(ByValue, Displayed):
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)
 
     def open_frames(self, simulated: bool) -> tuple[OpenFrame, ...]:
-        """Of which frames recorded poses may be others, as nothing is compared with them: joint values say which flange
-        and base are meant, touched points where the base is; simulated poses are known."""
+        """Frames in which recorded poses may be meant, as nothing is compared with them.
+
+        Joint values say which flange and base are meant, touched points where the base is; simulated poses are known.
+
+        Parameters
+        ----------
+        simulated : whether the samples were made by a simulation
+
+        Returns
+        -------
+        frames : empty if nothing is open
+        """
         if simulated or self.states_joints:
             return ()
         return ("flange_poses", "base_poses") if self.touched is None else ("flange_poses",)
@@ -113,7 +128,16 @@ class CalibrationSet(ByValue, Displayed):
         return self.of_joints or self.q is not None
 
     def take(self, rows: Flags | Integers) -> CalibrationSet:
-        """The chosen samples: a mask (N,) or numbers."""
+        """The chosen samples, with all that belongs to them; touched points stay.
+
+        Parameters
+        ----------
+        rows : a mask (N,), or numbers from 0 in any order
+
+        Returns
+        -------
+        samples : in the order of the numbers
+        """
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         covariance = self.camera_covariance
         return replace(
@@ -127,11 +151,11 @@ class CalibrationSet(ByValue, Displayed):
         )
 
 
-GRID_S = 0.02
+GRID_S = 0.02  # s, between offsets tried before the best is refined
 SPAN_S = 0.4  # over which turns are compared
-INLIER = 3.0
-MAX_PAIRS = 2000
-MIN_PAIRS = 10
+INLIER = 3.0  # standard deviations, beyond which a rotation counts as wrong
+MAX_PAIRS = 2000  # of rotations, that are compared at most
+MIN_PAIRS = 10  # of rotations, without which an offset is left open
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +191,18 @@ class OffsetOpenError(Er3aError):
 
 
 def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
-    """Estimate the offset within +-``widest`` s.
+    """Estimate the offset between the clocks of two streams, by rotation angles over short times.
 
     Robust: up to half of the compared rotations may be wrong.
+
+    Parameters
+    ----------
+    hand, eye : streams of poses with times in s
+    widest : s, the offset is sought within this to either side
+
+    Returns
+    -------
+    offset : to be added to the eye's times, s
 
     Raises
     ------
@@ -212,10 +245,19 @@ def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
 
 
 def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
-    """``count`` poses (count, 4, 4) of hand and eye at equal times (count,), s, spread over rotations.
+    """Poses of hand and eye at equal times, spread over rotations.
 
-    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before,
-    from the half of all times at which the arm is slowest, where an error of the offset matters least.
+    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before.
+    Only the half of all times counts at which the arm is slowest: there an error of the offset matters least.
+
+    Parameters
+    ----------
+    offset : s, to be added to the eye's times
+    count : how many poses; fewer if the streams have fewer in common
+
+    Returns
+    -------
+    hand, eye, t : (count, 4, 4), m, twice, and (count,), s by the hand's clock
     """
     inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
     t = eye.t[inside] + offset

@@ -24,18 +24,44 @@ Unknowns = tuple[Reals, Reals]
 
 
 def motions(F: Reals, B: Reals) -> tuple[Reals, Reals]:
-    """Motions (..., P, 4, 4) of hand and eye between all pairs of samples (..., N, 4, 4): A X = X C."""
+    """Motions of hand and eye between all pairs of samples: A X = X C.
+
+    Parameters
+    ----------
+    F, B : (..., N, 4, 4), m, see the module's text
+
+    Returns
+    -------
+    A, C : (..., P, 4, 4), m, of the P = N (N - 1) / 2 pairs i < j: ``F_j^-1 F_i`` and ``B_j B_i^-1``
+    """
     i, j = np.triu_indices(F.shape[-3], 1)
     return inverted(F[..., j, :, :]) @ F[..., i, :, :], B[..., j, :, :] @ inverted(B[..., i, :, :])
 
 
 def mean_pose(T: Reals) -> Reals:
-    """The mean (..., 4, 4) of transforms (..., N, 4, 4): of positions, and the rotation nearest to all."""
+    """The mean of transforms: of positions, and the rotation nearest to all in the least squares of their entries.
+
+    Parameters
+    ----------
+    T : (..., N, 4, 4), m
+
+    Returns
+    -------
+    mean : (..., 4, 4), m
+    """
     return posed(_nearest_rotation(T[..., :3, :3].mean(axis=-3)), T[..., :3, 3].mean(axis=-2))
 
 
 def park(F: Reals, B: Reals) -> Unknowns:
-    """X and Y (..., 4, 4) after Park and Martin [1]_.
+    """Hand-eye and board pose after Park and Martin [1]_: rotation from logarithms of motions, then position.
+
+    Parameters
+    ----------
+    F, B : (..., N, 4, 4), m, see the module's text
+
+    Returns
+    -------
+    X, Y : (..., 4, 4), m
 
     Raises
     ------
@@ -55,7 +81,15 @@ def park(F: Reals, B: Reals) -> Unknowns:
 
 
 def shah(F: Reals, B: Reals) -> Unknowns:
-    """X and Y (4, 4) of samples (N, 4, 4) after Shah [2]_, who takes them as B Y^-1 = X^-1 F^-1.
+    """Hand-eye and board pose after Shah [2]_, who takes the samples as B Y^-1 = X^-1 F^-1.
+
+    Parameters
+    ----------
+    F, B : (N, 4, 4), m, see the module's text
+
+    Returns
+    -------
+    X, Y : (4, 4), m
 
     Raises
     ------

@@ -36,7 +36,7 @@ DEPTH = 2e-4  # m, to within which the smallest clearance is found
 PEAKS = (15 / 8, 10 / np.sqrt(3), 60.0)  # of a quintic from rest to rest: speed, acceleration and jerk, by duration
 SPARE = 1.02  # of the duration, so that bounds settle what samples allow
 MIN_DURATION = 0.05  # s
-CHECKS = 41
+CHECKS = 41  # times of a leg at which it is solved and measured first; both are refined from there
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +57,33 @@ class GraspLeg:
     T_end: Reals | None = None
 
     def sampled(self, count: int) -> tuple[Reals, Reals]:
-        """Times (count,) in s from 0, and joints (count, n) in rad."""
+        """The leg at even times, both ends included.
+
+        Parameters
+        ----------
+        count : how many times
+
+        Returns
+        -------
+        t, q : (count,), s from 0, and (count, n), rad or m
+        """
         times = np.linspace(0.0, self.duration, count)
         return times, self.joints(times)
 
 
 def joint_legs(part: Part, corners: Reals, limits: JointLimits) -> tuple[GraspLeg, ...]:
-    """Straight moves of all joints from corner to corner (k, n), rad, as fast as their limits allow on quintics."""
+    """Straight moves of all joints from corner to corner, on quintics from rest to rest.
+
+    Parameters
+    ----------
+    part : of the grasp's way that the legs belong to
+    corners : (k, n), rad or m
+    limits : of speed and acceleration, which the legs use as far as they allow
+
+    Returns
+    -------
+    legs : k - 1
+    """
     return tuple(_joint_leg(part, a, b, limits) for a, b in pairwise(corners))
 
 
@@ -78,10 +98,19 @@ def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> Gra
 
 
 def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tuple[GraspLeg, ...] | NoWayAround:
-    """Legs from joints (n,) to joints (n,), rad, on which nothing touches; or why there are none.
+    """Legs from joints to joints on which nothing touches.
 
-    Where the straight move comes nearer to something than ``needed`` (m), a way around is tried; of both the one is
-    taken that keeps farther away.
+    Where the straight move comes too near to something, a way around is tried; of both the one is taken that keeps
+    farther away.
+
+    Parameters
+    ----------
+    start, end : (n,), rad or m
+    needed : m, clearance with which the straight move is good enough
+
+    Returns
+    -------
+    legs : or why there are none
     """
     if outside := limits_exceeded(task.robot, start):
         return EndOutsideLimits("start", outside)
@@ -107,12 +136,17 @@ def _clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> float:
 def tool_leg(
     robot: Robot, part: Part, waypoints: Reals, ends: tuple[Reals, Reals], limits: JointLimits, speed: float
 ) -> tuple[GraspLeg, ...] | None:
-    """The straight line of the tool between two poses (4, 4), within limits and off singular poses; None if that fails.
+    """The straight line of the tool between two poses, within limits and off singular poses.
 
     Parameters
     ----------
-    waypoints : (k, n), rad, joints along it, from a search
+    waypoints : (k, n), rad, joints along it, from a search; arms without closed form move straight between them
+    ends : (4, 4) each, T_base_tool, m
     speed : m/s, the tool's largest
+
+    Returns
+    -------
+    legs : one, or one for each two waypoints; None if no line keeps the limits
     """
     if parallel_axes_arm(robot) is None and wrist_partition_missing(robot) is not None:
         return joint_legs(part, waypoints, limits)
@@ -137,9 +171,17 @@ def tool_leg(
 
 
 def min_clearance(bodies: Bodies, legs: tuple[GraspLeg, ...]) -> tuple[float, Pair] | None:
-    """What the arm is proven to keep clear by along legs, m (below 0 where it overlaps), and what is nearest there.
+    """What the arm is proven to keep clear by along legs, and what is nearest there.
 
-    None where nothing can meet.
+    Parameters
+    ----------
+    bodies : of the arm and the scene
+    legs : one after another
+
+    Returns
+    -------
+    clearance, pair : m, below 0 where it overlaps, less the ``DEPTH`` that the proof leaves open
+        None in place of both where nothing can meet
     """
     smallest: tuple[float, Pair] | None = None
     for leg in legs:

@@ -252,12 +252,16 @@ def plan_grasp(
     T_base_object: Reals,
     covariance_at: Callable[[Reals], Reals],
 ) -> GraspPlan:
-    """Choose a grasp of one object.
+    """Choose a grasp of one object, by the largest of the smallest margins (see the module's text).
 
     Parameters
     ----------
-    T_base_object : (4, 4)
+    T_base_object : (4, 4), m
     covariance_at : from joint angles (n,) of a grasp to the covariance (6, 6) of the object's pose as the tool meets it
+
+    Returns
+    -------
+    plan : the grasp with its probability, or why there is none; and how many were tried
     """
     poses = _poses(target, T_base_object)
     candidates = [
@@ -414,8 +418,20 @@ def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:
 def success_probability(
     chosen: ChosenGrasp, target: DetectedObject, T_base_object: Reals, covariance: Reals, needs: GraspNeeds
 ) -> float:
-    """That the tool meets the object within the gripper's tolerance, in each of its six directions.
+    """Probability that the tool meets the object within the gripper's tolerance, in each of its six directions.
 
+    Parameters
+    ----------
+    T_base_object : (4, 4), m, as the camera puts it
+    covariance : (6, 6), of the object's pose: position (m) and rotation (rad) by the base's axes, about its origin
+    needs : with the tolerance along (m) and about (rad) the tool's axes
+
+    Returns
+    -------
+    probability : 0 to 1, by the draws of :func:`er3a.vision.point_error.draws`
+
+    Notes
+    -----
     A turn about the z axis of a rotationally symmetric object is not an error.
     """
     T = chosen.T_base_tool

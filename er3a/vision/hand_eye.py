@@ -78,12 +78,31 @@ class AngleCheck(ByValue):
 
 
 def angles_between(R: Reals) -> Reals:
-    """Angles (N, N) in rad between rotations (N, 3, 3)."""
+    """Angles between all pairs of rotations.
+
+    Parameters
+    ----------
+    R : (N, 3, 3)
+
+    Returns
+    -------
+    angles : (N, N), rad, 0 to pi
+    """
     return rotation_angle(R[:, None], R[None])
 
 
 def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
-    """Find samples whose turning angles contradict the others'."""
+    """Find samples whose turning angles contradict the others': hand and board turn by equal angles [1]_.
+
+    Parameters
+    ----------
+    samples : N of them
+
+    Returns
+    -------
+    check : mismatch of all pairs in rad, the samples that agree, and a finding for each other one; if no more than half
+        agree, all are used and a warning says so
+    """
     hand, eye = samples.flange[:, :3, :3], samples.target[:, :3, :3]
     turned = angles_between(hand)
     mismatch = np.abs(turned - angles_between(transposed(eye)))
@@ -156,11 +175,20 @@ def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Re
 def worst_sample(
     samples: calibration_set.CalibrationSet, refined: Refined
 ) -> tuple[int, vision_findings.FarFromFit] | None:
-    """The sample whose residuals are too large beside those of all others; None if there is none.
+    """The sample whose residuals are too large compared with those of all others.
 
-    Each sample's six residuals, with the share that it pulls towards itself taken back, over the others' scatter are
-    distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is not too large,
-    however little the others scatter.
+    The share by which a sample pulls the fit towards itself is taken back from its six residuals. Over the others'
+    scatter these are distributed as F with 6 and the remaining degrees of freedom. What is within stated deviations is
+    not too large, however little the others scatter.
+
+    Parameters
+    ----------
+    samples : N of them
+    refined : the fit of all of them
+
+    Returns
+    -------
+    number, finding : from 0, in mm and deg; None if no sample is too far from the fit
     """
     free = 6 * len(samples) - 12 - 6
     if free < 6:
@@ -235,7 +263,20 @@ CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
 def other_conventions(
     samples: calibration_set.CalibrationSet, residual: Reals
 ) -> tuple[vision_findings.OtherConvention, ...]:
-    """The conventions by which the samples fit much better than with residuals (N, 6), all that fit equally well."""
+    """Conventions by which the samples fit much better than as they were read, all that fit equally well.
+
+    Parameters
+    ----------
+    residual : (N, 6), m and rad, of the samples as they were read
+
+    Returns
+    -------
+    findings : empty where the samples fit as they were read, or no better otherwise
+
+    Notes
+    -----
+    Each reading is judged by the residuals of Park's closed form (:mod:`er3a.vision.classic_methods`).
+    """
     given, *rms = _misfit(residual)
     if given < MISREAD:
         return ()
@@ -262,15 +303,15 @@ def _misfit(residual: Reals) -> tuple[float, float, float]:
     return distance / MUCH_DISTANCE + turn / MUCH_ROTATION, 1000 * distance, float(np.degrees(turn))
 
 
-MIN_SAMPLES = 3
+MIN_SAMPLES = 3  # two motions with different axes determine the rotation
 FEW_SAMPLES = 6  # of which none is judged by the others
-EQUAL = 1e-9
-MIN_TURN = np.radians(0.5)
-MIN_SPREAD = np.radians(1.0)
+EQUAL = 1e-9  # m and rad, within which all poses are one: nothing was moved
+MIN_TURN = np.radians(0.5)  # of the hand, without which nothing is determined
+MIN_SPREAD = np.radians(1.0)  # of the rotation axes, without which a shift along them stays open
 LITTLE_TURN, LITTLE_SPREAD = np.radians(15), np.radians(10)
 EXCLUDED = 1e-3
 CONTRADICTED = 1e-3  # probability of touched points as far off, below which they contradict the calibration
-MAX_FACTS = 10
+MAX_FACTS = 10  # findings that a notebook shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,7 +331,7 @@ class TouchCheck(ByValue):
 
     @property
     def contradiction(self) -> vision_findings.TouchContradicts | None:
-        """That the points contradict the calibration, if they do."""
+        """The finding that the points contradict the calibration; None if they don't."""
         if self.probability >= CONTRADICTED:
             return None
         return vision_findings.TouchContradicts(len(self.difference), 1000 * self.largest, self.probability)
@@ -345,7 +386,12 @@ class HandEye(ByValue, Displayed):
         return tuple(each.sample for each in self.suspects)
 
     def sheet(self) -> Sheet:
-        """The twelve numbers with half their 95 % intervals."""
+        """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
+
+        Returns
+        -------
+        sheet : a row for each axis of both poses, and the first findings
+        """
         in_hand = self.samples.setup == "eye_in_hand"
         poses = ("T_flange_camera", "T_base_board") if in_hand else ("T_base_camera", "T_flange_board")
         rows = [
@@ -425,6 +471,10 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
 def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...], float]:
     """A calibration whose warnings name the joint with a wrong zero, if one explains all that contradicts it.
 
+    Parameters
+    ----------
+    found : a calibration; samples without joint values leave all joints unseen
+
     Returns
     -------
     found, unseen, smallest : see :class:`er3a.vision.typical_causes.ZerosTried`
@@ -446,7 +496,16 @@ EXPLAINED_BY_A_ZERO = {
 
 
 def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
-    """The closed-form answer X, Y (4, 4) with the smallest residuals, in standard deviations (2,) in m and rad.
+    """The closed-form answer with the smallest residuals, of Park's and Shah's.
+
+    Parameters
+    ----------
+    F, B : (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
+    deviations : (2,), m and rad, by which residuals are divided
+
+    Returns
+    -------
+    X, Y : (4, 4), m
 
     Raises
     ------
@@ -572,13 +631,31 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
 
 
 def board_poses(found: HandEye) -> Reals:
-    """Where each sample puts the board: F X B (N, 4, 4), all equal to Y without errors."""
+    """Where each sample puts the board: F X B, all equal to Y without errors.
+
+    Parameters
+    ----------
+    found : a calibration of N samples
+
+    Returns
+    -------
+    T : (N, 4, 4), m, T_base_board for a camera on the flange, else T_flange_board
+    """
     poses: Reals = found.samples.hand @ found.X @ found.samples.target
     return poses
 
 
 def spread_of(found: HandEye) -> tuple[float, float]:
-    """Root mean square distance (m) and angle (rad) of the samples' board poses from their mean, of those used."""
+    """How much the used samples' board poses scatter about their mean.
+
+    Parameters
+    ----------
+    found : a calibration
+
+    Returns
+    -------
+    distance, angle : root mean squares, m and rad
+    """
     poses = board_poses(found)[found.used]
     step = step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]

@@ -38,8 +38,8 @@ from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_ro
 from er3a.numerics.arrays import Integers, Reals
 from er3a.vision.calibration_set import CalibrationSet, Setup
 
-UNKNOWNS = 12
-CONFIDENCE = 0.95
+UNKNOWNS = 12  # position and rotation of both poses
+CONFIDENCE = 0.95  # of all intervals
 MAX_STEPS = 60
 STEP_ENDS = 1e-11  # m and rad
 ROUNDS = 20
@@ -79,7 +79,16 @@ class PoseObservations:
 
     @classmethod
     def of(cls, samples: CalibrationSet) -> PoseObservations:
-        """Those of a set, with what it states of their scatter."""
+        """Samples of a set, with what it states of their scatter.
+
+        Parameters
+        ----------
+        samples : N of them
+
+        Returns
+        -------
+        seen : F and B (N, 4, 4), m
+        """
         stated = samples.camera_covariance, samples.flange_covariance
         return cls(samples.setup, samples.hand, samples.target, *stated, samples.places)
 
@@ -128,14 +137,35 @@ class Refined:
 
 
 def half_width(covariance: Reals, freedom: Reals) -> Reals:
-    """Half the 95 % intervals (p,) by Student, of a covariance (p, p) with degrees of freedom (p,), one at least."""
+    """Half the 95 % intervals, by Student's distribution.
+
+    Parameters
+    ----------
+    covariance : (p, p)
+    freedom : (p,), degrees of freedom; less than one counts as one
+
+    Returns
+    -------
+    half : (p,), in the units of the numbers
+    """
     quantile = scipy.special.stdtrit(np.maximum(freedom, 1.0), (1 + CONFIDENCE) / 2)
     half: Reals = quantile * np.sqrt(np.diag(covariance))
     return half
 
 
 def residuals(F: Reals, B: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals]:
-    """Residuals (..., N, 6) in m and rad and their derivatives (..., N, 6, 12) for X, Y (..., 4, 4)."""
+    """Residuals of samples by both poses, and their derivatives in closed form.
+
+    Parameters
+    ----------
+    F, B : (..., N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
+    X, Y : (..., 4, 4), m, hand-eye and board pose
+
+    Returns
+    -------
+    residual : (..., N, 6), m and rad, seen less predicted, by the camera's axes
+    derivative : (..., N, 6, 12), by X's position and rotation, then Y's, by the axes of their parent frames
+    """
     Rx, tx = X[..., None, :3, :3], X[..., None, :3, 3]
     Ry, ty = Y[..., None, :3, :3], Y[..., None, :3, 3]
     Rf, tf = F[..., :3, :3], F[..., :3, 3]
@@ -155,7 +185,17 @@ def residuals(F: Reals, B: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals]:
 
 
 def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
-    """How errors of T_base_flange (m, rad by the base's axes) move T_camera_board: (..., N, 6, 6)."""
+    """How errors of T_base_flange move T_camera_board, to first order.
+
+    Parameters
+    ----------
+    F : (..., N, 4, 4), m, T_base_flange, or T_flange_base for a fixed camera
+    X, Y : (..., 4, 4), m, hand-eye and board pose
+
+    Returns
+    -------
+    G : (..., N, 6, 6), from m and rad by the base's axes to m and rad by the camera's
+    """
     Rxt, Rf = transposed(X[..., None, :3, :3]), F[..., :3, :3]
     ty, tf = Y[..., None, :3, 3], F[..., :3, 3]
     G = np.zeros((*F.shape[:-2], 6, 6))
@@ -169,7 +209,17 @@ def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
 
 
 def stated_whitening(seen: PoseObservations, X: Reals, Y: Reals) -> Reals:
-    """Matrices (N, 6, 6) that give residuals unit covariance, by what is stated of camera and flange."""
+    """Matrices that give residuals unit covariance, by what is stated of camera and flange.
+
+    Parameters
+    ----------
+    seen : N samples with a camera covariance
+    X, Y : (4, 4), m, poses at which the flange's errors are carried into the camera
+
+    Returns
+    -------
+    W : (N, 6, 6), inverse Cholesky factors, 1/m and 1/rad
+    """
     assert seen.camera_covariance is not None
     S = seen.camera_covariance
     if seen.flange_covariance is not None:
@@ -182,12 +232,18 @@ def stated_whitening(seen: PoseObservations, X: Reals, Y: Reals) -> Reals:
 def refine(
     seen: PoseObservations, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
 ) -> Refined:
-    """The likeliest poses from starts X, Y (4, 4).
+    """The likeliest hand-eye and board pose, by Levenberg and Marquardt's steps [1]_.
 
     Parameters
     ----------
+    seen : N samples, with what is stated of their scatter
+    X, Y : (4, 4), m, where to start
     model : what predicts the samples, with ``more`` unknowns that start at zero; None: the two poses alone
     W : (N, 6, 6), weights to keep; None: as the samples state them, or estimated
+
+    Returns
+    -------
+    refined : with covariance, and residuals in m and rad
 
     Raises
     ------
@@ -230,10 +286,12 @@ class _Fit:
 
     @property
     def unknowns(self) -> tuple[Reals, Reals, Reals]:
+        """X, Y (4, 4), m, and the other unknowns (k,)."""
         return self.X, self.Y, self.values
 
     @cached_property
     def inverse(self) -> Reals:
+        """(p, p), the inverse of J^T J, by columns of unit length so that units don't matter."""
         size = np.linalg.norm(self.J, axis=(0, 1))
         J = self.J / size
         found: Reals = np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
@@ -280,7 +338,7 @@ class _Noise:
 
     @cached_property
     def axes(self) -> Reals:
-        """(N, 6, 6): from the camera's axes to those across and along the sight, and for turns to the board's."""
+        """(N, 6, 6), from the camera's axes to those across and along the sight, and for turns to the board's."""
         distance = np.maximum(np.linalg.norm(self.B[:, :3, 3], axis=1), MIN_DEVIATION)[:, None]
         axes = np.zeros((len(self.B), 6, 6))
         axes[:, :3, :3] = [frame_along(p) for p in self.B[:, :3, 3] / distance]
@@ -296,7 +354,18 @@ class _Noise:
         return W
 
     def again(self, fit: _Fit) -> _Noise:
-        """Estimated from the residuals of a fit."""
+        """The noise estimated from the residuals of a fit.
+
+        Deviations are pooled where few residuals give them; the middle is where turns explain most of the position.
+
+        Parameters
+        ----------
+        fit : at these deviations, of the same N samples
+
+        Returns
+        -------
+        noise : with new deviations (m, rad) and middle (m)
+        """
         by_group = np.eye(4)[GROUPS]
         squares = (fit.white**2).sum(axis=0) @ by_group * self.deviations**2
         free = np.maximum((1 - fit.leverage).sum(axis=0) @ by_group, MIN_FREE)

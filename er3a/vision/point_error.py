@@ -18,10 +18,10 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 from er3a.vision.hand_eye import HandEye
 
-DRAWS = 4000
+DRAWS = 4000  # a probability near 0.95 has a standard deviation of 0.0034
 DRAW_SEED = 9283
 ISO_DEVIATIONS = 3.0  # ISO 9283: RP is the mean distance from the mean place plus three standard deviations of it
-TABLE_STEP = 1e-6
+TABLE_STEP = 1e-6  # m or rad, of one-sided differences
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,22 @@ class SeenPoseError:
 
     @property
     def whole(self) -> Reals:
-        """All parts together."""
+        """All parts together, (..., 6, 6), m and rad in the base frame."""
         return self.camera + self.calibration + self.repeatability + self.table
 
 
 def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
-    """Covariance (..., 6, 6) of T_base_tool at joint angles (..., n) from independent errors of the table's entries."""
+    """Covariance of the tool's pose from independent errors of the table's entries, to first order.
+
+    Parameters
+    ----------
+    q : (..., n), rad or m
+    accuracy : with standard deviations of lengths (m) and angles (rad)
+
+    Returns
+    -------
+    covariance : (..., 6, 6), position (m) and rotation (rad) of T_base_tool by the base's axes
+    """
     at = forward(robot, q)
     out = np.zeros((*at.shape[:-2], 6, 6))
     for name, deviation in (
@@ -81,12 +91,31 @@ def table_covariance(robot: Robot, q: Reals, accuracy: ArmAccuracy) -> Reals:
 
 
 def repeatability_covariance(accuracy: ArmAccuracy) -> Reals:
-    """Covariance (6, 6) of the position that comes back; ISO 9283 states RP of position, so rotation has none here."""
+    """Covariance of the pose to which an arm comes back.
+
+    Parameters
+    ----------
+    accuracy : with RP of position after ISO 9283, m
+
+    Returns
+    -------
+    covariance : (6, 6), m^2; 0 for the rotation, of which RP of position says nothing
+    """
     return np.diag([accuracy.position_deviation**2] * 3 + [0.0] * 3)
 
 
 def seen_pose(found: HandEye, T_camera_object: Reals, T_base_flange: Reals | None = None) -> Reals:
-    """T_base_object (..., 4, 4); where the picture is taken from is needed with the camera on the flange."""
+    """Pose of an object in the base frame, from where the camera sees it.
+
+    Parameters
+    ----------
+    T_camera_object : (..., 4, 4), m
+    T_base_flange : (..., 4, 4), m, where the picture is taken, for a camera on the flange; None for a fixed one
+
+    Returns
+    -------
+    T : (..., 4, 4), m, T_base_object
+    """
     placed: Reals = found.X @ T_camera_object
     return placed if T_base_flange is None else T_base_flange @ placed
 
@@ -98,13 +127,17 @@ def seen_pose_error(
     accuracy: ArmAccuracy,
     arm: tuple[Robot, Reals, Reals | None],
 ) -> SeenPoseError:
-    """Errors of T_base_object (..., 4, 4) as the tool meets them that goes there.
+    """Errors of an object's pose as the tool meets them that goes there, to first order.
 
     Parameters
     ----------
-    T_camera_object : (..., 4, 4); camera_covariance : (..., 6, 6) of it by the camera's axes
-    arm : the robot, the joint angles (..., n) at which its tool is on the object, and those (n,) at which a camera on
-        the flange takes the picture (None for a fixed one)
+    T_camera_object : (..., 4, 4), m; camera_covariance : (..., 6, 6) of it by the camera's axes
+    arm : the robot, and the joint angles (..., n) at which its tool is on the object; then those (n,) at which a camera
+        on the flange takes the picture, None for a fixed one
+
+    Returns
+    -------
+    errors : covariances (..., 6, 6) of T_base_object, m and rad by the base's axes, by cause
     """
     robot, q_there, q_picture = arm
     X = found.X
@@ -148,7 +181,16 @@ def _normals() -> Reals:
 
 
 def draws(covariance: Reals) -> Reals:
-    """Normal errors (4000, ..., 6) of covariances (..., 6, 6); from the same numbers always, for equal bytes."""
+    """Normal errors of given covariances, from the same random numbers always, for equal bytes.
+
+    Parameters
+    ----------
+    covariance : (..., 6, 6), m and rad
+
+    Returns
+    -------
+    errors : (4000, ..., 6), m and rad
+    """
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
     found: Reals = np.einsum("...ij,kj->k...i", root, _normals())
@@ -156,7 +198,16 @@ def draws(covariance: Reals) -> Reals:
 
 
 def error_sizes(covariance: Reals) -> tuple[Reals, Reals]:
-    """Distances (m) and angles (rad), each (...,), below which 95 % of errors of a covariance (..., 6, 6) stay."""
+    """Sizes below which 95 % of errors of a covariance stay, by the draws of :func:`draws`.
+
+    Parameters
+    ----------
+    covariance : (..., 6, 6), m and rad
+
+    Returns
+    -------
+    distance, angle : (...,), m and rad
+    """
     drawn = draws(covariance)
     square = drawn**2
     distance, angle = (np.sqrt(square[..., part].sum(axis=-1)) for part in (slice(3), slice(3, 6)))

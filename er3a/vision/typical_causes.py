@@ -54,7 +54,7 @@ STEP_CHANCE = 3e-5  # of sound sets in which a step is found
 MIN_BLOCK = 2  # samples on either side of a step
 MIN_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
-MIN_ZERO = np.radians(0.5)
+MIN_ZERO = np.radians(0.5)  # below which a joint's zero is not named
 
 DistanceError = Literal["board", "focal_length", "principal_point_x", "principal_point_y"]
 
@@ -73,7 +73,17 @@ class TypicalCause:
     applied: Callable[[Reals], tuple[Reals, Reals]]
 
     def at(self, X: Reals, Y: Reals, values: Reals) -> tuple[Reals, Reals]:
-        """Residuals and their derivatives, as :data:`er3a.vision.likelihood.Model`."""
+        """Residuals and their derivatives, as :data:`er3a.vision.likelihood.Model`.
+
+        Parameters
+        ----------
+        X, Y : (4, 4), m, hand-eye and board pose
+        values : (count,), of the cause's numbers
+
+        Returns
+        -------
+        residual, derivative : (N, 6), m and rad, and (N, 6, 12 + count); by the numbers from central differences
+        """
 
         def raw(values: Reals) -> tuple[Reals, Reals]:
             return residuals(*self.applied(values), X, Y)
@@ -84,12 +94,35 @@ class TypicalCause:
         return here, np.concatenate([J, np.stack(own, axis=2)], axis=2)
 
     def fitted(self, samples: CalibrationSet, start: Refined, W: Reals) -> Refined:
-        """The fit of both poses and the numbers, with weights W (N, 6, 6)."""
+        """The fit of both poses and the cause's numbers.
+
+        Parameters
+        ----------
+        start : a fit of the poses alone, whose poses are the start
+        W : (N, 6, 6), weights to keep, 1/m and 1/rad
+
+        Returns
+        -------
+        fit : its ``values`` (count,) are the cause's numbers
+
+        Raises
+        ------
+        LinAlgError
+            where the samples leave some of the unknowns open
+        """
         return refine(PoseObservations.of(samples), start.X, start.Y, self.at, self.count, W)
 
     def drop(self, refined: Refined) -> float | None:
-        """By how much the numbers lower the sum of squares of a fit, to first order; None where the samples don't tell
-        them from the two poses."""
+        """By how much the numbers lower the sum of squares of a fit, to first order.
+
+        Parameters
+        ----------
+        refined : the fit of the poses alone, with its whitened residuals
+
+        Returns
+        -------
+        drop : None where the samples can't distinguish the numbers from the two poses
+        """
         J = (refined.W @ self.at(refined.X, refined.Y, np.zeros(self.count))[1]).reshape(-1, UNKNOWNS + self.count)
         poses, own = J[:, :UNKNOWNS], J[:, UNKNOWNS:]
         rest = own - poses @ np.linalg.lstsq(poses, own, rcond=None)[0]
@@ -100,12 +133,19 @@ class TypicalCause:
 
 
 def chance_of(drop: float, count: int, squares: float, free: int, least: float = 1e-300) -> float:
-    """Probability that ``count`` numbers lower a sum of squares by as much by chance.
+    """Probability that some numbers lower a sum of squares by as much by chance, by the F distribution.
 
     Parameters
     ----------
+    drop : of the sum of squares
+    count : of the numbers
+    squares : before the numbers were fitted
     free : degrees of freedom of what remains
     least : variance of a residual, if it is stated
+
+    Returns
+    -------
+    probability : 0 to 1
     """
     scale = max((squares - drop) / free, least)
     return float(scipy.special.fdtrc(count, free, max(drop, 0.0) / count / scale))
@@ -152,6 +192,10 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
     Parameters
     ----------
     refined : the fit of the samples without such an error
+
+    Returns
+    -------
+    fits : empty for fewer than ``LEAST_SAMPLES`` samples
     """
     if len(samples) < LEAST_SAMPLES:
         return ()
@@ -184,8 +228,17 @@ def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
 
 
 def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
-    """Half the 95 % intervals of a value: by its samples, and by intrinsics estimated from the same images: a focal
-    length that is estimated from them scales all distances."""
+    """Half the 95 % intervals of a distance error, by its two sources.
+
+    Parameters
+    ----------
+    refined : the fit of the poses alone
+    fit : the fit with the distance error
+
+    Returns
+    -------
+    own, shared : shares of 1, by the samples, and by intrinsics estimated from the same images, which all share
+    """
     own = float(fit.half_width[UNKNOWNS])
     if samples.shared is None:
         return own, 0.0
@@ -195,7 +248,17 @@ def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, 
 
 
 def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refined) -> Refined:
-    """The fit with an error of distances."""
+    """The fit of both poses with an error of distances.
+
+    Parameters
+    ----------
+    name : what is wrong: the board's size, the focal length, or the principal point
+    refined : the fit of the poses alone, where it starts
+
+    Returns
+    -------
+    fit : ``values`` (1,), by what share distances are wrong
+    """
 
     def applied(values: Reals) -> tuple[Reals, Reals]:
         B = samples.target.copy()
@@ -220,6 +283,10 @@ def moved_between(samples: CalibrationSet, refined: Refined) -> vision_findings.
     Parameters
     ----------
     refined : the fit of all these samples
+
+    Returns
+    -------
+    finding : from which sample on, by how many mm and deg; None if there is no such step
     """
     count = len(samples)
     free = 6 * count - UNKNOWNS - 6
@@ -277,6 +344,10 @@ def wrong_zero(samples: CalibrationSet, used: CalibrationSet, refined: Refined, 
     Parameters
     ----------
     used : those of the samples that the fit ``refined`` rests on
+
+    Returns
+    -------
+    tried : the joint with its zero in deg, if one explains them; and which joints no sample shows
     """
     names = joint_names(robot)
     if samples.q is None:

@@ -177,7 +177,7 @@ class TouchContradicts(Finding):
     probability: float
 
 
-MUCH_SCATTER = 3.0
+MUCH_SCATTER = 3.0  # standard deviations: residuals so much larger than stated contradict what is stated
 _GRAVE = (
     *(NoMajority, OtherConvention, UnexplainedResiduals, MovedBetween, NotConverged, JointZero),
     *get_args(WrongDistances),
@@ -185,7 +185,16 @@ _GRAVE = (
 
 
 def grave_warnings(warnings: Iterable[CalibrationWarning]) -> tuple[CalibrationWarning, ...]:
-    """Those with which no calibration can be used."""
+    """Warnings with which no calibration can be used.
+
+    Parameters
+    ----------
+    warnings : of a calibration
+
+    Returns
+    -------
+    grave : in the given order; more scatter than stated is one above ``MUCH_SCATTER``
+    """
     return tuple(
         each
         for each in warnings

@@ -106,7 +106,7 @@ class AccelerationExceeded(Finding):
 
 
 AT_REST = 1e-6  # rad
-POINTS = 501
+POINTS = 501  # grid points of a stretch that its timing passes through at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,15 +172,27 @@ class SingularSegment:
         return first
 
     def begin(self) -> list[Timed]:
-        """The turn at rest that a singular start may ask for; no part where none is needed."""
+        """The turn at rest that a singular start may ask for.
+
+        Returns
+        -------
+        parts : one joint move from ``first_joints`` to the path's first joints; empty where no turn is needed
+        """
         if not np.abs(self.followed.start_turn).max() > AT_REST:
             return []
         return [straight(self.first_joints, self.q[0], self.limits)]
 
     def along(self, first: int, last: int, programmed: bool = True) -> Timed:
-        """The path from grid point ``first`` to ``last``, from rest to rest.
+        """The path from one grid point to another, from rest to rest.
 
-        As programmed or slower; if not ``programmed``, as fast as the joints can.
+        Parameters
+        ----------
+        first, last : indices of ``t`` and ``q``, with first < last and all joints between known
+        programmed : True for the programmed speed, or slower where the joints need it; False for the fastest
+
+        Returns
+        -------
+        motion : timed within ``limits``; it passes through ``POINTS`` of the grid points at most
         """
         kept = np.unique(np.linspace(first, last, min(POINTS, last - first + 1)).round().astype(int))
         t, q = nodes_along(self.followed.joints, self.t[kept], self.q[kept], self.limits)
@@ -191,7 +203,16 @@ Strategy = Callable[[SingularSegment], Avoidance | NotPossible]
 
 
 def coarse(t: Reals) -> Reals:
-    """About POINTS of the times (N,), with both ends."""
+    """About ``POINTS`` of the times, evenly chosen, with both ends.
+
+    Parameters
+    ----------
+    t : (N,), s
+
+    Returns
+    -------
+    kept : (min(N, POINTS),) at most, s
+    """
     kept: Reals = t[np.unique(np.linspace(0, len(t) - 1, min(POINTS, len(t))).round().astype(int))]
     return kept
 
@@ -204,7 +225,21 @@ def singular_segment(
     fixed_start: bool = False,
     allowed: JointLimits | None = None,
 ) -> SingularSegment:
-    """What is to be avoided on a path, at its own grid points and at its events."""
+    """What is to be avoided on a path, at its own grid points and at its events.
+
+    Parameters
+    ----------
+    followed : the path, with the joints along it
+    near : the distances that the path is to keep from the singular sets
+    limits : of the joints' rates, to which motions are timed
+    events : their times (s) join the grid, so that the nearest pose is among its points
+    fixed_start : whether the joints at the start are given, or only the tool's pose
+    allowed : what the joints can do, if motions are to be timed to less
+
+    Returns
+    -------
+    segment : with times (N,) in s and joints (N, 6) in rad, manufacturer's angles, NaN where out of reach
+    """
     inner = [event.t for event in events or [] if 0 < event.t < followed.t[-1]]
     t = np.unique(np.concatenate([followed.t, inner]))
     q = followed.q

@@ -38,10 +38,10 @@ Kind = Literal["shift", "tilt"]
 
 WIDER = 2.5  # a bend spans the region's half width so many times, if the path is long enough
 STEP = 1e-6  # of the characteristic length, or rad
-BENT_POINTS = 120
-GROWTH = 1.4
-HALVINGS = 12
-MAX_SIDES = 8
+BENT_POINTS = 120  # at which the distance along a bend is looked at
+GROWTH = 1.4  # of a bend's size from try to try, until one clears the region
+HALVINGS = 12  # of the interval between the last size that did not clear it and the first that did
+MAX_SIDES = 8  # combinations of sides that are followed: with each region more they double
 MAX_BEND: dict[Kind, float] = {"shift": 0.5, "tilt": 1.0}  # of the characteristic length; rad
 SAME_TIME = 0.01  # s
 SPARE = 1.0005  # keep this much more than the distance
@@ -65,11 +65,20 @@ class Bend:
 
     @property
     def amount(self) -> float:
-        """m or rad"""
+        """Length of the shift (m) plus angle of the tilt (rad), of which one is 0."""
         return float(np.linalg.norm(self.shift) + np.linalg.norm(self.tilt))
 
     def size(self, progress: Reals) -> Reals:
-        """0 outside, 1 at the top, with continuous second derivative."""
+        """Share of the bend that is applied, with continuous second derivative (quintic up, quintic down).
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        size : (...,), 0 outside ``start`` to ``end``, 1 at ``top``
+        """
         rise = np.clip((progress - self.start) / (self.top - self.start), 0.0, 1.0)
         fall = np.clip((self.end - progress) / (self.end - self.top), 0.0, 1.0)
         zero, one = np.array(0.0), np.array(1.0)
@@ -85,15 +94,33 @@ class BentPath:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration of the path without bends, s."""
         return self.path.duration
 
     def progress(self, t: Reals) -> tuple[Reals, Reals, Reals]:
-        """Of the path without bends."""
+        """Time law of the path without bends.
+
+        Parameters
+        ----------
+        t : (...,), s
+
+        Returns
+        -------
+        progress, first, second : (...,), share of the path, and its derivatives in 1/s and 1/s^2
+        """
         return self.path.progress(t)
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
+        """Poses of the tool on the bent path: shifted, and turned about the tool point.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
         progress = np.asarray(progress, float)
         T = self.path.poses(progress)
         for bend in self.bends:
@@ -106,12 +133,30 @@ class BentPath:
 
 
 def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Bend the path by the smallest shift of the tool point, its orientation kept."""
+    """Bend the path by the smallest shift of the tool point, its orientation kept.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion along the bent path, or why there is none
+    """
     return _via(segment, "shift")
 
 
 def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Bend the path by the smallest tilt of the tool, the tool point kept on its path."""
+    """Bend the path by the smallest tilt of the tool, the tool point kept on its path.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion along the bent path, or why there is none
+    """
     return _via(segment, "tilt")
 
 
@@ -155,7 +200,17 @@ def _carried_out(segment: avoidance.SingularSegment, other: avoidance.SingularSe
 
 
 def bends_of(segment: avoidance.SingularSegment, first: int, last: int, kind: Kind) -> list[Bend]:
-    """The smallest bend to either side that clears a region."""
+    """The smallest bend to either side that clears a region.
+
+    Parameters
+    ----------
+    first, last : index range of the region on the segment's grid, ``last`` excluded; not at the path's ends
+    kind : "shift" of the tool point (m) or "tilt" about it (rad)
+
+    Returns
+    -------
+    bends : up to two, one for each side on which a bend was found
+    """
     path, t = segment.followed.line, segment.t
     worst = first + int(np.argmin(segment.near.margin(segment.robot, segment.q[first:last])))
     low, top, high = (float(path.progress(t[i])[0]) for i in (first - 1, worst, last))
@@ -272,6 +327,14 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
 
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion, which crosses the singular set by joint moves, or why there is none
     """
     if not segment.regions:
         return avoidance.NoSingularRegion()
@@ -293,7 +356,7 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     return avoidance.Avoidance(joined(parts), crosses_by_joints=True)
 
 
-COARSE = 201
+COARSE = 201  # times at which other branches are looked at before one is followed in full
 
 
 def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
@@ -302,6 +365,14 @@ def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     A change before the path begins is preferred: where only the tool's pose is given there, the arm may as well begin
     on that branch. Else the change is made at the last good pose. Of the branches on which the rest keeps its distance
     within the limits, the one nearest in joint travel is taken.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion, or why there is none
     """
     bad = ~(segment.good & within(segment.robot, segment.q))
     if not bad.any():
@@ -348,7 +419,16 @@ def _changed(segment: avoidance.SingularSegment, followed: Followed, index: int,
 
 
 def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Follow the path exactly, as programmed wherever the joints can, slower where they can't."""
+    """Follow the path exactly, as programmed wherever the joints can, slower where they can't.
+
+    Parameters
+    ----------
+    segment : the path; not possible where it leaves the reach, or where a branch ends
+
+    Returns
+    -------
+    found : the motion within the limits of speed and acceleration, or why there is none
+    """
     if np.isnan(segment.q[:, 0]).any():
         return avoidance.PartlyOutOfReach()
     if segment.followed.jumps:
@@ -358,7 +438,16 @@ def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
 
 
 def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
-    """Follow the path exactly, and stop at the last pose that keeps its distance."""
+    """Follow the path exactly, and stop at the last pose that keeps its distance.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+
+    Returns
+    -------
+    found : the motion to that pose with the share of the path done (0 to 1), or why there is none
+    """
     if not segment.regions:
         return avoidance.NoSingularRegion()
     last = segment.regions[0][0] - 1
@@ -377,7 +466,16 @@ class HasPoses(Protocol):
     """A path of the tool in space."""
 
     def poses(self, progress: Reals) -> Reals:
-        """T_base_tool (..., 4, 4) at shares of the path (...,)."""
+        """Poses of the tool along the path.
+
+        Parameters
+        ----------
+        progress : (...,), shares of the path, 0 to 1
+
+        Returns
+        -------
+        T : (..., 4, 4), T_base_tool, m
+        """
 
 
 def deviation(line: HasPoses, T: Reals) -> tuple[Reals, Reals, Reals]:
@@ -471,20 +569,34 @@ class StrategyResult:
 
 
 def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
-    """Try all strategies, or the chosen one."""
+    """Try all strategies on a path, or the chosen one.
+
+    Parameters
+    ----------
+    segment : the path, and the distances that it is to keep
+    chosen : name of one strategy; None for all
+
+    Returns
+    -------
+    results : one for each strategy tried, in the order of ``STRATEGIES``
+    """
     return [_tried(segment, name) for name in STRATEGIES if chosen in (None, name)]
 
 
 def best(results: Iterable[StrategyResult], meets: bool, programmed: float = 0.0) -> StrategyResult | None:
-    """The usable strategy with the smallest deviation from the path (mm and deg added); None if there is none.
+    """The usable strategy with the smallest deviation from the path (mm and deg added).
 
-    Among equals: the shortest time beyond the programmed one (in steps of ``SAME_TIME``), then a strategy that keeps
-    its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
+    Among equals the shortest time beyond the programmed one (in steps of ``SAME_TIME``) counts. Then comes a strategy
+    that keeps its distance from singular poses, then the smallest ratio of speeds and accelerations to their limits.
 
     Parameters
     ----------
     meets : whether the path meets a singular pose; what goes through it is then taken only if nothing else is usable
     programmed : duration of the path, s
+
+    Returns
+    -------
+    result : None if no strategy is usable
     """
 
     def price(cost: StrategyCost) -> tuple[bool, float, int, bool, float]:
