@@ -526,7 +526,8 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
     Returns
     -------
     findings : the joint that turns most, if by more than 90 deg, although the tool moves less than 50 mm. The tool also
-        turns less than half as far then. Further joints that turn by more than 180 deg, where another turn within the limits is shorter.
+        turns less than half as far then. Further joints that turn by more than 180 deg, where another turn within the
+        limits is shorter.
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[found_in.CheckFinding] = []

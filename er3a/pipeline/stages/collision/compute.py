@@ -146,21 +146,11 @@ SAMPLES_STREAM, PLACES_STREAM = 0, 1
 
 
 def compute(study: Study, name: str) -> model.CollisionResults:
-    """Work out where a robot of the study is free of collisions: in joint space, at places, at targets, along paths.
-
-    Parameters
-    ----------
-    study : with the settings of the stage, and the scene
-    name : of a robot or a variant
+    """Work out where a robot (by its name in the study) is free of collisions.
 
     Returns
     -------
-    results : the same on every run with the study's seed
-
-    Raises
-    ------
-    InputError
-        naming file and field that can't be used
+    results : in joint space, at places, at targets, along paths; :class:`InputError` if a file can't be used
     """
     robot, settings = study.robot(name), study.section(CollisionSettings)
     scene = study.scene(name, STAGE_NAME)

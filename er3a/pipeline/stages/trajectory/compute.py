@@ -399,20 +399,8 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:
-    """Plan and check every path of a robot: singular poses, limits, collisions, reach; and write programs of it.
-
-    Parameters
-    ----------
-    name : of a robot or a variant
-
-    Returns
-    -------
-    results : the same on every run with the study's seed
-
-    Raises
-    ------
-    InputError
-        naming file and field that can't be used
+    """Plan and check every path of a robot, by its name in the study, and write programs of it; :class:`InputError` if a
+    file can't be used.
     """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
