@@ -399,8 +399,8 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:
-    """Plan and check every path of a robot, by its name in the study, and write programs of it; :class:`InputError` if a
-    file can't be used.
+    """Plan and check every path of a robot, by its name in the study, and write programs of it.
+    :class:`InputError` if a file of the study can't be used.
     """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     file = Path(study.entry(name).paths)
