@@ -206,7 +206,7 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
 
 
 @inner_kernel
-def cores_distance(
+def cores_distance(  # noqa: C901, PLR0912
     w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
 ) -> float:
     """Distance of two convex cores by the iteration of Gilbert, Johnson and Keerthi [2]_.

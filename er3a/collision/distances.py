@@ -301,7 +301,7 @@ def measure(layout: Layout, q: Reals, found: Reals, smallest: Reals, pair: Integ
 
 
 @kernel
-def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:
+def which_overlap(layout: Layout, q: Reals, found: Flags) -> None:  # noqa: C901, PLR0912
     """Which pairs overlap, in many arm poses.
 
     What the pose before has shown is tried first, for it mostly holds again: the pair that overlapped, the direction

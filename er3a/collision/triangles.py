@@ -346,7 +346,7 @@ def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, probe: Reals)
 
 
 @inner_kernel
-def surface_distance(
+def surface_distance(  # noqa: C901, PLR0912, PLR0915
     trees: Trees,
     a: int,
     T: Reals,

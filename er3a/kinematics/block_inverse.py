@@ -176,7 +176,7 @@ _VALID, _WITHIN, _PAIR_ROWS = 12, 13, 15  # two slots of a wrist: six angles eac
 
 
 @kernel
-def solve_blocks(
+def solve_blocks(  # noqa: C901, PLR0912
     arm: BlockConstants, joints: Joints, T: Reals, q_ref: Reals, out: tuple[Reals, Flags, Flags, Flags, Flags]
 ) -> None:
     """Solve poses of an arm with a spherical wrist, block by block. Kernel.

@@ -119,7 +119,7 @@ def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, h
 
 
 @kernel
-def solve(
+def solve(  # noqa: C901, PLR0912
     arm: ArmConstants, joints: Joints, T: Reals, q_ref: Reals, keep_folds: bool, keep_free: bool, out: Slots
 ) -> None:
     """Solve poses in closed form, all eight branches [1]_ [2]_. Kernel.

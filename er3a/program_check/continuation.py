@@ -51,7 +51,7 @@ def continued(robot: Robot, poses: Reals, start: Reals) -> Reals:
 
 
 @kernel
-def _continue(
+def _continue(  # noqa: C901, PLR0912
     poses: Reals, first: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals
 ) -> int:
     n = len(first)
@@ -113,7 +113,7 @@ def _continue(
 
 
 @kernel
-def _normal_equations(J: Reals, error: Reals, A: Reals, step: Reals) -> None:
+def _normal_equations(J: Reals, error: Reals, A: Reals, step: Reals) -> None:  # noqa: C901
     """Solve (J^T J + damping) step = J^T error by Cholesky's decomposition, in place."""
     n = len(step)
     for i in range(n):

@@ -377,7 +377,7 @@ def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int
 
 
 @kernel
-def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple[Reals, Reals]) -> None:
+def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple[Reals, Reals]) -> None:  # noqa: C901, PLR0912
     """Fill ``found`` (N, n) with joints Q (N, n) by the turns that leave limits least, by no more than each may be
     left, then are nearest to refs (N, n); and ``left`` (N,) with the sum by which they leave them, infinite where there
     are none."""

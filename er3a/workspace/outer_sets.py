@@ -236,7 +236,7 @@ def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
 
 
 @inner_kernel
-def exclude(
+def exclude(  # noqa: C901, PLR0912
     L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
 ) -> int:
     """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.

@@ -222,7 +222,7 @@ def _zero_between(terms: Reals, low: float, high: float, rises: bool) -> float:
 
 
 @inner_kernel
-def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) -> int:
+def isolate(stack: Reals, order: int, noise: float, found: Reals, count: int) -> int:  # noqa: C901, PLR0912
     """Find the intervals of -1..1 that hold the zeros of a polynomial in Bernstein's basis [2]_. Kernel.
 
     Parameters
@@ -588,7 +588,7 @@ def _right_side(slides: bool, m: Scratch) -> None:
 
 
 @inner_kernel
-def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
+def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:  # noqa: C901, PLR0912
     """Four equations from the rows along joint 2: two reflections take cos x_1 and sin x_1 out of all but two rows.
 
     ``m.along`` (6, 30) keeps the reflected rows: cos, sin, constant, then the left side.
@@ -635,7 +635,7 @@ def _without_first_joint(left: Reals, slides: Flags, m: Scratch) -> None:
 
 
 @inner_kernel
-def _without_second_joint(left: Reals, m: Scratch) -> None:
+def _without_second_joint(left: Reals, m: Scratch) -> None:  # noqa: C901, PLR0912
     """Two equations from the rows across joint 2: the complex row that is orthogonal to the right side's columns."""
     B, normal, v = np.empty((4, 3), np.complex128), np.zeros((3, 4), np.complex128), np.zeros(4, np.complex128)
     for b in range(4):
@@ -698,7 +698,7 @@ def at_angle(equations: Reals, angle: float, F: Reals) -> None:
 
 
 @inner_kernel
-def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
+def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:  # noqa: C901, PLR0912
     """Reduce the twelve equations to nine with the same zeros. Kernel.
 
     Six rows are F; three are combinations of F without C^2 of joint 4, one power further.

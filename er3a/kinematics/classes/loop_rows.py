@@ -91,7 +91,7 @@ def new_memory(sliding: Flags) -> LoopMemory:
 
 
 @kernel
-def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
+def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:  # noqa: C901, PLR0912
     """Find the hidden joint's possible angles. Kernel.
 
     Dark intervals are sampled anew by determinants on them alone, whose rounding is that of their own size.
@@ -157,7 +157,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:
 
 
 @inner_kernel
-def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
+def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:  # noqa: C901
     """Find the angles of joints 4 and 5 at a zero, from null vectors of the nine equations. Kernel.
 
     Parameters
@@ -292,7 +292,7 @@ def _pencil(Y: Reals, step: int, slides: Flags, pairs: Reals, count: int) -> int
 
 
 @inner_kernel
-def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:
+def remaining_joints(reading: Reading, e: Scratch, m: LoopMemory) -> int:  # noqa: C901, PLR0912
     """Find joints 1, 2 and 6 from joints 3, 4 and 5. Kernel.
 
     Parameters

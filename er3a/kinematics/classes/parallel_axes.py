@@ -253,7 +253,7 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
 
 
 @inner_kernel
-def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:
+def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:  # noqa: PLR0915
     """All joints of both elbows for one root of joint 5."""
     sum_s, sum_c = k.half_sum
     less_s, less_c = k.half_difference

@@ -21,7 +21,7 @@ PROBE = 1e-2  # rad or parts of the size, step to either side that shows the fol
 
 
 @inner_kernel
-def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:
+def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:  # noqa: C901, PLR0912
     """Pose error and geometric Jacobian of a chain of six joints, lengths in parts of its size. Kernel.
 
     Parameters
@@ -82,7 +82,7 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
 
 
 @inner_kernel
-def eliminate(J: Reals, columns: Integers) -> float:
+def eliminate(J: Reals, columns: Integers) -> float:  # noqa: C901, PLR0912
     """Reduce a linear system by complete pivoting. Kernel.
 
     Parameters
@@ -148,7 +148,7 @@ def _step(J: Reals, columns: Integers, dq: Reals) -> None:
 
 
 @inner_kernel
-def newton(
+def newton(  # noqa: C901
     links: Reals, sliding: Flags, T: Reals, q: Reals, most: int, w: Reals, J: Reals, dq: Reals, columns: Integers
 ) -> tuple[float, float]:
     """Move joint values to a root by Newton's steps, without steps that the pose does not determine. Kernel.

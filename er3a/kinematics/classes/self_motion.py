@@ -116,7 +116,7 @@ def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals)
 
 
 @inner_kernel
-def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:
+def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:  # noqa: C901, PLR0912
     """The shortest solution of a linear system with independent rows, by Cholesky's factors of ``J J^T``. Kernel.
 
     Parameters
@@ -280,7 +280,7 @@ def free_direction(posed: Posed, x: Reals, v: Reals) -> int:
 
 
 @kernel
-def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:
+def trace(posed: Posed, x: Reals, v: Reals, points: Reals) -> tuple[int, int]:  # noqa: C901, PLR0912
     """Follow a curve of solutions [1]_. Kernel.
 
     Parameters

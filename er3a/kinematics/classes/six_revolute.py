@@ -319,7 +319,7 @@ def in_order(q: Reals, count: Integers) -> None:
 
 
 @inner_kernel
-def _by_reading(
+def _by_reading(  # noqa: C901
     reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
 ) -> tuple[int, int, float]:
     """Add the solutions that one reading of the loop finds; returns its verdict, the number of rows, and the
