@@ -45,6 +45,7 @@ STANDS_FOR = {
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
     "program": {},
     "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
+    "predict": {"ROBOT": "er3a_c60", "JOINTS.csv": "measured.csv", "mine_model.json": "corrected_model.json"},
     "import-calibration": {"ROBOT": "ur5e"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
     "compare": {"A": "er3a_c60", "B": "er3_600", "table.csv": "er3a_c60_article", "arm.urdf": "er3a_c60"},

@@ -26,7 +26,7 @@ PLACES = (
 )
 FREE_SPACE = "joint_vectors lost_cells unjoined_cells within_cells targets path_stretches tool shallow_overlaps"
 PROGRAMS = "program_again controller_language controller_ramps torques shallow_overlaps"
-PATHS = "path_stretches ways_between tool torques shallow_overlaps"
+PATHS = "ways_between tool torques shallow_overlaps"
 SOLUTIONS = "round_trips ways_between tool"
 
 LISTED = {

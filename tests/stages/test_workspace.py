@@ -18,7 +18,6 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.workspace import judged_void, say, void_text
-from er3a.pipeline.overview.index import border_mm
 from er3a.pipeline.results import read_stage, write_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
@@ -66,19 +65,6 @@ def test_tables_agree_with_the_summary(found):
     reached = forward(make_study().robot("er3_600"), np.radians(hull.q_deg))[:, :3, 3]
     assert np.abs(reached - hull.point_m).max() < 1e-12
     assert 0 < summary.hull.volume_m3 < 1.26
-
-
-def test_the_border_is_that_of_what_the_proof_leaves_reachable(found):
-    arcs = [np.array(arc) / 1000 for arc in border_mm(found)]
-    assert arcs
-    points = np.concatenate(arcs)
-    empty = found.proof.take(found.proof.empty_ratio >= 1)
-    size = (found.proof.rho_m[:, 1] - found.proof.rho_m[:, 0]).max()
-    for rho, z in points[::17]:
-        beside = (np.abs(empty.rho_m.mean(axis=1) - rho) < size) & (np.abs(empty.z_m.mean(axis=1) - z) < size)
-        assert beside.any() or rho < size
-    reached = forward(make_study().robot("er3_600"), np.radians(found.hull_vertices.q_deg))[:, :3, 3]
-    assert points[:, 0].max() > np.hypot(*reached[:, :2].T).max() - 0.01
 
 
 def test_what_is_read_is_what_was_computed(found, tmp_path):

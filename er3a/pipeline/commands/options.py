@@ -15,6 +15,7 @@ import typer
 from er3a.errors import Er3aError, InputWarning
 from er3a.files.kept_files import given_file
 from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.study import load_study
 from er3a.version import __version__
 
 DEFAULT_STUDY = Path("config/config.yaml")
@@ -64,6 +65,18 @@ def start(
         print(_START)
 
 
+def _stages(incomplete: str) -> list[str]:
+    return [name for name in STAGES if name.startswith(incomplete)]
+
+
+def _robots(context: typer.Context, incomplete: str) -> list[str]:
+    try:
+        study = load_study(context.params.get("study") or DEFAULT_STUDY)
+    except (Er3aError, OSError):
+        return []
+    return [name for name in study.names if name.startswith(incomplete)]
+
+
 def given_files(files: Any) -> Any:
     """One file or several, or none, as :func:`er3a.files.kept_files.given_file` finds them: a callback of typer."""
     if isinstance(files, list):
@@ -71,9 +84,11 @@ def given_files(files: Any) -> Any:
     return files and given_file(files)
 
 
-StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES))]
-RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study")]
-SomeRobot = Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="a robot of the study (default: all)")]
+StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
+RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study", autocompletion=_robots)]
+SomeRobot = Annotated[
+    str | None, typer.Argument(metavar="[ROBOT]", help="a robot of the study (default: all)", autocompletion=_robots)
+]
 AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name or file")]
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
 Results = Annotated[Path, typer.Option(help="folder of the results")]

@@ -340,6 +340,7 @@ def schema(
     for file, content in schemas.items():
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    docs.mkdir(parents=True, exist_ok=True)
     (docs / "dictionary.md").write_text(data_dictionary(), encoding="utf-8")
 
 

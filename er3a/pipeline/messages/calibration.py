@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -167,7 +168,8 @@ def kept_lines(
     doubts = {"positions held back contradict it": contradicted, "measurements and table don't fit": not found.fits}
     if against := " and ".join(each for each, holds in doubts.items() if holds):
         lines.append(f"written although {against}: don't use these files until that is settled")
-    lines.append(f"{model}: written; the whole model: {python} in Python")
+    lines.append(f"{model}: written; the whole model: {python} in Python, or")
+    lines.append(f"    er3a predict {shlex.quote(str(model))} JOINTS.csv --robot {shlex.quote(robot)}")
     lines.append(f"{output}: written" + (f"; {text}" if (text := file_text(found)) else ""))
     if found.ratios:
         lines.append(

@@ -48,7 +48,7 @@ class UrScriptWriter(writing.Writer):
 
         Parameters
         ----------
-        text : a line that begins with ``$ `` (the pendant's own marks) is kept as it is
+        text : a line that begins with a dollar sign and a blank (the pendant's own marks) is kept as it is
         """
         self.line(text if text.startswith("$ ") else f"# {text}")
 

@@ -124,12 +124,13 @@ def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLim
     curve, followed = motion.curve, motion.followed
     events = motion_faults.singular_events(robot, curve, near)
     ends = followed and (followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events))
+    known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
     return Faults(
         events=events,
         limits=motion_faults.limit_intervals(robot, curve),
         fast=[part for limit in limits.rates for part in motion_faults.rate_intervals(curve, limit)],
         undecided=[] if ends else open_stretches(curve),
-        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)),
+        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known else None,
     )
 
 
