@@ -83,7 +83,9 @@ def test_a_run_says_what_was_edited_meanwhile(call, monkeypatch):
     monkeypatch.setattr(verdicts, "read_verdicts", lambda *_: [verdict])
     done = call("run")
     assert (done.returncode, done.stderr) == (1, "note: arm, workspace (pass): text\n")
-    assert call("run", "workspace").returncode == 0
+    assert call("run", "workspace").returncode == 1
+    assert call("run", "validation").returncode == 0  # another stage was asked for
+    assert call("run", "results/other/workspace/summary.json").returncode == 0
 
 
 def test_reading_a_program_ends_in_its_time_and_a_line_of_it_is_not_repeated_whole(call, tmp_path, monkeypatch):

@@ -351,6 +351,21 @@ def _one_at_first() -> list[str]:
     return ["--resources", *(f"compiles_{stage}=1" for stage in new)] if new else []
 
 
+def asked_robots(targets: Iterable[str] | None) -> set[str]:
+    """The robots whose files a run is asked for.
+
+    Parameters
+    ----------
+    targets : each names a stage, or a file of a robot such as ``reports/er3_600/inverse.html``
+
+    Returns
+    -------
+    robots : empty where it may be all of them
+    """
+    parts = [Path(target).parts for target in targets or ()]
+    return {each[1] for each in parts} if all(len(each) > 2 for each in parts) else set()
+
+
 def parsed(words: Sequence[str]) -> Namespace:
     """What a user's words request of Snakemake.
 

@@ -14,6 +14,7 @@ CODE_OF_LIBRARIES = {
     ".snakemake/pip-deployments": "Snakemake would load Python modules from it",
 }
 """Places below the working folder that no study needs, and why they are refused."""
+STATE = ".snakemake"
 
 
 def distrust() -> None:
@@ -28,7 +29,8 @@ def distrust() -> None:
     here, own = os.path.realpath("."), os.path.realpath(os.path.join(__file__, "..", "..", ".."))
     if here != own:
         sys.path[:] = [place for place in sys.path if os.path.realpath(place) != here]
-    for place, why in CODE_OF_LIBRARIES.items():
+    linked = {STATE: "a run deletes files in it, and it links to another folder"} if os.path.islink(STATE) else {}
+    for place, why in (CODE_OF_LIBRARIES | linked).items():
         if os.path.lexists(place):
             print(f"error: {place}: {why}. Move it out of this folder", file=sys.stderr)
             sys.exit(2)

@@ -143,6 +143,19 @@ def test_a_folder_in_the_path_of_python_is_taken_out_of_it(stranger, path):
     call("python", "-m", "er3a", "check", "config/study.yaml", PYTHONPATH=path)
 
 
+def test_a_state_folder_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path):
+    foreign = tmp_path / "foreign"
+    (foreign / "locks").mkdir(parents=True)
+    (foreign / "locks/precious").touch()
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / ".snakemake").symlink_to(foreign)
+    done = run([sys.executable, "-P", "-m", "er3a", "run"], cwd=study)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert done.stderr.startswith("error: .snakemake: ")
+    assert (foreign / "locks/precious").exists()
+
+
 @pytest.mark.parametrize("place", CODE_OF_LIBRARIES)
 def test_a_folder_with_code_of_libraries_is_refused_by_jobs_too(stranger, place):
     folder, call = stranger

@@ -17,6 +17,7 @@ from er3a.errors import Er3aError, ResultError
 from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands import options
 from er3a.pipeline.progress import shown_work
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 from er3a.robots.robot import Convention
 
@@ -114,16 +115,20 @@ def run(
     fail_on: Annotated[options.FailOn | None, typer.Option(help="exit code 1 for this verdict or a worse one")] = None,
 ):
     """Run the study in this folder; finished parts are not run again."""
-    from er3a.pipeline.run_study import parsed, run_study
+    from er3a.pipeline.run_study import asked_robots, asked_stages, parsed, run_study
     from er3a.pipeline.verdicts import read_verdicts
 
     if not run_study(study, options.DEFAULT_RESULTS, options.DEFAULT_REPORTS, words or []):
         raise typer.Exit(2)
     asked = parsed(words or [])
-    if not (fail_on or asked.dryrun or asked.targets):  # of the whole study: what changed in the meantime
+    if not (fail_on or asked.dryrun):  # what was made, and changed in the meantime
+        stages, robots = asked_stages(asked.targets), asked_robots(asked.targets)
         with suppress(ResultError):  # such as after an option that only lists something
             found = read_verdicts(load_study(study), options.DEFAULT_RESULTS)
-            _end_with_findings([verdict for verdict in found if verdict.outdated], options.FailOn.fail)
+            own = [
+                each for each in found if each.stage in (stages or STAGES) and each.robot in (robots or [each.robot])
+            ]
+            _end_with_findings([verdict for verdict in own if verdict.outdated], options.FailOn.fail)
     if fail_on:
         _end_with_findings(read_verdicts(load_study(study), options.DEFAULT_RESULTS), fail_on)
 
