@@ -22,7 +22,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 
 PLACE_M, PLACE_RAD = 1e-3, np.radians(0.2)  # within which the flange stands at one place
 Setup = Literal["eye_in_hand", "eye_to_hand"]
-OpenFrame = Literal["flange_poses", "base_poses"]
+OpenFrame = Literal["flange_frame", "base_frame"]
 """What recorded poses may not be: the flange's, and in the robot's own base."""
 
 
@@ -120,7 +120,7 @@ class CalibrationSet(ByValue, Displayed):
         """
         if simulated or self.states_joints:
             return ()
-        return ("flange_poses", "base_poses") if self.touched is None else ("flange_poses",)
+        return ("flange_frame", "base_frame") if self.touched is None else ("flange_frame",)
 
     @property
     def states_joints(self) -> bool:

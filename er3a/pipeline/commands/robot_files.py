@@ -288,11 +288,11 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
-    from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-    from er3a.pipeline.messages.say import bracketed, say
+    from er3a.pipeline.messages.say import say
+    from er3a.pipeline.messages.scope import assumed_text, gap_text
     from er3a.pipeline.messages.vision import hand_eye_lines, hand_eye_record
-    from er3a.pipeline.results import LeftOut
-    from er3a.pipeline.stages.vision.compute import left_out_of_calibration
+    from er3a.pipeline.scope import GAPS, Open
+    from er3a.pipeline.stages.vision.compute import open_of_calibration
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -311,16 +311,18 @@ def hand_eye(
             raise Er3aError(f"{file}: {say(error.finding)}") from None
     boardless = images.boardless if images else ()
     missed = [
-        *left_out_of_calibration(samples, head, offset, images, (found, unseen, least_zero)),
-        *map(LeftOut, samples.open_frames(head.simulated)),
+        *open_of_calibration(samples, head, images, (found, unseen, least_zero)),
+        *map(Open, samples.open_frames(head.simulated)),
     ]
-    not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each in missed]
+    not_checked = [gap_text(each) for each in missed if each.reason in GAPS]
+    assumed = [assumed_text(each) for each in missed if each.reason not in GAPS]
     if as_json:
         record = hand_eye_record(found, offset, boardless, open_tilts)
-        options.print_json(record | {"not_examined": not_examined})
+        options.print_json(record | {"not_checked": not_checked, "assumed": assumed})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
-        sample_lines += [f"not examined: {each}" for each in not_examined]
+        sample_lines += [f"not checked: {each}" for each in not_checked]
+        sample_lines += [f"assumed: {each}" for each in assumed]
         print("\n".join([hand_eye_lines(found, offset, boardless), *sample_lines]))
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:

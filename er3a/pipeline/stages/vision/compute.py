@@ -21,16 +21,11 @@ from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import GAPS, Check, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.covered import assumed_rates, assumed_tool, covered_collisions, gaps_in_solids
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import (
-    left_out_in_solids,
-    left_out_of_collisions,
-    left_out_of_intrinsics,
-    left_out_of_rates,
-    left_out_without_tool,
-)
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
@@ -47,7 +42,7 @@ from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
 from er3a.vision.calibration_set import CalibrationSet, TimeOffset
 from er3a.vision.field_of_view import in_sight
-from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
+from er3a.vision.grasp_motion import PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
@@ -293,18 +288,15 @@ def compute(study: Study, name: str) -> model.VisionResults:
     samples, offset, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
-    bodies, frames = bodies_of(robot, scene), _open_frames(samples, head)
-    of_motions = (*frames, *GRASPS_REST_ON, *_left_out_of_motions(robot, bodies, scene, motions))
+    frames = _open_frames(samples, head)
+    of_file = (*frames, *_open_of_file(task_file))
+    seen = covered_collisions(robot, bodies_of(robot, scene), scene)
+    given = motions.acceleration_deg_s2 is not None
+    assumed = (*assumed_rates(speeds_given(robot), given), *assumed_tool(robot), *seen.assumed)
     try:
         with_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
-        left_out = (
-            _no_grasps(task_file),
-            *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images),
-            *of_motions,
-        )
-        return _without_calibration(error, task_file, title, settings, left_out)
+        return _without_calibration(error, task_file, title, settings)
     found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
@@ -316,22 +308,24 @@ def compute(study: Study, name: str) -> model.VisionResults:
     objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
+    open_points = (
+        *of_file,
+        *open_of_calibration(samples, head, images, with_zeros, task_file.gripper.tolerance_mm),
+        *gaps_in_solids(scene, _places(robot, task_file, found, picture)),
+        *(() if scene and scene.carried else (Open("gripper"),)),
+    )
+    gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     summary = model.VisionSummary(
-        verdict=judged.without(bodies.in_error).resting_on(shapes),
+        verdict=judged.resting_on(shapes),
         figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,
         least_success=settings.least_success,
         calibration=calibration,
         objects=objects,
-        not_examined=(
-            *((_no_grasps(task_file),) if doubt else ()),
-            *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
-            *of_motions,
-            *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
-        ),
+        checked=coverages(_asked(objects, found) | seen.asked, gaps),
+        assumed=(*(each for each in open_points if each.reason not in GAPS), *assumed),
     )
     return model.VisionResults(
         summary,
@@ -355,9 +349,12 @@ def _places(
             yield each.name, (camera @ each.pose())[:3, 3], float(error_sizes(error.camera + error.calibration)[0])
 
 
-def _rates_given(motions: TrajectorySettings) -> tuple[bool, bool]:
-    """Whether the study gives the joints' accelerations, and their jerk."""
-    return motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
+def _asked(objects: Sequence[model.ObjectResult], found: HandEye) -> dict[Check, tuple[int, int]]:
+    """What the checks of the calibration and of the grasps cover."""
+    asked = [each for each in objects if each.expect in (None, "grasped")]
+    of = len(asked), len(asked)
+    used = int(found.used.sum())
+    return {"camera": (used, used), "reach": of, "limits": of}
 
 
 def _all_programs(
@@ -378,13 +375,11 @@ def _all_programs(
 
 
 def _without_calibration(
-    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings, left_out: tuple[LeftOut, ...]
+    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings
 ) -> model.VisionResults:
     """What is written where the samples allow no calibration: why, and no rows."""
     verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
-    summary = model.VisionSummary(
-        verdict, (), file.title, scene, settings.least_success, None, (), not_examined=left_out
-    )
+    summary = model.VisionSummary(verdict, (), file.title, scene, settings.least_success, None, ())
     return model.VisionResults(
         summary,
         model.SampleRows.empty(),
@@ -394,67 +389,49 @@ def _without_calibration(
     )
 
 
-def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
+def _open_of_file(file: VisionFile) -> Iterator[Open]:
     """What the file of the cell leaves open whatever the samples say: objects out of view, errors of the arm."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(), places)
     if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
-        yield LeftOut("objects_out_of_view", hidden)
+        yield Open("out_of_view", hidden)
     if not file.arm.states_all:
-        yield LeftOut("arm_errors")
+        yield Open("arm_errors")
 
 
-def _left_out_of_motions(
-    robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings
-) -> Iterator[LeftOut]:
-    """What of collisions, speeds and torques nobody looks at."""
-    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH)
-    yield from left_out_of_rates(speeds_given(robot), *_rates_given(settings))
-    yield from left_out_without_tool(robot)
-    yield LeftOut("torques")
-
-
-def _no_grasps(file: VisionFile) -> LeftOut:
-    """The objects that no grasp is looked for of, as no calibration says where they are."""
-    return LeftOut("grasps", tuple(each.name for each in file.objects))
-
-
-def left_out_of_calibration(
+def open_of_calibration(
     samples: CalibrationSet,
     head: HandEyeFile,
-    offset: TimeOffset | None,
     images: SeenImages | None,
-    found: tuple[HandEye, tuple[str, ...] | None, float] | None = None,
+    found: tuple[HandEye, tuple[str, ...] | None, float],
     tolerance_mm: Sequence[float] = (),
-) -> tuple[LeftOut, ...]:
-    """What a calibration does not rest on, and what nothing checks it against.
+) -> tuple[Open, ...]:
+    """What nothing checks a calibration against, and what it takes as given.
 
-    ``found`` : as :func:`zeros_tried` returns it, without joints where no arm is known; None: no calibration.
-    ``tolerance_mm`` : what touched points have to agree within, to stand for the intrinsics; empty for any distance.
+    Parameters
+    ----------
+    found : as :func:`zeros_tried` returns it, without joints where no arm is known
+    tolerance_mm : what touched points have to agree within, to stand for the intrinsics; empty for any distance
+
+    Returns
+    -------
+    open_points : gaps of the check of the camera, and assumptions
     """
-    hand_eye, zeros, least_zero = found or (None, None, 0.0)
-    touch = hand_eye.touch if hand_eye else None
-    boardless = tuple(each.sample for each in images.boardless) if images else ()
-    rejected = hand_eye.rejected if hand_eye else ()
-    copies = hand_eye.copies if hand_eye else ()
-    unused = offset.unused if offset else 0
-    touched = touch is not None and (not tolerance_mm or touched_within(touch, tolerance_mm))
-    left: dict[LeftOut, object] = {
-        LeftOut("real_camera"): head.simulated,
-        LeftOut("boardless_images", boardless): boardless,
-        LeftOut("left_out_samples", rejected): rejected,
-        LeftOut("stream_poses", amount=unused): unused,
-        LeftOut("copied_samples", copies): copies,
-        LeftOut("joint_zeros", zeros or ()): zeros != (),
-        LeftOut("small_joint_zeros", amount=least_zero): least_zero,
-        LeftOut("touched_points"): touch is None if hand_eye else samples.touched is None,
-        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated, touched)},
+    hand_eye, zeros, least_zero = found
+    touched = hand_eye.touch is not None and (not tolerance_mm or touched_within(hand_eye.touch, tolerance_mm))
+    points = {
+        Open("real_camera"): head.simulated,
+        Open("joint_zeros", zeros or ()): zeros != (),
+        Open("small_joint_zeros", amount=least_zero): least_zero > 0,
+        Open("touched_points"): hand_eye.touch is None,
+        Open("given_intrinsics"): images is not None and images.views.shared is None,
     }
-    return tuple(each for each, is_so in left.items() if is_so)
-
-
-GRASPS_REST_ON = (LeftOut("detections"), LeftOut("gripped_parts"))
-"""What grasps take as it is given."""
+    if images is None:
+        # Touched points show where a fixed camera is. Of a camera on the flange they show where the board is, and a
+        # wrong focal length may leave that as it is.
+        confirmed = head.simulated or (samples.setup == "eye_to_hand" and touched)
+        points[Open("pose_intrinsics" if confirmed else "intrinsics")] = True
+    return tuple(each for each, is_so in points.items() if is_so)
 
 
 def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> bool:
@@ -470,14 +447,14 @@ def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> b
     return touch is not None and 1000 * touch.largest <= min(tolerance_mm)
 
 
-def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOut, ...]:
+def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[Open, ...]:
     """Of the frames that nothing is compared with, the one that the camera is in: grasps rest on no other.
 
     A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
     all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
     """
-    camera_in: LeftOutSubject = "flange_poses" if head.setup == "eye_in_hand" else "base_poses"
-    return tuple(LeftOut(each) for each in samples.open_frames(head.simulated) if each == camera_in)
+    camera_in = "flange_frame" if head.setup == "eye_in_hand" else "base_frame"
+    return tuple(Open(each) for each in samples.open_frames(head.simulated) if each == camera_in)
 
 
 def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from er3a.by_value import Finding
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
@@ -234,7 +234,7 @@ class VisionSummary(Summary):
     grasps are no pass.
     """
 
-    decisive = NEVER_A_PASS | {"carried"}
+    needs = ("camera", "reach", "limits", "self_collision", "scene_collision")
 
     verdict: Verdict[CalibrationImpossible | CalibrationDoubtful | TouchContradicts | GraspCounts | ExpectationsUnmet]
     title: str

@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import bracketed, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import LeftOut, Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
@@ -136,8 +136,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
     robot, contradicted = study.robot(name), stored.rests_on.get("validation") == "fail"
-    boxes = [LeftOut("placed_box")] if "workspace" in study.stages(name) else []
-    head = program_head(stored.validated, [*summary.not_examined, *boxes])
+    head = program_head(stored.validated, summary.checked, summary.assumed, "vision")
     render_stage(
         study,
         stored,
