@@ -21,8 +21,8 @@ from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.messages.scope import assumed_text, gap_text
+from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.vision.entry import vision_files
 from er3a.robots.joint_limits import joint_columns
 from testing import camera_cells
@@ -274,18 +274,19 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
         codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
         record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
         assert record["touch_contradicts"] == (beside > 0)
-        subjects = ("joint_zeros", "touched_points", "real_camera", "flange_poses", "base_poses")
-        told = (left_out_text(LeftOut(each)) for each in subjects)
-        assert [each in record["not_examined"] for each in told] == [True, False, False, True, False]
+        told = [
+            assumed_text(Open(each)) in record["assumed"] for each in ("joint_zeros", "touched_points", "real_camera")
+        ]
+        assert told == [True, False, False]
+        frames = [gap_text(Open(each)) in record["not_checked"] for each in ("flange_frame", "base_frame")]
+        assert frames == [True, False]
     text = file.read_text()
     file.write_text(text.replace("touched: touched.csv", ""))
     unconfirmed = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert all(left_out_text(LeftOut(each)) in unconfirmed for each in ("flange_poses", "base_poses"))
+    assert all(gap_text(Open(each)) in unconfirmed for each in ("flange_frame", "base_frame"))
     file.write_text(text.replace("touched: touched.csv", "simulated: true"))
     untouched = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert all(
-        f"not examined: {left_out_text(LeftOut(each))}" in untouched for each in ("touched_points", "real_camera")
-    )
+    assert all(f"assumed: {assumed_text(Open(each))}" in untouched for each in ("touched_points", "real_camera"))
     assert "recorded poses" not in untouched
     assert codes == [(0, False), (1, True)]
 
@@ -347,8 +348,6 @@ def test_poses_of_a_stream_that_no_sample_was_made_of_are_counted(tmp_path):
     file = _streams(tmp_path, ahead=0.1)
     samples, offset, _ = read_calibration(file, None)
     assert (len(samples), offset.unused) == (60, 480 - 60)
-    told = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert f"not examined: {left_out_text(LeftOut('stream_poses', amount=420))}" in told
 
 
 def test_images_beside_streams_are_refused(tmp_path):

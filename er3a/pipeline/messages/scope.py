@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TypeVar
+from typing import Any
 
 from er3a.by_value import Finding
 from er3a.collision.pairs import BASE, link_label
@@ -127,10 +127,9 @@ _words: dict[str, tuple[str, Mapping[str, str]]] = {}
 RESERVED: Mapping[str, tuple[str, ...]] = {
     "dynamics.no_limits": ("link_masses", "load", "friction"),
 }
-NameT = TypeVar("NameT", bound=str)
 
 
-def names_in_words(reason: str, code: str, words: Mapping[NameT, str]) -> None:
+def names_in_words(reason: str, code: str, words: Mapping[Any, str]) -> None:
     """Say a reason's names by a table of words marked with ``N_``; a stage's messages call this."""
     _words[reason] = code, {str(name): text for name, text in words.items()}
 
@@ -171,6 +170,11 @@ def missed_text(found: Coverage) -> str:
     """A check that does not cover all, and why."""
     gaps = joined(map(gap_text, found.gaps), ", ") or covered_text(found)
     return sentence("not_checked.one", check=check_name(found.check), gaps=gaps)
+
+
+def never_text(stage: str) -> str:
+    """What a stage never checks; empty for a stage of others, which says it on its page."""
+    return sentence(key) if (key := f"never.{stage}") in TEXTS else ""
 
 
 def say_reserved(finding: Finding, assumed: Iterable[Open]) -> str:

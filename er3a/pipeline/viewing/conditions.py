@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from er3a.pipeline import language
-from er3a.pipeline.messages.say import sentence
-from er3a.pipeline.messages.scope import assumed_text, missed_text
+from er3a.pipeline.messages.scope import assumed_text, missed_text, never_text
 from er3a.pipeline.messages.validation import condition
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.scope import Coverage, Open
@@ -57,4 +56,4 @@ def program_head(
     with language.using("en"):
         missed = [f"not checked: {missed_text(each)}" for each in checked if not each.complete]
         given = [f"assumed: {assumed_text(each)}" for each in assumed]
-        return [line for line in (condition_of(validated), *missed, *given, sentence(f"never.{stage}")) if line]
+        return [line for line in (condition_of(validated), *missed, *given, never_text(stage)) if line]

@@ -41,8 +41,8 @@ from er3a.pipeline.messages.numbers import (
     rounded_up,
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
-from er3a.pipeline.messages.say import bracketed, joined, listed, say, sentence, word
-from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, say_reserved
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, say_reserved
 from er3a.pipeline.results import (
     AbsentResults,
     Provenance,
@@ -442,7 +442,7 @@ def render_stage(
     name, stage = stored.robot, stored.stage
     shared: dict[str, Any] = {
         "head": head or head_of(stored, head_links),
-        "never": sentence(f"never.{stage}"),
+        "never": never_text(stage),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),

@@ -179,7 +179,10 @@ def _checked(joints: tuple[int, int], proven: Proven, seen: Covered, gaps: Seque
     undecided = 100 * proven.proof.width
     hidden = (Open("undecided_cells", amount=undecided),) if proven.proof.width > SETTLED else ()
     decided = 100 if not hidden else int(100 - undecided)
-    return coverages({"reach": (decided, 100), "limits": joints, "self_collision": seen.asked["self_collision"]}, (*seen.gaps, *gaps, *hidden))
+    return coverages(
+        {"reach": (decided, 100), "limits": joints, "self_collision": seen.asked["self_collision"]},
+        (*seen.gaps, *gaps, *hidden),
+    )
 
 
 def _assumed(tool: ToolCapability) -> Iterator[Open]:
