@@ -490,6 +490,7 @@ def _known(names: Iterable[str]) -> str:
 
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
+HALF_DEG, COMMANDED_DEG = 0.5, 2.5
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 _COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
@@ -636,18 +637,24 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
 
 
 def _fill_rounding(table: list[Fields]) -> None:
-    """Half the last digit of a row's joint values, which is that of all rows of its source; none of a commanded pose,
-    whose joint values are whole or half degrees that are written as such, and exact."""
-    most: dict[str, int] = {}
+    """Half the last digit of each joint value, cell by cell; none of commanded poses, which are exact.
+
+    A table of whole and half degrees alone is of commanded poses. Beside typed ones of the same source, a row counts as
+    commanded only if all its values are multiples of 2.5 degrees: six others, rounded to whole degrees, are so once in
+    15 000 rows.
+    """
     typed = [[fields[name] for name in (*_POSE, *_FURTHER) if fields.get(name) is not None] for fields in table]
+    mixed = {fields["source"] for fields, values in zip(table, typed) if not _multiples_of(HALF_DEG, values)}
     for fields, values in zip(table, typed):
-        decimals = max((value.decimals for value in values), default=0)
-        most[fields["source"]] = max(most.get(fields["source"], 0), decimals)
-    for fields, values in zip(table, typed):
-        commanded = all(value.decimals <= 1 and 2 * value == round(2 * value) for value in values)
-        half = 0.5 * 10.0 ** -most[fields["source"]]
-        halves = (0.0 if fields.get(name) is None else half for name in (*_POSE, *_FURTHER))
+        commanded = _multiples_of(COMMANDED_DEG if fields["source"] in mixed else HALF_DEG, values)
+        cells = [fields.get(name) for name in (*_POSE, *_FURTHER)]
+        halves = [0.0 if cell is None else 0.5 * 10.0**-cell.decimals for cell in cells]
         fields["rounding"] = () if commanded else tuple(halves)
+
+
+def _multiples_of(step: float, values: list[Written]) -> bool:
+    """Whether joint values (deg), written with one decimal at most, are whole steps."""
+    return all(value.decimals <= 1 and value % step == 0 for value in values)
 
 
 def _states_none(fields: Fields) -> bool:
