@@ -51,18 +51,15 @@ SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 ROUNDED = 4  # decimals of mm and deg in a corrected table
-UNITS = {
-    own / read: f"{read_as} → {name}"
-    for (name, own), (read_as, read) in itertools.permutations(
-        {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0}.items(), 2
-    )
-}
-"""What takes lengths from the unit they were read in to their own."""
-ANGLE_UNITS = {
-    math.degrees(1.0): "deg → rad",
-    math.radians(1.0): "180/π deg → deg",
-    math.degrees(math.degrees(1.0)): "deg → π/180 rad",
-}
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # mm
+RAD = math.degrees(1.0)
+ANGLE_UNITS = {"deg": 1.0, "rad": RAD, "gon": 0.9, "π/180 deg": 1 / RAD, "180/π rad": RAD**2}
+"""In deg; the last two are those of angles that were converted once too often."""
+LENGTH_FACTORS = {own / read for own, read in itertools.permutations(LENGTH_UNITS.values(), 2)}
+GON = ANGLE_UNITS["gon"]
+ANGLE_FACTORS = RAD, 1 / RAD, RAD**2, GON, GON / RAD
+"""What takes values from the unit they were read in to their own."""
+NEAR_FACTOR = math.log(1.35)  # of a ratio, as one wrong entry may change it
 USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an arm's table, and of one of both
 LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
 NEAR_UNITS = math.log(20.0)
@@ -75,6 +72,8 @@ USUAL_ANGLES = {
     "speed": (20.0, 1500.0),
 }
 """Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
+NEAR_GON = 0.02  # of the sum of all angles of a column
+SAME_FACTOR = 1e-6
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
@@ -658,9 +657,12 @@ def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
 
 
 def _likely_factor(ratio: float) -> set[float]:
-    """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer."""
-    near = min((1.0, *UNITS), key=lambda factor: abs(math.log(ratio / factor)))
-    return {near} - {1.0} if abs(math.log(ratio / near)) < math.log(2) else set()
+    """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer; and those about as near."""
+    off = {factor: abs(math.log(ratio / factor)) for factor in (1.0, *LENGTH_FACTORS)}
+    near = min(off, key=off.__getitem__)
+    if near == 1.0 or off[near] > math.log(2):
+        return set()
+    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR)}
 
 
 def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], factor: float) -> Cause:
@@ -677,22 +679,68 @@ def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], fact
 
     stranger = strange(robot_b) - strange(robot_a)
     if stranger > STRANGER:
-        factor = min(UNITS, key=lambda each: abs(math.log(each * factor)))
-        return Cause("unit", "b", columns, factor, UNITS[factor])
-    return Cause("unit", "a" if stranger < -STRANGER else None, columns, factor, UNITS[factor])
+        return _of_unit("unit", "b", columns, 1 / factor)
+    return _of_unit("unit", "a" if stranger < -STRANGER else None, columns, factor)
+
+
+def _of_unit(
+    code: CauseCode, side: Literal["a", "b"] | None, columns: tuple[str, ...], factor: float, heading: str = ""
+) -> Cause:
+    """Columns in another unit than their heading's (mm or deg, if it is not given), and what takes them to it."""
+    units, heading = (ANGLE_UNITS, heading or "deg") if code == "angle_unit" else (LENGTH_UNITS, heading or "mm")
+    own = units[heading] * factor
+    name = min(units, key=lambda each: abs(math.log(units[each] / own)))
+    if abs(math.log(units[name] / own)) > SAME_FACTOR:
+        name = f"{factor:.6g} {heading}"
+    return Cause(code, side, columns, factor, f"{heading} → {name}")
+
+
+def by_headings(found: Comparison, a: Mapping[str, str], b: Mapping[str, str]) -> Comparison:
+    """A comparison whose causes name units as the tables' headings do.
+
+    Parameters
+    ----------
+    found : read in the headings' units
+    a, b : unit of each column of the two tables, such as ``{"alpha": "rad"}``; mm and deg of those that are not named
+
+    Returns
+    -------
+    found : each column's unit as "heading's → the one that its numbers are in"
+    """
+    if found.units is None:
+        return found
+
+    def named(slip: Cause) -> Cause:
+        factor, columns = slip.amount or 1.0, slip.entries
+        own = _of_unit(slip.code, slip.side, columns, factor, (b if slip.side == "b" else a).get(columns[0], ""))
+        other = _of_unit(slip.code, None, columns, 1 / factor, b.get(columns[0], ""))
+        return other if slip.side is None and _is_named(other) and not _is_named(own) else own
+
+    return replace(found, units=replace(found.units, causes=tuple(map(named, found.units.causes))))
+
+
+def _is_named(slip: Cause) -> bool:
+    """Whether what a slip's columns are in is a unit, and no multiple of their heading's."""
+    return slip.unit.rpartition("→ ")[2] in (*LENGTH_UNITS, *ANGLE_UNITS)
 
 
 def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> list[tuple[Cause, ...]]:
-    """Ways in which angles of two tables can be in another unit: none, and for either the one that makes them usual."""
+    """Ways in which angles of two tables can be in another unit: none, and for either those that make them usual, or
+    gon that make them the other's."""
     found: list[tuple[Cause, ...]] = [()]
-    sides: dict[Literal["a", "b"], Robot] = {"a": robot_a, "b": robot_b}
-    for side, robot in sides.items():
-        turning = ~robot.slides if columns in RANGES.values() else slice(None)
-        values = np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns]))
+    turning = ~robot_a.slides if columns in RANGES.values() else slice(None)
+    every = [
+        np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns])) for robot in (robot_a, robot_b)
+    ]
+    sums = [float(values[np.isfinite(values)].sum()) for values in every]
+    sides: tuple[Literal["a", "b"], ...] = ("a", "b")
+    for side, values, ratio in zip(sides, every, (sums, sums[::-1])):
         widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
-        for factor, unit in () if least < widest < most else ANGLE_UNITS.items():
-            if least < widest * factor < most:
-                found.append((Cause("angle_unit", side, columns, factor, unit),))
+        usual = least < widest < most
+        for factor in ANGLE_FACTORS:
+            gon = abs(ratio[1] - GON * ratio[0]) < NEAR_GON * ratio[0]
+            if (factor == GON and gon) if usual else least < widest * factor < most:
+                found.append((_of_unit("angle_unit", side, columns, factor),))
     return found
 
 
@@ -703,7 +751,7 @@ def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> It
             yield from slips
     sums = [sum(float(np.abs(getattr(each, key)[each.slides]).sum()) for key in columns) for each in (robot_a, robot_b)]
     for factor in _likely_factor(sums[1] / sums[0]) if min(sums) > 0 else ():
-        yield Cause("unit", None, columns, factor, UNITS[factor])
+        yield _of_unit("unit", None, columns, factor)
 
 
 # Causes ---------------------------------------------------------------------------------------------------------------

@@ -131,10 +131,11 @@ def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool
 
 
 def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
-    """A comparison of two tables, with what both files give beside them."""
-    from er3a.comparison.compare import given_by_both
+    """A comparison of two tables, its units named as their headings do, with what both files give beside them."""
+    from er3a.comparison.compare import by_headings, given_by_both
 
     ranges = (each for each in found.not_examined if each in ("limits", "speeds", "limits_on_sums"))
+    found = by_headings(found, first.units, other.units)
     return replace(found, not_examined=(*ranges, *given_by_both(first.beside, other.beside)))
 
 
