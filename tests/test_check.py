@@ -125,7 +125,6 @@ CAMERA = "kind: hand_eye\ntitle: A\nsource: A\nsetup: eye_to_hand\nsamples: away
         PATH.format("program, program: away.src"),
         "kind: programs\nprograms:\n- {name: a, title: A, file: away.src}\n",
         CAMERA,
-        CAMERA.replace("samples: away.csv", "streams: {flange: away.csv, target: away.csv}"),
         CAMERA.replace("away", "seen") + "images: {board: {pattern: chessboard, squares: [9, 6], square_mm: 25}}\n",
     ],
 )

@@ -12,7 +12,7 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -36,7 +36,7 @@ from er3a.numerics.si_units import in_si
 from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
-from er3a.vision.calibration_set import SPAN_S, CalibrationSet, OffsetOpenError, Stream, TimeOffset, paired, time_offset
+from er3a.vision.calibration_set import CalibrationSet
 
 FORMS: dict[str, tuple[str, ...]] = {
     **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
@@ -131,14 +131,13 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
             raise InputError(path, f"row {row['row']}, {where}", problem, "Write every position in mm")
 
 
-STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
 MIN_SQUARE_MM = 0.5
 MIN_DEVIATION_MM = 5e-3
 """Of a camera or an arm; less is in metres."""
-PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "PPM")  # of others, some are drawn by programs that are called for it
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
+PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "PPM")  # of others, some are drawn by programs that are called for it
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
 Positive = Annotated[float, Field(gt=0, le=1e5)]
@@ -210,14 +209,6 @@ class ImageEntry(StrictModel):
     pixel_standard_deviation: Annotated[float, Field(gt=0, le=100)] = 0.3
 
 
-class StreamsEntry(StrictModel):
-    """Two tables with separate clocks (``t_s``); the offset between the clocks is estimated within +-``widest_s``."""
-
-    flange: Text
-    target: Text
-    widest_s: Annotated[float, Field(gt=0, le=3600)] = 2.0
-
-
 @dataclass(frozen=True, eq=False)
 class SeenImages:
     """Image files that show the board, as the table names them, what was found in each, and those without it."""
@@ -242,8 +233,7 @@ class HandEyeFile(InputFile):
     source: Text
     simulated: bool = False
     setup: Literal["eye_in_hand", "eye_to_hand"]
-    samples: Text | None = None
-    streams: StreamsEntry | None = None
+    samples: Text
     images: ImageEntry | None = None
     camera_standard_deviation: StandardDeviations | None = None
     flange_standard_deviation: StandardDeviations | None = None
@@ -252,11 +242,7 @@ class HandEyeFile(InputFile):
     touch_standard_deviation_mm: Positive = 0.1
 
     @model_validator(mode="after")
-    def _one_source_of_samples(self) -> Self:
-        if (self.samples is None) == (self.streams is None):
-            raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
-        if self.streams and self.images:
-            raise ValueError("images: streams hold board poses, no images | Give samples with images, or remove it")
+    def _one_source_of_noise(self) -> Self:
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
                 "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "
@@ -281,9 +267,7 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
     return read_calibration(path, arm)[0]
 
 
-def read_calibration(
-    path: str | Path, robot: Robot | None
-) -> tuple[CalibrationSet, TimeOffset | None, SeenImages | None]:
+def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, SeenImages | None]:
     """Read a calibration set of a camera, with all files that it names.
 
     Parameters
@@ -294,7 +278,6 @@ def read_calibration(
     Returns
     -------
     samples : poses T_world_flange and T_camera_board in m, and joint values in rad or m where they were recorded
-    offset : between the clocks of the two streams, s; None for a table of samples
     images : what was found in the pictures; None without pictures. Samples whose picture shows no board are left out.
 
     Raises
@@ -304,34 +287,23 @@ def read_calibration(
     """
     path = Path(path)
     head = load(HandEyeFile, path)
-    offset: TimeOffset | None = None
     images: SeenImages | None = None
     covariance = head.camera_standard_deviation
     per_sample: Reals | None = None
     shared: Reals | None = None
-    if head.streams is not None:
-        flange_table = path.parent / head.streams.flange
-        hand = _stream(flange_table, "flange", robot)
-        eye = _stream(path.parent / head.streams.target, "target", robot)
-        offset = _offset(path, hand, eye, head.streams.widest_s)
-        flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
-        offset = replace(offset, unused=len(eye.t) - len(times))
-        names, q = tuple(f"{t:.3f} s" for t in times), None
-        of_joints = bool(_joint_columns(read_header(flange_table)))
+    table = path.parent / head.samples
+    rows, header = sample_rows(table)
+    flange, q = _flange(table, rows, header, robot)
+    of_joints = q is not None
+    names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
+    if head.images is not None:
+        images = _targets_of_images(table, rows, names, head.images)
+        target, per_sample, shared = images.views.target, images.views.covariance, images.views.shared
+        kept = list(images.views.numbers)
+        flange, names = flange[kept], tuple(names[number] for number in kept)
+        q = None if q is None else q[kept]
     else:
-        table = path.parent / str(head.samples)
-        rows, header = sample_rows(table)
-        flange, q = _flange(table, rows, header, robot)
-        of_joints = q is not None
-        names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
-        if head.images is not None:
-            images = _targets_of_images(table, rows, names, head.images)
-            target, per_sample, shared = images.views.target, images.views.covariance, images.views.shared
-            kept = list(images.views.numbers)
-            flange, names = flange[kept], tuple(names[number] for number in kept)
-            q = None if q is None else q[kept]
-        else:
-            target = poses_of(table, rows, "target", _form(table, header, "target"))
+        target = poses_of(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
         per_sample = np.broadcast_to(covariance.covariance(), (len(flange), 6, 6))
     samples = CalibrationSet(
@@ -347,7 +319,7 @@ def read_calibration(
         shared=shared,
         of_joints=of_joints,
     )
-    return samples, offset, images
+    return samples, images
 
 
 def check_samples(table: Path) -> str:
@@ -390,7 +362,7 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     for name in ("name", "image"):
         if name in header:
             columns[name] = CsvColumn(str, optional=name == "name")
-    if "t_s" in header:
+    if "t_s" in header:  # of recordings; not used
         columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
     columns |= {name: CsvColumn() for name in _joint_columns(header)}
     for stream in ("flange", "target"):
@@ -448,41 +420,6 @@ def _flange(
         raise InputError(table, f"columns {given[0]} to {given[-1]}", problem, "Convert to degrees")
     q = meant(robot, values)
     return forward(robot.without_tool(), q), q
-
-
-def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
-    rows, header = sample_rows(table)
-    if "t_s" not in header:
-        raise InputError(table, "header", "the column t_s is missing", "Add the time of each row in seconds")
-    t = np.array([row["t_s"] for row in rows], dtype=float)
-    falls = np.flatnonzero(np.diff(t) <= 0)
-    if falls.size:
-        where = f"row {rows[int(falls[0]) + 1]['row']}, column t_s"
-        raise InputError(
-            table, where, "time does not rise from the row before", "Sort the rows; keep one of equal ones"
-        )
-    flange = name == "flange"
-    T = _flange(table, rows, header, robot)[0] if flange else poses_of(table, rows, name, _form(table, header, name))
-    return Stream(t, T)
-
-
-def _offset(path: Path, hand: Stream, eye: Stream, widest: float) -> TimeOffset:
-    try:
-        return time_offset(hand, eye, widest)
-    except OffsetOpenError as error:
-        if error.end is not None:
-            problem = f"turns of arm and camera agree best at {error.end:.3g} s, an end of the range searched"
-            remedy = "Write a larger value, or check that both tables are of one recording"
-            raise InputError(path, "streams.widest_s", problem, remedy) from None
-    times = "; ".join(
-        f"{name}: {stream.t[0]:.10g} to {stream.t[-1]:.10g} s, {len(stream.t)} rows"
-        for name, stream in (("flange", hand), ("target", eye))
-    )
-    problem = (
-        f"the clocks can't be compared ({times}): it takes camera poses {SPAN_S:g} to {2 * SPAN_S:g} s apart while the "
-        f"arm was recorded for {widest:g} s (widest_s) before and after"
-    )
-    raise InputError(path, "streams", problem, "Record both for longer or more often, or make both t_s start together")
 
 
 def _touched(table: Path, robot: Robot | None = None) -> Reals:

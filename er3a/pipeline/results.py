@@ -182,7 +182,6 @@ LeftOutSubject = Literal[
     "boardless_images",
     "left_out_samples",
     "copied_samples",
-    "stream_poses",
     "joint_zeros",
     "small_joint_zeros",
     "touched_points",

@@ -527,7 +527,6 @@ def test_touched_points_confirm_what_the_gripper_needs_and_no_more():
         ({"simulated": True}, (LeftOut("real_camera"),)),
         ({"boardless": (BoardlessImage("a", "a.png", 3),)}, (LeftOut("boardless_images", ("a",)),)),
         ({"rejected": ("a", "b")}, (LeftOut("left_out_samples", ("a", "b")),)),
-        ({"unused": 30}, (LeftOut("stream_poses", amount=30),)),
         ({"copies": ("a",)}, (LeftOut("copied_samples", ("a",)),)),
         ({"zeros": ("J1", "J6")}, (LeftOut("joint_zeros", ("J1", "J6")),)),
         ({"least_zero": 0.5}, (LeftOut("small_joint_zeros", amount=0.5),)),
@@ -535,12 +534,12 @@ def test_touched_points_confirm_what_the_gripper_needs_and_no_more():
     ],
 )
 def test_a_calibration(given, more):
-    own = {"simulated": False, "boardless": (), "unused": 0, "zeros": (), "least_zero": 0.0}
+    own = {"simulated": False, "boardless": (), "zeros": (), "least_zero": 0.0}
     own |= {"rejected": (), "copies": (), "touch": of(largest=0.0)} | given
     found = of(rejected=own["rejected"], copies=own["copies"], touch=own["touch"]), own["zeros"], own["least_zero"]
     images = of(boardless=own["boardless"], views=of(shared="estimated"))
     listed = STAGES["vision"].module("compute").left_out_of_calibration
-    assert listed(None, of(simulated=own["simulated"]), of(unused=own["unused"]), images, found) == more
+    assert listed(None, of(simulated=own["simulated"]), images, found) == more
 
 
 @pytest.mark.parametrize(

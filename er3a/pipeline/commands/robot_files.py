@@ -301,7 +301,7 @@ def hand_eye(
     arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
     head = load(HandEyeFile, file)
     with shown_work(f"{file}: reading the samples") as at:
-        samples, offset, images = read_calibration(file, arm)
+        samples, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
         at(f"{file}: estimating the camera's pose")
         try:
@@ -311,17 +311,17 @@ def hand_eye(
             raise Er3aError(f"{file}: {say(error.finding)}") from None
     boardless = images.boardless if images else ()
     missed = [
-        *left_out_of_calibration(samples, head, offset, images, (found, unseen, least_zero)),
+        *left_out_of_calibration(samples, head, images, (found, unseen, least_zero)),
         *map(LeftOut, samples.open_frames(head.simulated)),
     ]
     not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each in missed]
     if as_json:
-        record = hand_eye_record(found, offset, boardless, open_tilts)
+        record = hand_eye_record(found, boardless, open_tilts)
         options.print_json(record | {"not_examined": not_examined})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
         sample_lines += [f"not examined: {each}" for each in not_examined]
-        print("\n".join([hand_eye_lines(found, offset, boardless), *sample_lines]))
+        print("\n".join([hand_eye_lines(found, boardless), *sample_lines]))
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)

@@ -121,10 +121,6 @@ TEXTS = texts(
         "left_out.boardless_images": "images in which no board was found",
         "left_out.left_out_samples": "samples that contradict the others: the calibration does not rest on them",
         "left_out.copied_samples": "samples that repeat another one exactly: they measure nothing and are left out",
-        "left_out.stream_poses": (
-            "{amount:,.0f} of the camera's poses: samples are made of those at which the arm is slow and which differ "
-            "most in how it is turned"
-        ),
         "left_out.joint_zeros": (
             "whether the zeros of these joints are right: the samples hold no joint angles, or a wrong zero acts on "
             "them as another pose of camera or board would"

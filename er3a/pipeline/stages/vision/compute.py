@@ -45,7 +45,7 @@ from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
-from er3a.vision.calibration_set import CalibrationSet, TimeOffset
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
@@ -143,7 +143,6 @@ def _closes(before: GraspLeg, after: GraspLeg) -> bool:
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
-    offset: TimeOffset | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
     """All that the summary says of a calibration.
@@ -152,7 +151,6 @@ def calibration_result(
     ----------
     head : the file that describes the recording
     found : poses and half-widths of their 95 % intervals, m and rad
-    offset : between the clocks of two streams; None for one table
     images : None for poses given as numbers
 
     Returns
@@ -181,7 +179,6 @@ def calibration_result(
         moved_mm=from_si("mm", moved),
         moved_deg=from_si("deg", tilted),
         touch=_touch(found),
-        time_offset=stated(model.OffsetResult, offset) if offset else None,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
         copies=found.copies,
@@ -290,7 +287,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
-    samples, offset, images = read_calibration(head_path, robot)
+    samples, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     bodies, frames = bodies_of(robot, scene), _open_frames(samples, head)
@@ -301,7 +298,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         left_out = (
             _no_grasps(task_file),
             *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images),
+            *left_out_of_calibration(samples, head, images),
             *of_motions,
         )
         return _without_calibration(error, task_file, title, settings, left_out)
@@ -309,7 +306,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    calibration = calibration_result(head, found, offset, images)
+    calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
     limits = (limits_of(robot, motions), study.seed)
     planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
@@ -328,7 +325,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         not_examined=(
             *((_no_grasps(task_file),) if doubt else ()),
             *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
+            *left_out_of_calibration(samples, head, images, with_zeros, task_file.gripper.tolerance_mm),
             *of_motions,
             *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
         ),
@@ -422,7 +419,6 @@ def _no_grasps(file: VisionFile) -> LeftOut:
 def left_out_of_calibration(
     samples: CalibrationSet,
     head: HandEyeFile,
-    offset: TimeOffset | None,
     images: SeenImages | None,
     found: tuple[HandEye, tuple[str, ...] | None, float] | None = None,
     tolerance_mm: Sequence[float] = (),
@@ -437,13 +433,11 @@ def left_out_of_calibration(
     boardless = tuple(each.sample for each in images.boardless) if images else ()
     rejected = hand_eye.rejected if hand_eye else ()
     copies = hand_eye.copies if hand_eye else ()
-    unused = offset.unused if offset else 0
     touched = touch is not None and (not tolerance_mm or touched_within(touch, tolerance_mm))
     left: dict[LeftOut, object] = {
         LeftOut("real_camera"): head.simulated,
         LeftOut("boardless_images", boardless): boardless,
         LeftOut("left_out_samples", rejected): rejected,
-        LeftOut("stream_poses", amount=unused): unused,
         LeftOut("copied_samples", copies): copies,
         LeftOut("joint_zeros", zeros or ()): zeros != (),
         LeftOut("small_joint_zeros", amount=least_zero): least_zero,

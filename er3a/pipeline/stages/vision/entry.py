@@ -50,9 +50,7 @@ def calibration_files(path: str | Path) -> list[Path]:
     """
     path = Path(path)
     head: dict[str, Any] = read_yaml(path)
-    streams = head.get("streams")
     named = [head.get("samples"), head.get("touched")]
-    named += [streams.get("flange"), streams.get("target")] if isinstance(streams, dict) else []
     files = [path, *(path.parent / name for name in named if isinstance(name, str))]
     if head.get("images") is not None and isinstance(head.get("samples"), str):
         table = path.parent / head["samples"]

@@ -97,16 +97,6 @@ class TouchResult:
 
 
 @dataclass(frozen=True)
-class OffsetResult:
-    """The camera's clock plus this is the arm's, with half its 95 % interval; ``unused``: poses without a sample."""
-
-    offset_s: float
-    half_width_s: float
-    rms_deg: float
-    unused: int = 0
-
-
-@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -146,7 +136,6 @@ class CalibrationResult:
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
-    time_offset: OffsetResult | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
     copies: tuple[str, ...] = ()

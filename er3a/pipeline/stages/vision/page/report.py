@@ -170,7 +170,7 @@ def _image_folder(study: Study, name: str) -> Path:
     """Where the table of samples stands, beside which its images are."""
     file = Path(str(study.entry(name).vision))
     head = file.parent / load_vision(file).calibration
-    return (head.parent / str(load(HandEyeFile, head).samples)).parent
+    return (head.parent / load(HandEyeFile, head).samples).parent
 
 
 def _programs(rows: model.GraspPrograms, head: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
