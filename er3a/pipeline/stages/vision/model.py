@@ -270,21 +270,11 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-class GraspPrograms(Table):
-    """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
-
-    target: Texts = column("name of the object")
-    language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
-    file: Texts = column("name of the file")
-    text: Texts = column("what the file holds")
-
-
 class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 
     samples: SampleRows
     ways: PathRows
-    programs: GraspPrograms
     corners: CornerRows
 
 
