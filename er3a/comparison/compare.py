@@ -300,17 +300,16 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
-    ranges: dict[Uncompared, RangeLayer] = {}
     layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
         "limits": lambda one, other: _limits(one, other, reverses, joint_zeros, tolerances),
         "speeds": _speeds,
     }
-    for name, layer_of in layers_of.items():
-        ranges[name] = layer_of(robot_a, robot_b)
-        for slip in _range_slips(robot_a, robot_b, RANGES[name]) if ranges[name].same is False else ():
+    ranges = {name: layer_of(robot_a, robot_b) for name, layer_of in layers_of.items()}
+    for name in (name for name, layer in ranges.items() if layer.same is False):
+        for slip in _range_slips(robot_a, robot_b, RANGES[name]):
             arms = in_units(robot_a, [slip], "a"), in_units(robot_b, [slip], "b")
-            if layer_of(*arms).same is not False:
-                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer_of(*arms)
+            if (layer := layers_of[name](*arms)).same is not False:
+                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer
                 break
     limits, speeds = ranges["limits"], ranges["speeds"]
     units = UnitLayer(not slips, slips)
@@ -888,22 +887,7 @@ def _corrected(
     for k in np.flatnonzero(moved).tolist():
         column = "d" if robot_a.sliding[k] else "offset"
         columns[column][k] = _rounded(columns[column][k] + found.zeros[k], column == "offset")
-    first, last = 0, robot_a.rows - 1
-    base, flange = robot_a.base, robot_a.flange
-    if not mechanism.is_identity(found.base, tolerances):
-        before = np.linalg.inv(robot_a.base) @ np.linalg.inv(found.base) @ robot_a.base
-        if robot_a.convention == "standard" and _about_z(before):
-            _put_on_axis(columns, first, before)
-        else:
-            base = _rounded_pose(np.linalg.inv(found.base) @ robot_a.base)
-    if not mechanism.is_identity(found.flange, tolerances):
-        behind = robot_a.flange @ found.flange @ np.linalg.inv(robot_a.flange)
-        folded = robot_a.convention == "standard" and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
-        if not folded and _about_z(behind) and last > 0:
-            turned_over = robot_a.convention == "standard" and np.cos(columns["alpha"][last]) < 0
-            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
-        else:
-            flange = _rounded_pose(robot_a.flange @ found.flange)
+    base, flange = _ends_corrected(robot_a, found, tolerances, columns)
     # Corrected zeros and directions make A's joint values those of B.
     ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
@@ -930,6 +914,29 @@ def _corrected(
         sources=sources,
         **columns,
     )
+
+
+def _ends_corrected(
+    robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances, columns: dict[str, Any]
+) -> tuple[Reals, Reals]:
+    """Base and flange as the other arm has them; where the first or last row can hold the difference, that is changed
+    in ``columns`` instead."""
+    base, flange, standard, last = robot.base, robot.flange, robot.convention == "standard", robot.rows - 1
+    if not mechanism.is_identity(found.base, tolerances):
+        before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
+        if standard and _about_z(before):
+            _put_on_axis(columns, 0, before)
+        else:
+            base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)
+    if not mechanism.is_identity(found.flange, tolerances):
+        behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
+        folded = standard and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
+        if not folded and _about_z(behind) and last > 0:
+            turned_over = standard and np.cos(columns["alpha"][last]) < 0
+            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
+        else:
+            flange = _rounded_pose(robot.flange @ found.flange)
+    return base, flange
 
 
 def _sources_of_both(robot_a: Robot, robot_b: Robot, changed: Sequence[str]) -> dict[str, Source]:

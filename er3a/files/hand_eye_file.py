@@ -18,18 +18,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.orientations import FORMS as ORIENTATIONS
+from er3a.files.orientations import NoRotationError, rotations
 from er3a.files.robot_file import Text
-from er3a.files.target_file import FORMS as TARGET_FORMS
 from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
-from er3a.geometry.transforms import exp_rotation, posed, transform
+from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
@@ -38,14 +38,9 @@ from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet
 
-FORMS: dict[str, tuple[str, ...]] = {
-    **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
-    "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
-}
-LONGEST_VECTOR = 2 * np.pi * 1.01
+FORMS = {form: columns for form, columns in ORIENTATIONS.items() if form != "zyz_deg"}
 POSITION = ("x_mm", "y_mm", "z_mm")
-UNIT_LENGTH_TOLERANCE = 1e-3  # quaternions are written with as few as four digits
-ORTHONORMAL_TOLERANCE = 1e-3
+TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 MIXED_UNITS = 200.0
 ROWS_TO_JUDGE_UNITS = 3
 
@@ -82,38 +77,11 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
         if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS / 2:
             problem = f"the widest angle is {widest:g} deg, which can only be radians"
             raise InputError(path, f"columns {stream}_roll_deg to {stream}_yaw_deg", problem, "Convert to degrees")
-        return transform(position / 1000, np.radians(values))
-    if form == "rotation_vector_rad":
-        for row, v in zip(rows, values):
-            if (length := float(np.linalg.norm(v))) > LONGEST_VECTOR:
-                where = f"row {row['row']}, columns {stream}_rx_rad to {stream}_rz_rad"
-                problem = f"the rotation vector's length is {length:.4g}, more than a turn, which can only be degrees"
-                raise InputError(path, where, problem, "Convert to radians; roll, pitch and yaw have other columns")
-        return posed(exp_rotation(values), position / 1000)
-    if form == "quaternion_wxyz":
-        for row, q in zip(rows, values):
-            length = float(np.linalg.norm(q))
-            if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
-                where = f"row {row['row']}, columns {stream}_qw to {stream}_qz"
-                problem = f"the quaternion's length is {length:.6g}, not 1"
-                raise InputError(path, where, problem, "Correct the sample, or remove its row")
-        return posed(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix(), position / 1000)
-    return posed(_rotations(path, rows, stream, values.reshape(-1, 3, 3)), position / 1000)
-
-
-def _rotations(path: Path, rows: list[dict[str, Any]], stream: str, R: Reals) -> Reals:
-    for row, M in zip(rows, R):
-        where = f"row {row['row']}, columns {stream}_r11 to {stream}_r33"
-        worst = float(np.abs(M @ M.T - np.eye(3)).max())
-        if worst > ORTHONORMAL_TOLERANCE:
-            problem = f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g}"
-            raise InputError(path, where, problem, "Correct the sample, or write more digits")
-        if np.linalg.det(M) < 0:
-            problem = "the matrix is left-handed (its determinant is -1)"
-            raise InputError(path, where, problem, "Change the sign of one axis in every sample")
-    U, _, Vt = np.linalg.svd(R)
-    rotations: Reals = U @ Vt
-    return rotations
+    try:
+        return posed(rotations(form, values, TOLERANCE), position / 1000)
+    except NoRotationError as error:
+        where = f"row {rows[error.row]['row']}, columns {stream}_{FORMS[form][0]} to {stream}_{FORMS[form][-1]}"
+        raise InputError(path, where, error.problem, error.remedy) from None
 
 
 def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, position: Reals) -> None:

@@ -30,8 +30,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
+from er3a.files.orientations import NoRotationError, rotations
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
+from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, PoseEntry
 from er3a.files.units import (
     JOINT_COLUMN,
     JointsDeg,
@@ -44,7 +45,7 @@ from er3a.files.units import (
     joint_values,
 )
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, read_yaml
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.geometry.transforms import posed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning import commands
@@ -54,7 +55,6 @@ from er3a.planning.stated_rates import StatedRates
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MAX_JOINTS, Robot
 
-UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
 MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
@@ -289,33 +289,13 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
 
 def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
     position = _block(path, rows, POSITION, check_millimetres)
-    T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]
-    if form in ("rpy_deg", "zyz_deg"):
-        angles = _block(path, rows, names)
-        order = "ZYX" if form == "rpy_deg" else "ZYZ"
-        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_euler(
-            order, angles[:, ::-1] if form == "rpy_deg" else angles, degrees=True
-        ).as_matrix()
-        return T
-    values = np.array([[row[name] for name in names] for row in rows])
-    if form == "quaternion_wxyz":
-        length = np.linalg.norm(values, axis=1)
-        for i in np.flatnonzero(np.abs(length - 1) > UNIT_LENGTH_TOLERANCE):
-            problem = f"the quaternion's length is {length[i]:.9g}, not 1"
-            raise InputError(path, _where(lines[i], names), problem, "Divide w, x, y and z by it")
-        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix()
-        return T
-    R = values.reshape(-1, 3, 3)
-    off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
-    for i in np.flatnonzero((off > ORTHONORMAL_TOLERANCE) | (np.linalg.det(R) < 0)):
-        problem = (
-            "the matrix mirrors" if off[i] <= ORTHONORMAL_TOLERANCE else f"the matrix is off a rotation by {off[i]:.3g}"
-        )
-        raise InputError(path, _where(lines[i], names), problem, "Give an orthonormal, right-handed matrix by rows")
-    u, _, vt = np.linalg.svd(R)
-    T[:, :3, :3] = u @ vt
-    return T
+    angles = form in ("rpy_deg", "zyz_deg")
+    values = _block(path, rows, names) if angles else np.array([[row[name] for name in names] for row in rows])
+    try:
+        return posed(rotations(form, values), position / 1000)
+    except NoRotationError as error:
+        raise InputError(path, _where(lines[error.row], names), error.problem, error.remedy) from None
 
 
 def _block(
@@ -361,21 +341,6 @@ Expected = Annotated[
 """One verdict, or several that a path comes to at once."""
 Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MAX_JOINTS)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
-
-
-class PoseEntry(Orientation):
-    """A pose of the tool in the base frame: position, and one of the forms of orientation."""
-
-    xyz_mm: PositionMm
-
-    @model_validator(mode="after")
-    def _one_orientation(self) -> Self:
-        self.check_one_form()
-        return self
-
-    def pose(self) -> Reals:
-        """T_base_tool (4, 4), m."""
-        return self.transform_at(np.array(self.xyz_mm) / 1000)
 
 
 class NamedPath(StrictModel):

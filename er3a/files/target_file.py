@@ -9,33 +9,28 @@ yes in each row where small angles are degrees although they look like radians.
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
+from er3a.files.orientations import FORMS as ORIENTATIONS
+from er3a.files.orientations import rotations
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, posed, rot_y, rot_z, transform
+from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
 from er3a.robots.robot import MAX_JOINTS, Robot
 
 POSITION = ("x_mm", "y_mm", "z_mm")
-FORMS: dict[str, tuple[str, ...]] = {
-    "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
-    "zyz_deg": ("z1_deg", "y_deg", "z2_deg"),
-    "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
-    "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
-}
+FORMS = {form: columns for form, columns in ORIENTATIONS.items() if form != "rotation_vector_rad"}
 KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
@@ -85,7 +80,6 @@ def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[
 
 
 MAX_TARGETS = 20_000
-UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
@@ -118,30 +112,12 @@ class Orientation(StrictModel):
                 )
         return content
 
-    @field_validator("quaternion_wxyz")
+    @field_validator("quaternion_wxyz", "matrix")
     @classmethod
-    def _unit_length(cls, values):
-        length = 1.0 if values is None else math.hypot(*values)
-        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
-            raise ValueError(f"the quaternion's length is {length:.9g}, not 1 | Divide w, x, y and z by it")
+    def _rotation(cls, values, info):
+        if values is not None:
+            rotations(info.field_name, [np.ravel(values)])
         return values
-
-    @field_validator("matrix")
-    @classmethod
-    def _rotation(cls, rows):
-        if rows is None:
-            return rows
-        R = np.array(rows)
-        with np.errstate(over="ignore", invalid="ignore"):
-            worst = np.abs(R @ R.T - np.eye(3)).max()
-        if not worst <= ORTHONORMAL_TOLERANCE:
-            raise ValueError(
-                f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g} | "
-                f"Its rows must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; write more digits"
-            )
-        if np.linalg.det(R) < 0:
-            raise ValueError("the matrix is a reflection (its determinant is -1) | Change the sign of one axis")
-        return rows
 
     def forms(self) -> list[str]:
         """The forms that are given."""
@@ -164,23 +140,25 @@ class Orientation(StrictModel):
 
         Returns
         -------
-        T : (4, 4); the rotation of a matrix is the nearest orthogonal one, by its singular values
-
-        Notes
-        -----
-        ``rpy_deg`` is R = Rz(yaw) Ry(pitch) Rx(roll), ``zyz_deg`` is R = Rz(a) Ry(b) Rz(c), a quaternion has w first.
+        T : (4, 4), see :func:`er3a.files.orientations.rotations`
         """
-        if self.rpy_deg is not None:
-            return transform(position, np.radians(self.rpy_deg))
-        if self.zyz_deg is not None:
-            a, b, c = np.radians(self.zyz_deg)
-            R = rot_z(a)[:3, :3] @ rot_y(b)[:3, :3] @ rot_z(c)[:3, :3]
-        elif self.quaternion_wxyz is not None:
-            R = scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
-        else:
-            u, _, vt = np.linalg.svd(np.array(self.matrix))
-            R = u @ vt
-        return posed(R, position)
+        (form,) = self.forms()
+        return posed(rotations(form, [np.ravel(getattr(self, form))])[0], position)
+
+
+class PoseEntry(Orientation):
+    """A pose: position, and one of the forms of orientation."""
+
+    xyz_mm: PositionMm
+
+    @model_validator(mode="after")
+    def _one_orientation(self):
+        self.check_one_form()
+        return self
+
+    def pose(self) -> NDArray[np.float64]:
+        """The transform (4, 4), m."""
+        return self.transform_at(np.array(self.xyz_mm) / 1000)
 
 
 class TargetEntry(Orientation):

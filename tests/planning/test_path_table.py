@@ -192,7 +192,7 @@ BAD = {
         "x_mm,y_mm,z_mm,r11,r12,r13,r21,r22,r23,r31,r32,r33",
         [[300, 0, 250, 1, 0, 0, 0, 1, 0, 0, 0, -1]] * 2,
         "row 2, column r11",
-        "mirrors",
+        "left-handed",
     ),
 }
 

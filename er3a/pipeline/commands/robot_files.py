@@ -38,8 +38,8 @@ def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF or xacro of a serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
-    base: Annotated[str | None, typer.Option(help="the link at which the arm begins (default: the root)")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link at which the arm ends, if there are several ends")] = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
     references: Annotated[
         Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
     ] = None,
