@@ -40,7 +40,7 @@ from er3a.geometry.transforms import (
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.vision import calibration_set, vision_findings
-from er3a.vision.classic_methods import mean_pose, park
+from er3a.vision.classic_methods import mean_pose, park, shah
 from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
 from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distances, wrong_zero
 
@@ -495,10 +495,41 @@ EXPLAINED_BY_A_ZERO = {
 }
 
 
+def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
+    """The closed-form answer with the smallest residuals, of Park's and Shah's.
+
+    Parameters
+    ----------
+    F, B : (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
+    deviations : (2,), m and rad, by which residuals are divided
+
+    Returns
+    -------
+    X, Y : (4, 4), m
+
+    Raises
+    ------
+    HandEyeError
+        if no method has one
+    """
+    best: tuple[float, Reals, Reals] | None = None
+    for solve in (park, shah):
+        try:
+            X, Y = solve(F, B)
+        except np.linalg.LinAlgError:
+            continue
+        if np.isfinite(X).all() and np.isfinite(Y).all():
+            cost = float(np.sum((residuals(F, B, X, Y)[0] / np.repeat(deviations, 3)) ** 2))
+            best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
+    if best is None:
+        raise vision_findings.HandEyeError(vision_findings.NothingFits())
+    return best[1], best[2]
+
+
 def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
     seen = PoseObservations.of(samples)
     try:
-        found = refine(seen, *park(samples.hand, samples.target))
+        found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
         raise vision_findings.HandEyeError(vision_findings.NothingFits()) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():

@@ -17,7 +17,7 @@ from er3a.geometry.transforms import moved, transform
 from er3a.pipeline.results import LeftOut
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.classic_methods import park
+from er3a.vision.classic_methods import park, shah
 from er3a.vision.hand_eye import CONVENTIONS, calibrate_hand_eye, other_conventions
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
 from er3a.vision.typical_causes import moved_between, wrong_distances
@@ -57,6 +57,7 @@ from testing.hand_eye_sets import (
 )
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
+CLOSED_FORMS = {"park": park, "shah": shah}
 
 
 def a_set(setup: str, seed: int = 0, count: int = 15, **more) -> CalibrationSet:
@@ -65,21 +66,41 @@ def a_set(setup: str, seed: int = 0, count: int = 15, **more) -> CalibrationSet:
     return CalibrationSet(setup, flange, noisy(seen(setup, flange), random), **more)
 
 
+def by_opencv(name: str, F: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    if name == "shah":
+        G = np.linalg.inv(F)
+        method = cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH
+        R_Y, t_Y, R_X, t_X = cv2.calibrateRobotWorldHandEye(
+            B[:, :3, :3], B[:, :3, 3], G[:, :3, :3], G[:, :3, 3], method=method
+        )
+        X, Y = np.eye(4), np.eye(4)
+        X[:3, :3], X[:3, 3], Y[:3, :3], Y[:3, 3] = R_X, t_X.ravel(), R_Y, t_Y.ravel()
+        return np.linalg.inv(X), np.linalg.inv(Y)
+    method = cv2.CALIB_HAND_EYE_PARK
+    R, t = cv2.calibrateHandEye(F[:, :3, :3], F[:, :3, 3], B[:, :3, :3], B[:, :3, 3], method=method)
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = R, t.ravel()
+    return X, None
+
+
 @pytest.mark.parametrize("setup", SETUPS)
-def test_the_closed_form_answers_as_opencv_does(setup):
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_closed_forms_answer_as_opencv_does(name, setup):
     random = np.random.default_rng(5)
     flange = flange_poses(random, 12, turn=0.35)
     B = noisy(seen(setup, flange), random)
     F = flange if setup == "eye_in_hand" else np.linalg.inv(flange)
-    X, _ = park(F, B)
-    R, t = cv2.calibrateHandEye(F[:, :3, :3], F[:, :3, 3], B[:, :3, :3], B[:, :3, 3], method=cv2.CALIB_HAND_EYE_PARK)
-    assert np.abs(X[:3, :3] - R).max() < 1e-9
-    assert np.abs(X[:3, 3] - t.ravel()).max() < 1e-9
+    X, Y = CLOSED_FORMS[name](F, B)
+    X_cv, Y_cv = by_opencv(name, F, B)
+    assert np.abs(X - X_cv).max() < 1e-9
+    if Y_cv is not None:
+        assert np.abs(Y - Y_cv).max() < 1e-9
 
 
-def test_the_closed_form_finds_the_truth_without_noise():
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_closed_forms_find_the_truth_without_noise(name):
     flange = flange_poses(np.random.default_rng(6), 6)
-    X, Y = park(flange, seen("eye_in_hand", flange))
+    X, Y = CLOSED_FORMS[name](flange, seen("eye_in_hand", flange))
     assert np.abs(X - X_TRUE).max() < 1e-9
     assert np.abs(Y - Y_TRUE).max() < 1e-9
 
@@ -249,7 +270,7 @@ def test_places_are_the_same_in_any_order():
 def test_both_streams_inverted_is_the_same_problem_with_the_unknowns_swapped():
     samples = a_set("eye_in_hand", 12)
     F, B = samples.flange, samples.target
-    X, Y = park(F, B)
+    X, Y = shah(F, B)
     X_swapped, Y_swapped = park(np.linalg.inv(F), np.linalg.inv(seen("eye_in_hand", F)))
     assert np.abs(off(X_swapped, Y_TRUE)).max() < 1e-9
     assert np.abs(off(Y_swapped, X_TRUE)).max() < 1e-9
