@@ -603,7 +603,7 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
     leaves the fewest conventions different, then the smallest. If geometry agrees with none, and it is to be explained,
     one that leaves less than half of the entries different."""
     twists, offsets = (_angle_slips(robot_a, robot_b, columns) for columns in (("alpha",), ("offset",)))
-    options = list(itertools.product(_length_slips(robot_a, robot_b), twists))
+    sets = [(*lengths, *angles) for lengths, angles in itertools.product(_length_slips(robot_a, robot_b), twists)]
 
     def arms(slips: tuple[Cause, ...]) -> tuple[Robot, Robot]:
         return in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
@@ -618,10 +618,10 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
         found = mechanism.match(one, other, tolerances)
         return found.rank[0], found.layers, sum(len(each.entries) for each in slips)
 
-    sets = [(*lengths, *angles) for lengths, angles in options]
     fits = [slips for slips in sets if same(slips)] if len(sets) * len(offsets) > 1 else [()]
     if not fits and explain and len(sets) > 1:
-        nearest = min(sets, key=rank)
+        likely = _length_slips(robot_a, robot_b, only_nearest=True)
+        nearest = min(((*lengths, *angles) for lengths, angles in itertools.product(likely, twists)), key=rank)
         fits = [nearest] if 2 * rank(nearest)[0] < rank(())[0] else []
     every = [(*slips, *more) for slips in fits for more in offsets]
     return _merged(min(every, key=rank) if len(every) > 1 else every[0] if every else ())
@@ -636,15 +636,16 @@ def _merged(slips: tuple[Cause, ...]) -> tuple[Cause, ...]:
     return tuple(found.values())
 
 
-def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
-    """Ways in which a and d of two tables can be in different units: none, both, or one of them."""
+def _length_slips(robot_a: Robot, robot_b: Robot, only_nearest: bool = False) -> list[tuple[Cause, ...]]:
+    """Ways in which a and d of two tables can be in different units: none, both, or one of them; of about equally near
+    factors all, or the nearest alone."""
     pair = [mechanism.mechanism_of(each, ends=False) for each in (robot_a, robot_b)]
     factors: set[float] = set()
     used = [column for column in ("a", "d") if getattr(robot_a, column).any() and getattr(robot_b, column).any()]
     for column, (one, other) in itertools.product(used, (pair, (robot_a, robot_b))):
         sums = [float(np.abs(getattr(each, column)).sum()) for each in (one, other)]
         if min(sums) > 0:
-            factors |= _likely_factor(sums[1] / sums[0])
+            factors |= _likely_factor(sums[1] / sums[0], only_nearest)
     alone = [_length_cause(robot_a, robot_b, (column,), factor) for column in used for factor in sorted(factors)]
     both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
     mixed = [
@@ -655,13 +656,13 @@ def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
     return [(), *((each,) for each in both), *((each,) for each in alone), *mixed]
 
 
-def _likely_factor(ratio: float) -> set[float]:
+def _likely_factor(ratio: float, only_nearest: bool = False) -> set[float]:
     """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer; and those about as near."""
     off = {factor: abs(math.log(ratio / factor)) for factor in (1.0, *LENGTH_FACTORS)}
     near = min(off, key=off.__getitem__)
     if near == 1.0 or off[near] > math.log(2):
         return set()
-    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR)}
+    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR and not only_nearest)}
 
 
 def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], factor: float) -> Cause:

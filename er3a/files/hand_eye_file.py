@@ -24,8 +24,7 @@ from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
-from er3a.files.orientations import FORMS as ORIENTATIONS
-from er3a.files.orientations import NoRotationError, rotations
+from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
 from er3a.files.robot_file import Text
 from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
@@ -38,26 +37,10 @@ from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet
 
-FORMS = {form: columns for form, columns in ORIENTATIONS.items() if form != "zyz_deg"}
 POSITION = ("x_mm", "y_mm", "z_mm")
 TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 MIXED_UNITS = 200.0
 ROWS_TO_JUDGE_UNITS = 3
-
-
-def pose_form(path: Path, header: list[str], stream: str) -> str | None:
-    """The form in which a table gives the orientations of a stream; None if it has none of its columns.
-
-    Raises
-    ------
-    InputError
-        for two forms
-    """
-    forms = [form for form, names in FORMS.items() if {f"{stream}_{name}" for name in names} & set(header)]
-    if len(forms) > 1:
-        problem = f"{stream} has two forms of orientation, {forms[0]} and {forms[1]}"
-        raise InputError(path, "header", problem, "Keep the columns of one")
-    return forms[0] if forms else None
 
 
 def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
@@ -72,7 +55,7 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
     position = np.array([[row[f"{stream}_{name}"] for name in POSITION] for row in rows], dtype=float)
     _check_millimetres(path, rows, stream, position)
     values = np.array([[row[f"{stream}_{name}"] for name in FORMS[form]] for row in rows], dtype=float)
-    if form == "rpy_deg":
+    if form in ("rpy_deg", "zyz_deg"):
         widest = float(np.abs(values).max())
         if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS / 2:
             problem = f"the widest angle is {widest:g} deg, which can only be radians"
@@ -303,7 +286,7 @@ def check_samples(table: Path) -> str:
         return "touched points"
     rows, header = sample_rows(table)
     for stream in ("flange", "target"):
-        if form := pose_form(table, header, stream):
+        if form := form_in(table, header, f"{stream}_"):
             poses_of(table, rows, stream, form)
     return "samples of a hand-eye calibration"
 
@@ -334,7 +317,7 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
         columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
     columns |= {name: CsvColumn() for name in _joint_columns(header)}
     for stream in ("flange", "target"):
-        if form := pose_form(table, header, stream):
+        if form := form_in(table, header, f"{stream}_"):
             columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
     if not columns:
         first = ", ".join(header)[:SHOWN_HEADER]
@@ -353,7 +336,7 @@ def _joint_columns(header: list[str]) -> list[str]:
 
 
 def _form(table: Path, header: list[str], stream: str) -> str:
-    form = pose_form(table, header, stream)
+    form = form_in(table, header, f"{stream}_")
     if form is None:
         remedy = f"Add {stream}_x_mm, {stream}_y_mm, {stream}_z_mm and {stream}_qw to {stream}_qz, or another form"
         raise InputError(table, "header", f"nothing says where the {stream} was", remedy)
@@ -369,7 +352,7 @@ def _flange(
     if not given:
         poses = poses_of(table, rows, "flange", _form(table, header, "flange"))
         return poses if robot is None else robot.base @ poses, None
-    if pose_form(table, header, "flange"):
+    if form_in(table, header, "flange_"):
         raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
     if robot is None:
         raise InputError(table, "columns q1_deg ...", "joint angles need a robot's table", "Name the robot")

@@ -7,11 +7,14 @@ of Universal Robots.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy
 
+from er3a.errors import InputError
 from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, transform
 from er3a.numerics.arrays import Reals
 
@@ -23,6 +26,31 @@ FORMS: dict[str, tuple[str, ...]] = {
     "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
 }
 LONGEST_VECTOR = 2 * np.pi * 1.01
+
+
+def form_in(path: Path, header: Iterable[str], prefix: str = "") -> str | None:
+    """The form in which a table gives orientations.
+
+    Parameters
+    ----------
+    header : names of all columns
+    prefix : before the names of the form's columns, such as ``flange_``
+
+    Returns
+    -------
+    form : one of ``FORMS``; None if the table has no column of any
+
+    Raises
+    ------
+    InputError
+        for columns of two forms
+    """
+    present = set(header)
+    forms = [form for form, columns in FORMS.items() if any(prefix + name in present for name in columns)]
+    if len(forms) > 1:
+        problem = f"two forms of orientation, {forms[0]} and {forms[1]}"
+        raise InputError(path, "header", problem, f"Keep the columns of one{f' for {prefix}' if prefix else ''}")
+    return forms[0] if forms else None
 
 
 class NoRotationError(ValueError):
@@ -59,11 +87,11 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         first[:, 2], second[:, 1], third[:, 2] = values.T
         return np.asarray(_turned(first) @ _turned(second) @ _turned(third))
     if form == "rotation_vector_rad":
-        length = np.linalg.norm(values, axis=1)
+        length = np.hypot.reduce(values, axis=1)
         _refuse(length > LONGEST_VECTOR, "{:.4g} rad are more than a turn, and can only be degrees", length, "Convert")
         return exp_rotation(values)
     if form == "quaternion_wxyz":
-        length = np.linalg.norm(values, axis=1)
+        length = np.hypot.reduce(values, axis=1)
         wrong = ~(np.abs(length - 1) <= tolerance)
         _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
         return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())

@@ -30,9 +30,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
-from er3a.files.orientations import NoRotationError, rotations
+from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, PoseEntry
+from er3a.files.target_file import KNOWN_FORMS, POSITION, PoseEntry
 from er3a.files.units import (
     JOINT_COLUMN,
     JointsDeg,
@@ -107,20 +107,16 @@ def read_path_table(path: str | Path) -> PathTable:
     of_pose = {*POSITION, *(name for columns in FORMS.values() for name in columns)}
     beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
     header -= beside
-    forms = [form for form, columns in FORMS.items() if header & set(columns)]
+    form = form_in(path, header)
     own = _joint_columns(path, header)
     of_joints = bool(own)
-    if of_joints and (forms or header & set(POSITION)):
+    if of_joints and (form or header & set(POSITION)):
         raise InputError(path, "header", "the table has both joint angles and poses", "Keep one of the two")
-    if len(forms) > 1:
-        raise InputError(
-            path, "header", f"two forms of orientation, {forms[0]} and {forms[1]}", "Keep the columns of one"
-        )
-    if not of_joints and not forms:
+    if not of_joints and not form:
         problem = "no orientation" if header & set(POSITION) else "neither joint angles nor poses"
         remedy = f"Give the columns x_mm, y_mm, z_mm with {KNOWN_FORMS}; or q1_deg .. qn_deg"
         raise InputError(path, "header", f"the table has {problem}", remedy)
-    columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
+    columns = own if of_joints else (*POSITION, *FORMS[str(form)])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in (*columns, *sorted(beside))} | CHECKED_COLUMN)
     if len(rows) < 2:
@@ -133,7 +129,7 @@ def read_path_table(path: str | Path) -> PathTable:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
-        poses, joints = _poses(path, lines, rows, forms[0]), None
+        poses, joints = _poses(path, lines, rows, str(form)), None
         turn = scipy.spatial.transform.Rotation.from_matrix(
             np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
         ).magnitude()

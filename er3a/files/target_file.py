@@ -1,6 +1,6 @@
 """Target files (YAML or CSV): the poses that the inverse stage solves.
 
-Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
+Targets as a CSV table: one row each, position in mm and the orientation in one of the named forms.
 
 Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
 ``expect`` (may stay empty), ``q1_ref_deg`` .. ``qn_ref_deg`` (of prismatic joints in mm), and ``units_checked``, with
@@ -19,8 +19,7 @@ from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
-from er3a.files.orientations import FORMS as ORIENTATIONS
-from er3a.files.orientations import rotations
+from er3a.files.orientations import FORMS, form_in, rotations
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
@@ -30,7 +29,6 @@ from er3a.kinematics.solutions import Target, TargetOutcome
 from er3a.robots.robot import MAX_JOINTS, Robot
 
 POSITION = ("x_mm", "y_mm", "z_mm")
-FORMS = {form: columns for form, columns in ORIENTATIONS.items() if form != "rotation_vector_rad"}
 KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
@@ -48,10 +46,9 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     path = Path(path)
     header = read_header(path)
     present = set(header)
-    forms = [form for form, columns in FORMS.items() if present & set(columns)]
-    if len(forms) != 1:
-        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {KNOWN_FORMS}")
-    form = forms[0]
+    form = form_in(path, header)
+    if form is None:
+        raise InputError(path, "header", _without_form(header), f"Give the columns {KNOWN_FORMS}")
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
     last = max((number for number, name in enumerate(REFERENCE, 1) if name in present), default=0)
@@ -59,11 +56,9 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     return [_target(row, form, REFERENCE[:last]) for row in read_csv(path, columns)]
 
 
-def _without_one_form(header: list[str], forms: list[str]) -> str:
+def _without_form(header: list[str]) -> str:
     if not header:
         return "the file is empty"
-    if forms:
-        return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
     strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE, UNITS_CHECKED)]
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
@@ -86,7 +81,7 @@ Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")
 
 
 class Orientation(StrictModel):
-    """The orientation of a pose, in one of four forms.
+    """The orientation of a pose, in one of five forms.
 
     Attributes
     ----------
@@ -94,6 +89,7 @@ class Orientation(StrictModel):
     zyz_deg : R = Rz(a) Ry(b) Rz(c)
     quaternion_wxyz : of unit length to 1e-6
     matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
+    rotation_vector_rad : axis times angle, a turn at most
     """
 
     rpy_deg: RpyDeg | None = None
@@ -112,7 +108,9 @@ class Orientation(StrictModel):
                 )
         return content
 
-    @field_validator("quaternion_wxyz", "matrix")
+    rotation_vector_rad: Triple | None = None
+
+    @field_validator("quaternion_wxyz", "matrix", "rotation_vector_rad")
     @classmethod
     def _rotation(cls, values, info):
         if values is not None:
