@@ -26,7 +26,14 @@ from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
 from er3a.files.robot_file import Text
-from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS, doubt
+from er3a.files.units import (
+    JOINT_COLUMN,
+    METRES_BELOW_MM,
+    ROWS_TO_JUDGE_UNITS,
+    WIDEST_IN_RADIANS,
+    doubt,
+    refuse_radians,
+)
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
@@ -40,7 +47,6 @@ from er3a.vision.calibration_set import CalibrationSet
 POSITION = ("x_mm", "y_mm", "z_mm")
 TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 MIXED_UNITS = 200.0
-ROWS_TO_JUDGE_UNITS = 3
 
 
 def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
@@ -55,16 +61,13 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
     position = np.array([[row[f"{stream}_{name}"] for name in POSITION] for row in rows], dtype=float)
     _check_millimetres(path, rows, stream, position)
     values = np.array([[row[f"{stream}_{name}"] for name in FORMS[form]] for row in rows], dtype=float)
+    where = f"columns {stream}_{FORMS[form][0]} to {stream}_{FORMS[form][-1]}"
     if form in ("rpy_deg", "zyz_deg"):
-        widest = float(np.abs(values).max())
-        if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS / 2:
-            problem = f"the widest angle is {widest:g} deg, which can only be radians"
-            raise InputError(path, f"columns {stream}_roll_deg to {stream}_yaw_deg", problem, "Convert to degrees")
+        refuse_radians(path, where, values, WIDEST_IN_RADIANS / 2)
     try:
         return posed(rotations(form, values, TOLERANCE), position / 1000)
     except NoRotationError as error:
-        where = f"row {rows[error.row]['row']}, columns {stream}_{FORMS[form][0]} to {stream}_{FORMS[form][-1]}"
-        raise InputError(path, where, error.problem, error.remedy) from None
+        raise InputError(path, f"row {rows[error.row]['row']}, {where}", error.problem, error.remedy) from None
 
 
 def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, position: Reals) -> None:
@@ -365,10 +368,7 @@ def _flange(
         problem = f"joint {wrong[0][1:].partition('_')[0]} of {robot.name} {kind}"
         raise InputError(table, f"column {wrong[0]}", problem, f"Give {', '.join(wanted)}")
     values = np.array([[row[name] for name in given] for row in rows], dtype=float)
-    widest = float(np.abs(values[:, ~robot.slides]).max(initial=0.0))
-    if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
-        problem = f"the widest angle is {widest:g} deg, which can only be radians"
-        raise InputError(table, f"columns {given[0]} to {given[-1]}", problem, "Convert to degrees")
+    refuse_radians(table, f"columns {given[0]} to {given[-1]}", values[:, ~robot.slides])
     q = meant(robot, values)
     return forward(robot.without_tool(), q), q
 
