@@ -391,7 +391,6 @@ class Match:
     ----------
     differences : of geometry, the fewest that explain the other arm; worst_length, worst_angle : m and rad
     invariants : how many numbers were compared; unexplained : m, what no entries explain
-    senses : (m,), -1 where an axis of the other table has the other sense
     reverses : (m,) bool, rows that the other arm moves in the other direction
     zeros : (m,), rad or m, other's ``offset`` less the first's once the other is brought there; 0 of the ends
     base : (4, 4), the other's base in the first's base; flange : (4, 4), other's flange in the first's flange
@@ -402,7 +401,6 @@ class Match:
     worst_angle: float
     invariants: int
     unexplained: float
-    senses: Reals
     reverses: Flags
     zeros: Reals
     base: Reals
@@ -476,7 +474,7 @@ def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_
         found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
         for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
         if (senses * other.direction == one.direction).all()
-        for found in _settled(one, with_senses(other, senses, normals), senses, tolerances, may_differ=False)
+        for found in _settled(one, with_senses(other, senses, normals), tolerances, may_differ=False)
     )
 
 
@@ -506,7 +504,7 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
             pairs.append(_measured_alike(local[0], turned))
             pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
         for first, second in pairs:
-            for found in _settled(first, second, senses, tolerances, may_differ=may_differ):
+            for found in _settled(first, second, tolerances, may_differ=may_differ):
                 entries, layers, *sizes = found.rank
                 rank = entries, layers, float(first is not one), *sizes  # of equals in the entries that are printed
                 if best is None or rank < best_rank:
@@ -532,9 +530,7 @@ def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechan
     return one, other
 
 
-def _settled(
-    one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolerances, *, may_differ: bool = True
-) -> Iterator[Match]:
+def _settled(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Iterator[Match]:
     """The match for chosen senses; where axes beside a slide are parallel to it, also the one with its own theta; those
     alone in which geometry agrees if it may not differ."""
     least = NEARLY_PARALLEL if one.beta.any() or other.beta.any() else EXACTLY_PARALLEL
@@ -544,7 +540,7 @@ def _settled(
     if (np.abs(wrap_to_pi(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
         ways.append(_with_free_turns(one, other, parallel, tolerances, of_slides=False))
     for placed in ways:
-        found = _settled_at(one, other, senses, parallel, placed, tolerances, may_differ=may_differ)
+        found = _settled_at(one, other, parallel, placed, tolerances, may_differ=may_differ)
         if found is not None:
             yield found
 
@@ -552,7 +548,6 @@ def _settled(
 def _settled_at(
     one: Mechanism,
     other: Mechanism,
-    senses: Reals,
     parallel: Flags,
     placed: tuple[Reals, Reals],
     tolerances: Tolerances,
@@ -599,7 +594,6 @@ def _settled_at(
         worst_angle,
         links + len(slides) + counted[0],
         left if left > tolerances.length else 0.0,
-        senses,
         reverses,
         zeros,
         *placed,
