@@ -1,10 +1,9 @@
 """A D-H table from the lines of the joint axes, as a URDF, a measurement or references give them.
 
-Frames are placed by the
-common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics: Modelling, Planning and
-Control*, section 2.8.2). Free choices are made so that common arms get their usual table: z axes along the base frame's
-positive axes or along a positive d, parallel axes with equal sense and d = 0, x axes turned as little as possible from
-one joint to the next.
+Frames are placed by the common normals of neighbouring axes (Denavit and Hartenberg 1955; Siciliano et al., *Robotics:
+Modelling, Planning and Control*, section 2.8.2). Free choices are made so that common arms get their usual table: z
+axes along the base frame's positive axes or along a positive d, parallel axes with equal sense and d = 0, x axes turned
+as little as possible from one joint to the next.
 
 Nearly parallel axes have a common normal kilometres away. Between them d is 0, and the table uses Hayati's rotation
 beta about y [1]_, which needs no normal.
