@@ -344,6 +344,8 @@ def _record(folder: Path) -> dict[str, Any]:
     for key in ("robot", "stage", "verdict", "figures", "provenance"):
         if key not in stored:
             raise ResultError(path, f"damaged (no '{key}' in it)")
+    if not isinstance(stored["verdict"], dict) or "status" not in stored["verdict"]:
+        raise ResultError(path, "damaged (verdict without status)")
     _compare(path, content, checksums(folder))
     return stored
 
@@ -360,7 +362,8 @@ def read_status(folder: Path) -> Status:
     ResultError
         as :func:`read_stage`
     """
-    return _status(folder, _record(folder))
+    status: Status = _record(folder)["verdict"]["status"]
+    return status
 
 
 def read_foundation(folder: Path) -> Foundation:
@@ -382,16 +385,8 @@ def read_foundation(folder: Path) -> Foundation:
     record = _record(folder)
     parts = record["verdict"].get("params", {}).get("parts", ())
     unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
-    status = _status(folder, record)
+    status: Status = record["verdict"]["status"]
     return "unsettled" if status == "caution" and unsettled else status
-
-
-def _status(folder: Path, record: dict[str, Any]) -> Status:
-    try:
-        status: Status = record["verdict"]["status"]
-    except (KeyError, TypeError):
-        raise ResultError(folder / SUMMARY, "damaged (verdict without status)") from None
-    return status
 
 
 def read_scope(folder: Path, stage: Stage) -> Summary:
@@ -411,7 +406,7 @@ def read_scope(folder: Path, stage: Stage) -> Summary:
         as :func:`read_stage`
     """
     record = _record(folder)
-    if _status(folder, record) == "not_computed":
+    if record["verdict"]["status"] == "not_computed":
         return Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ())
     summary: Summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
     return summary

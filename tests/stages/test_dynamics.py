@@ -570,7 +570,7 @@ def test_moments_about_a_joint_that_slides_are_refused():
         {"source": "a sheet", "grade": "claim", "rows": [{"joint": 3, "moment_n_m": 4.0}]}
     )
     with pytest.raises(ValueError, match="joint 3 is prismatic"):
-        check_masses(None, None, wrist_group, [False, False, True, False])
+        check_masses(None, wrist_group, [False, False, True, False])
 
 
 def test_the_load_that_a_program_names_is_no_part_of_the_torques(tmp_path):

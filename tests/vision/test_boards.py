@@ -140,7 +140,7 @@ def test_a_camera_is_calibrated_from_images_alone_and_those_without_a_board_are_
     blank = range(1, 12, 2)
     for number in blank:
         Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / f"{number}.png")
-    again, _, images = read_calibration(tmp_path / "set.yaml", None)
+    again, images = read_calibration(tmp_path / "set.yaml", None)
     assert images.boardless == tuple(BoardlessImage(f"row {k + 2}", f"{k}.png", 0) for k in blank)
     assert again.names == tuple(f"row {k + 2}" for k in range(0, 12, 2))
     np.testing.assert_array_equal(again.target, samples.target[::2])

@@ -38,8 +38,8 @@ def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF or xacro of a serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
-    base: Annotated[str | None, typer.Option(help="the link at which the arm begins (default: the root)")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link at which the arm ends, if there are several ends")] = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
     references: Annotated[
         Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
     ] = None,
@@ -301,7 +301,7 @@ def hand_eye(
     arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
     head = load(HandEyeFile, file)
     with shown_work(f"{file}: reading the samples") as at:
-        samples, offset, images = read_calibration(file, arm)
+        samples, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
         at(f"{file}: estimating the camera's pose")
         try:
@@ -317,13 +317,13 @@ def hand_eye(
     not_checked = [gap_text(each) for each in missed if each.reason in GAPS]
     assumed = [assumed_text(each) for each in missed if each.reason not in GAPS]
     if as_json:
-        record = hand_eye_record(found, offset, boardless, open_tilts)
+        record = hand_eye_record(found, boardless, open_tilts)
         options.print_json(record | {"not_checked": not_checked, "assumed": assumed})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
         sample_lines += [f"not checked: {each}" for each in not_checked]
         sample_lines += [f"assumed: {each}" for each in assumed]
-        print("\n".join([hand_eye_lines(found, offset, boardless), *sample_lines]))
+        print("\n".join([hand_eye_lines(found, boardless), *sample_lines]))
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)

@@ -31,114 +31,21 @@ from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
-from er3a.programs import instructions
-from er3a.programs.csv_program import write_csv
-from er3a.programs.from_commands import TO_START
-from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_names import LanguageName
-from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
-from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
+from er3a.robots.joint_limits import meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
-from er3a.vision.calibration_set import CalibrationSet, TimeOffset
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.field_of_view import in_sight
-from er3a.vision.grasp_motion import PARTS, GraspLeg
+from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
-LONGEST_NAME = 24
-GRIPPER_S = 1.0
-CLOSE = "close the gripper here"  # in a controller's file, which is plain ASCII
-SIMULATED = "the camera is simulated: put in the position that a real one measures before you run this"
-FRAMES_OPEN = "no joint values tell whether the camera was calibrated with the flange's poses, in the arm's base"
-NO_LOAD = "whether the arm may carry the object was not examined"
-CSV_POINTS = 41
-
-
-def grasp_programs(
-    robot: Robot,
-    name: str,
-    home: Reals,
-    chosen: ChosenGrasp,
-    languages: Sequence[LanguageName],
-    *,
-    speed: Reals,
-    simulated: bool,
-    frames_open: bool = False,
-) -> model.GraspPrograms:
-    """A grasp in each language that has this arm's joints.
-
-    ``speed`` : (n,), the joints' greatest, rad/s or m/s; ``simulated``: whether the camera is;
-    ``frames_open``: whether it was calibrated with recorded poses alone
-    """
-    own = program_name(f"grasp_{name}", LONGEST_NAME)
-    what = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
-    head = (what, *([SIMULATED] if simulated else []), *([FRAMES_OPEN] if frames_open else []), NO_LOAD)
-    rows: list[tuple[str, str, str]] = []
-    for language in languages:
-        if not_written(language, robot):
-            continue
-        if language == "csv":
-            files = {".csv": _programs_table(robot, chosen, head)}
-        else:
-            options = WriteOptions(robot, home, head=head, assumed_speed=speed)
-            files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
-        rows += [(language, own + suffix, text) for suffix, text in files.items()]
-    return model.GraspPrograms.of_rows((name, *row) for row in rows)
-
-
-def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> instructions.Listing:
-    tool, base, to_robot = (
-        instructions.NamedFrame("", robot.tool),
-        instructions.NamedFrame("", np.eye(4)),
-        np.linalg.inv(robot.base),
-    )
-    found: list[instructions.Instruction] = [
-        instructions.ArmMotion("joint", instructions.JointTarget(home), speed=TO_START, tool=tool, base=base)
-    ]
-    for before, leg in zip((None, *chosen.legs), chosen.legs):
-        if before is not None and _closes(before, leg):
-            found += [instructions.Remark(CLOSE), instructions.Pause(GRIPPER_S)]
-        rate = instructions.Rate(leg.duration, "s")
-        if leg.T_end is None:
-            found.append(
-                instructions.ArmMotion("joint", instructions.JointTarget(leg.q_end), speed=rate, tool=tool, base=base)
-            )
-        else:
-            target = instructions.PoseTarget(to_robot @ leg.T_end, joints=leg.q_end)
-            found.append(instructions.ArmMotion("line", target, speed=rate, tool=tool, base=base))
-    return instructions.Listing(name, tuple(found))
-
-
-def _programs_table(robot: Robot, chosen: ChosenGrasp, head: tuple[str, ...]) -> str:
-    """The motion over time, at rest where the gripper closes."""
-    times, rows, now = [np.zeros(1)], [chosen.legs[0].joints(np.zeros(1))], 0.0
-    for leg, next_leg in zip(chosen.legs, (*chosen.legs[1:], None)):
-        t, q = leg.sampled(CSV_POINTS)
-        times.append(now + t[1:])
-        rows.append(q[1:])
-        now += leg.duration
-        if next_leg is not None and _closes(leg, next_leg):
-            now += GRIPPER_S
-            times.append(np.array([now]))
-            rows.append(q[-1:])
-    joints = np.concatenate(rows)
-    poses = np.linalg.inv(robot.base) @ forward(robot, joints)
-    comments = tuple(HEAD + line for line in head)
-    return write_csv(np.concatenate(times), shown(robot, joints), poses, comments, joint_columns(robot))
-
-
-def _closes(before: GraspLeg, after: GraspLeg) -> bool:
-    """Whether the gripper closes between two legs."""
-    return before.part == "approach" and after.part == "retreat"
-
 
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
-    offset: TimeOffset | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
     """All that the summary says of a calibration.
@@ -147,7 +54,6 @@ def calibration_result(
     ----------
     head : the file that describes the recording
     found : poses and half-widths of their 95 % intervals, m and rad
-    offset : between the clocks of two streams; None for one table
     images : None for poses given as numbers
 
     Returns
@@ -176,7 +82,6 @@ def calibration_result(
         moved_mm=from_si("mm", moved),
         moved_deg=from_si("deg", tilted),
         touch=_touch(found),
-        time_offset=stated(model.OffsetResult, offset) if offset else None,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
         copies=found.copies,
@@ -285,7 +190,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
-    samples, offset, images = read_calibration(head_path, robot)
+    samples, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
     frames = _open_frames(samples, head)
@@ -301,7 +206,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    calibration = calibration_result(head, found, offset, images)
+    calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
     limits = (limits_of(robot, motions), study.seed)
     planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
@@ -331,7 +236,6 @@ def compute(study: Study, name: str) -> model.VisionResults:
         summary,
         sample_rows(found, robot),
         _all_ways(robot, planned),
-        _all_programs(robot, task_file, planned, motions, (head.simulated, bool(frames))),
         corner_rows(found, images),
     )
 
@@ -357,23 +261,6 @@ def _asked(objects: Sequence[model.ObjectResult], found: HandEye) -> dict[Check,
     return {"camera": (used, used), "reach": of, "limits": of}
 
 
-def _all_programs(
-    robot: Robot, file: VisionFile, planned: Planned, motions: TrajectorySettings, open_points: tuple[bool, bool]
-) -> model.GraspPrograms:
-    """The programs of all grasps; ``open_points``: whether the camera is simulated, and its frames are open."""
-    home, (simulated, frames_open) = meant(robot, np.array(file.home_deg)), open_points
-    write = partial(
-        grasp_programs,
-        speed=limits_of(robot, motions).speed,
-        languages=motions.programs,
-        simulated=simulated,
-        frames_open=frames_open,
-    )
-    return model.GraspPrograms.stacked(
-        write(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
-    )
-
-
 def _without_calibration(
     error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings
 ) -> model.VisionResults:
@@ -384,7 +271,6 @@ def _without_calibration(
         summary,
         model.SampleRows.empty(),
         model.PathRows.empty(),
-        model.GraspPrograms.empty(),
         model.CornerRows.empty(),
     )
 

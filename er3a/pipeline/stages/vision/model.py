@@ -97,16 +97,6 @@ class TouchResult:
 
 
 @dataclass(frozen=True)
-class OffsetResult:
-    """The camera's clock plus this is the arm's, with half its 95 % interval; ``unused``: poses without a sample."""
-
-    offset_s: float
-    half_width_s: float
-    rms_deg: float
-    unused: int = 0
-
-
-@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -146,7 +136,6 @@ class CalibrationResult:
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
-    time_offset: OffsetResult | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
     copies: tuple[str, ...] = ()
@@ -281,21 +270,11 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-class GraspPrograms(Table):
-    """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
-
-    target: Texts = column("name of the object")
-    language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
-    file: Texts = column("name of the file")
-    text: Texts = column("what the file holds")
-
-
 class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 
     samples: SampleRows
     ways: PathRows
-    programs: GraspPrograms
     corners: CornerRows
 
 
