@@ -138,13 +138,11 @@ class ByClass(Finding):
     ----------
     certain : whether the solver left no doubt that these are all
     named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
-    cuspidal : whether :mod:`er3a.kinematics.cuspidal` was run and joined two solutions without a singularity
     """
 
     arm_class: ArmClassCode
     certain: bool
     named: bool
-    cuspidal: bool = False
 
 
 Method = ClosedForm | ByClass | Iteration
