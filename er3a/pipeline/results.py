@@ -101,7 +101,7 @@ class Verdict(Generic[FindingT]):
         """
         return self._lowered(bool(unexamined), unexamined=unexamined)
 
-    def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
+    def with_assumed_shapes(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
         """The verdict where shapes of the arm are assumed.
 
         Parameters

@@ -400,7 +400,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     summary = model.InverseSummary(
         verdict=_verdict(results, worst, trips, bool(scene and scene.solids))
         .without(bodies_of(robot, scene).in_error)
-        .resting_on(rests_on),
+        .with_assumed_shapes(rests_on),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,

@@ -81,7 +81,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     assumed = shapes_assumed(robot, options.assumed_margin, smallest)
     return model.ProgramsResults(
         summary=model.ProgramsSummary(
-            verdict=_verdict(summaries).without(bodies_of(robot, scene).in_error).resting_on(assumed),
+            verdict=_verdict(summaries).without(bodies_of(robot, scene).in_error).with_assumed_shapes(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~speeds_given(robot)),

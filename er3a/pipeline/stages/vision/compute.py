@@ -318,7 +318,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     near = shapes.near if shapes else ()
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     summary = model.VisionSummary(
-        verdict=judged.without(bodies.in_error).resting_on(shapes),
+        verdict=judged.without(bodies.in_error).with_assumed_shapes(shapes),
         figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,

@@ -146,7 +146,7 @@ def _summary(
     volume = model.Bounds(*proven.proof.bounds)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
-        verdict=judged.without(tool.unexamined).resting_on(assumed if examined else None),
+        verdict=judged.without(tool.unexamined).with_assumed_shapes(assumed if examined else None),
         figures=_figures(reach, voids, volume, hull, settings.samples),
         samples=settings.samples,
         sampling=settings.sampling,
