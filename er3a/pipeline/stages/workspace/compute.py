@@ -98,7 +98,7 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
     asked = study.section(CapabilitySettings)
-    tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin, proven=proven)
+    tool = tool_capability(robot, asked, grid.cell, scene, margin=margin, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
     corners = model.HullVertices(hull.vertices, shown(robot, samples.q_extreme[hull.of]))
     return model.WorkspaceResults(
@@ -191,8 +191,6 @@ def _left_out(settings: WorkspaceSettings, proven: Proven, tool: ToolCapability)
         yield LeftOut("capability")
         return
     yield LeftOut("tool_directions", amount=found.directions)
-    if found.clear.without:
-        yield LeftOut("lost_cells", amount=found.clear.without)
     if isinstance(placement, model.PlacementTooLong):
         yield LeftOut("places")
     elif placement and not getattr(placement, "named_places", ()):

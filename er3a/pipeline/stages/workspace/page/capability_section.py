@@ -248,13 +248,6 @@ def across_slide(capability: model.CapabilitySummary) -> Reals:
     return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
 
 
-def clear_percent(cells: model.CapabilityCells) -> Reals:
-    """Of the poses tried in each cell and reached, those held with nothing touched, %; NaN where none was reached."""
-    reached = cells.reached_tries.astype(float)
-    found: Reals = np.divide(100.0 * cells.clear_tries, reached, out=np.full(len(reached), np.nan), where=reached > 0)
-    return found
-
-
 def placement_views(
     robot: Robot,
     capability: model.CapabilitySummary,
@@ -402,45 +395,24 @@ def _placement_context(
 
 def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
     cells = results.capability
-    upright, reached, held = (
+    upright, reached = (
         (
             tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability"),
             tr("Slices along the slide of joint 1: reachability"),
-            tr("Slices along the slide of joint 1: reached poses that can be held without collision"),
         )
         if capability.bar_m
         else (
             tr("Slices through axis 1: reachability, IK solutions, manipulability"),
             tr("Slices across axis 1: reachability"),
-            tr("Slices across axis 1: reached poses that can be held without collision"),
         )
     )
-    of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
     of_reached = level_slices(
         capability, cells, 100.0 * cells.reachability.astype(float), tr("tool orientations reached (%)")
     )
     return [
         Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
         Picture(of_reached, reached, _level_caption(capability)),
-        Picture(of_held, held, _clear_caption(capability.clear, results.summary.verdict.shapes is not None)),
     ]
-
-
-def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
-    touched = tr("“{scene}” or the arm itself", scene=own_title(clear.scene)) if clear.scene else tr("the arm itself")
-    return tr(
-        "An estimate by volume: {share} % of the poses reached can be held without touching {touched}. {tries} random "
-        "poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in {without} cells "
-        "and sectors none was found. Outer cells hold more volume, so the share is not the quotient of these counts. "
-        "Shares of so few tries distinguish good regions from bad ones, not single cells.",
-        share=number(100 * clear.share, 2),
-        touched=touched,
-        tries=clear.tries,
-        reached=number(clear.reached),
-        clear=number(clear.clear),
-        without=number(clear.without),
-        held=tr("clear of the assumed shapes") if assumed else tr("proven collision-free"),
-    )
 
 
 def _level_caption(capability: model.CapabilitySummary) -> str:
