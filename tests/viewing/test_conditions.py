@@ -8,7 +8,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import LookAtMotion
@@ -18,7 +17,6 @@ from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.overview.index import condition, proposed
 from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
 from er3a.pipeline.stages.dynamics.model import NoLimits
@@ -27,7 +25,6 @@ from er3a.pipeline.stages.inverse.page.report import rule_rows
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
-from er3a.pipeline.stages.workspace.page import capability_section
 from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.page.tray import trays
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
@@ -142,11 +139,7 @@ def placed(**stands) -> SimpleNamespace:
     return SimpleNamespace(results=SimpleNamespace(summary=SimpleNamespace(placement=found)))
 
 
-@pytest.mark.parametrize(
-    ("height", "room"), [("", "x ±75, y −200 to 175, z −200 to 50"), ("Keep.", "x ±75, y −200 to 175")]
-)
-def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be_kept(monkeypatch, height, room):
-    monkeypatch.setattr(capability_section, "range_text", lambda *_: height)
+def test_the_workspace_page_says_how_far_a_tray_can_be_moved():
     results = placed().results
     placement = results.summary.placement
     spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
@@ -154,28 +147,12 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     results.places = None
     (found,) = trays(results.summary)
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    moved = f"Reach and limits allow to move it by {room} mm, one direction at a time. {height}".strip()
-    assert rows["Margins"].endswith(moved)
+    room = "x ±75, y −200 to 175, z −200 to 50"
+    assert rows["Margins"].endswith(f"Reach and limits allow to move it by {room} mm, one direction at a time.")
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
     assert "put the tray into the study's scene file as a box, and run again" in rows["What to do first"]
     assert "No tool is given" in rows["What to do first"]
-
-
-def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
-    """Of three heights the lower has half the manipulability, the higher 4 deg less to a joint's limit; the task asks
-    for 2 deg."""
-    placement = placed(over=True).results.summary.placement
-    spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
-    gaps = replace(placement.stands[0], above=spot).gaps_m
-    heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
-    shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
-    places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
-    text = range_text(spot, gaps, placement.task.limit_margin_deg, places)
-    assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
-    alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
-    assert range_text(spot, gaps, placement.task.limit_margin_deg, alone) == ""
-    assert range_text(spot, None, placement.task.limit_margin_deg, places) == ""  # on a surface itself
 
 
 def test_a_tray_stands_on_a_surface_or_on_a_stand_over_it():

@@ -381,14 +381,6 @@ class StandSummary:
     why_none: WhyNoStand | None
     above: PlaceSummary | None
 
-    @property
-    def gaps_m(self) -> tuple[float, float, float] | None:
-        """How high what stands between them would be for the place above, and from what to what it may be."""
-        if self.above is None:
-            return None
-        gap = self.above.centre_m[2] - self.above.size_m[2] / 2 - self.height_m
-        return gap, max(0.0, gap - self.above.room_down_m[2]), gap + self.above.room_up_m[2]
-
 
 @dataclass(frozen=True)
 class PlacementSummary:

@@ -24,7 +24,6 @@ from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import (
     millimetres,
     no_box_text,
-    range_text,
     reached_text,
     run_again_text,
     stand_text,
@@ -51,28 +50,21 @@ def tray_rows(
     reached = page.whole_sentence(reached_text(placement, place, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
-        (tr("Margins"), _margins(tray, results, placement)),
+        (tr("Margins"), _margins(place)),
         (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
     ]
 
 
-def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
-    """What room a place has; its height is kept where others bring the arm nearer to a singular pose."""
-    place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
-    height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
-    room = _room(place, "xy" if height else "xyz")
-    moved = room and tr(
-        "Reach and limits allow to move it by {room} mm, one direction at a time.",
-        room=room,
-    )
+def _margins(place: model.PlaceSummary) -> str:
+    """What room a place has."""
+    room = _room(place)
     ratio = fixed(100 * place.manipulability_ratio, 1)
     texts = [
         _nearest_limit(place),
         _nearest_bodies(place),
         tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
-        moved,
-        height,
+        room and tr("Reach and limits allow to move it by {room} mm, one direction at a time.", room=room),
     ]
     return joined(texts, " ")
 
@@ -93,14 +85,16 @@ def _nearest_bodies(place: model.PlaceSummary) -> str:
     return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
-def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
-    """How far the tray can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
-    where it can't."""
-    if not any((*place.room_down_m[: len(axes)], *place.room_up_m[: len(axes)])):
+def _room(place: model.PlaceSummary) -> str:
+    """How far the tray can be moved along its axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds.
+
+    Empty where it can't be moved.
+    """
+    if not any((*place.room_down_m, *place.room_up_m)):
         return ""
     parts = []
     whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
-    for axis, down, up in zip(axes, *whole):
+    for axis, down, up in zip("xyz", *whole):
         if down == up:
             parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
         elif down or up:
