@@ -145,10 +145,10 @@ def rows_of_vectors(array: Reals) -> Rows:
 
 
 @inner_kernel
-def spherical_triangle(
+def three_angles(
     k: SphericalConstants, zx: float, zy: float, zz: float, xx: float, xy: float, xz: float, sign: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """Geometric angles of three joints through one point, by one of the two roots of joint 2. Kernel.
+) -> tuple[float, float, float, float, float]:
+    """Angles of three joints through one point, by one of the two roots of joint 2. Kernel.
 
     Parameters
     ----------
@@ -159,11 +159,10 @@ def spherical_triangle(
 
     Returns
     -------
-    c, s : cosine and sine of the first angle
-    middle, last : rad, the others
-    upper, lower : squares of sine and cosine of half the middle angle, but for a factor; both roots meet where one is
-        0, and there is none where one is negative
-    tilt : sine of axis 3 from axis 1, but for the length of ``z``
+    x, y, z : rad, joint angles
+    valid : 1 if there is such a root, else 0
+    smallest : the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
+        negative if axis 3 can't point there
     """
     sum_s, sum_c = k.half_sum
     less_s, less_c = k.half_difference
@@ -173,11 +172,12 @@ def spherical_triangle(
     per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
     upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
     lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
-    above, below = max(upper, 0.0), max(lower, 0.0)
-    a, d = np.sqrt(above), np.sqrt(below)
-    per = 1.0 / (above + below)
+    smallest = min(min(upper, lower), tilt)
+    upper, lower = max(upper, 0.0), max(lower, 0.0)
+    a, d = np.sqrt(upper), np.sqrt(lower)
+    per = 1.0 / (upper + lower)
     middle = 2.0 * sign * arctan2(a, d)
-    cos_2, sin_2 = (below - above) * per, 2.0 * sign * a * d * per
+    cos_2, sin_2 = (lower - upper) * per, 2.0 * sign * a * d * per
     px, py = -sin_2 * k.sin_23, k.cos_12 * cos_2 * k.sin_23 - k.sin_12 * k.cos_23
     c, s = zx * px + zy * py, zy * px - zx * py
     size = np.sqrt(c * c + s * s)
@@ -188,28 +188,6 @@ def spherical_triangle(
     uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
     ux, uy = ux * cos_2 + uy * sin_2, uy * cos_2 - ux * sin_2
     last = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
-    return c, s, middle, last, upper, lower, tilt
-
-
-@inner_kernel
-def three_angles(
-    k: SphericalConstants, zx: float, zy: float, zz: float, xx: float, xy: float, xz: float, sign: float
-) -> tuple[float, float, float, float, float]:
-    """Angles of three joints through one point, by one of the two roots of joint 2. Kernel.
-
-    Parameters
-    ----------
-    k, zx, zy, zz, xx, xy, xz, sign : as for :func:`spherical_triangle`
-
-    Returns
-    -------
-    x, y, z : rad, joint angles
-    valid : 1 if there is such a root, else 0
-    smallest : the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
-        negative if axis 3 can't point there
-    """
-    c, s, middle, last, upper, lower, tilt = spherical_triangle(k, zx, zy, zz, xx, xy, xz, sign)
-    smallest = min(min(upper, lower), tilt)
     return arctan2(s, c) - k.zero_1, middle - k.zero_2, last, 1.0 if smallest > -1e-12 else 0.0, smallest
 
 

@@ -31,7 +31,6 @@ from er3a.kinematics.classes.arm_angle import (
     Rows,
     SphericalConstants,
     spherical_constants,
-    spherical_triangle,
     vector_of,
 )
 from er3a.kinematics.classes.polish import newton
@@ -178,13 +177,15 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
     marked : (N,), filled with where branches meet, for the careful solver
     """
     pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
+    turn = np.empty(7 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         _into_frame(k, T, start, size, pose)
         for shoulder in range(2):
             _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
             for wrist in range(2):
-                _wrist_and_elbow(k, pose, side, 1.0 - 2.0 * wrist, slack, out)
+                _wrist(k.wrist, side, 1.0 - 2.0 * wrist, turn)
+                _elbows(k, pose, side, turn, slack, out)
                 slot = 4 * shoulder + wrist
                 for i in range(size):
                     for j in range(6):
@@ -239,15 +240,52 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
 
 
 @inner_kernel
-def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:
-    """All joints of both elbows for one root of joint 5."""
+def _wrist(k: SphericalConstants, side: Reals, sign: float, turn: Reals) -> None:
+    """Joints 5 and 6 by one root, as :func:`.arm_angle.three_angles` has them, written out so that lanes are vectors.
+
+    ``turn`` gets cosine and sine of phi, joint 5's geometric angle, joint 6, and how far both roots are from meeting:
+    squares of sine and cosine of half that angle, but for a factor, and the sine of axis 6 from w.
+    """
+    sum_s, sum_c = k.half_sum
+    less_s, less_c = k.half_difference
+    for i in range(BLOCK):
+        zx, zy, zz = side[5 * BLOCK + i], side[6 * BLOCK + i], side[7 * BLOCK + i]
+        xx, xy, xz = side[8 * BLOCK + i], side[9 * BLOCK + i], side[10 * BLOCK + i]
+        tilt = np.sqrt(zx * zx + zy * zy)
+        total = np.sqrt(tilt * tilt + zz * zz) + abs(zz)
+        cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
+        per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
+        upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
+        lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
+        turn[4 * BLOCK + i], turn[5 * BLOCK + i], turn[6 * BLOCK + i] = upper, lower, tilt
+        upper, lower = max(upper, 0.0), max(lower, 0.0)
+        a, d = np.sqrt(upper), np.sqrt(lower)
+        per = 1.0 / (upper + lower)
+        turn[2 * BLOCK + i] = 2.0 * sign * arctan2(a, d)
+        cos_5, sin_5 = (lower - upper) * per, 2.0 * sign * a * d * per
+        # axis 6 as seen with phi = 0, then phi by one angle
+        px, py = -sin_5 * k.sin_23, k.cos_12 * cos_5 * k.sin_23 - k.sin_12 * k.cos_23
+        c, s = zx * px + zy * py, zy * px - zx * py
+        size = np.sqrt(c * c + s * s)
+        lost = size < 1e-30
+        per = 1.0 / (1.0 if lost else size)
+        c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
+        ux, uy = xx * c + xy * s, xy * c - xx * s
+        uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
+        ux, uy = ux * cos_5 + uy * sin_5, uy * cos_5 - ux * sin_5
+        turn[i], turn[BLOCK + i] = c, s
+        turn[3 * BLOCK + i] = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
+
+
+@inner_kernel
+def _elbows(k: ParallelConstants, pose: Reals, side: Reals, turn: Reals, slack: float, out: Reals) -> None:
+    """All joints of both elbows, by what :func:`_wrist` has put into ``turn``."""
     per_turn, least = 1.0 / TURN, -slack * NEAR  # a miss of d beyond an edge is a value of order d^2 below 0
     reach, smallest = k.upper_arm + k.forearm, k.upper_arm - k.forearm
     edge = k.near_m * reach * NEAR
     for i in range(BLOCK):
-        zx, zy, zz = side[5 * BLOCK + i], side[6 * BLOCK + i], side[7 * BLOCK + i]
-        xx, xy, xz = side[8 * BLOCK + i], side[9 * BLOCK + i], side[10 * BLOCK + i]
-        c, s, phi_5, theta_6, upper, lower, tilt = spherical_triangle(k.wrist, zx, zy, zz, xx, xy, xz, sign)
+        c, s, phi_5, theta_6 = turn[i], turn[BLOCK + i], turn[2 * BLOCK + i], turn[3 * BLOCK + i]
+        upper, lower, tilt = turn[4 * BLOCK + i], turn[5 * BLOCK + i], turn[6 * BLOCK + i]
         mark = (tilt < NEAR) | (abs(upper) < NEAR * NEAR) | (abs(lower) < NEAR * NEAR)
         valid = (side[BLOCK + i] > 0.0) & (upper > least) & (lower > least)
         phi = arctan2(s, c)
