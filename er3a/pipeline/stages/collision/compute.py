@@ -168,8 +168,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
     closest = (*at_targets, *on_paths)
-    clearances = {each.name: each.clearance_mm / 1000 for each in closest}
-    assumed = shapes_assumed(robot, study.assumed_margin(name), clearances)
+    assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     undecided = int((matrix.state == "undecided").sum())
     free = model.FreeSpace(
         *(space.whole.value, places_found.reached, places_found.clear, places_found.joined, undecided),
