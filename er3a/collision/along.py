@@ -31,10 +31,11 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import Pair
+from er3a.collision.bodies import Bodies, named_pair
+from er3a.collision.distances import which_overlap
+from er3a.collision.pairs import BASE, Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import link_frames
+from er3a.collision.shapes import arm_bodies, carried_bodies, layout_of, link_frames, solid_bodies
 from er3a.numerics.arrays import Integers, Reals, runs
 from er3a.robots.robot import Robot
 
@@ -359,6 +360,44 @@ def _touch(
         motion.measure(at, motion.joints(np.array([at]))[0], np.arange(len(motion.bodies.pairs)))
         return Touch(motion.bodies.pairs[k], start, -float(found.fun), at)
     return Touch(motion.bodies.pairs[k], start, -float(distances[deepest]), at)
+
+
+STEP = 0.02
+"""Of joints, rad or m, between moments at which a stored motion is compared with solids."""
+
+
+def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float, Pair] | None:
+    """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which.
+
+    Allowed contacts are not looked up.
+
+    Parameters
+    ----------
+    t : (n,), s
+    q : (n, joints), rad or m; rows that are not finite are left out, with the ways to and from them
+
+    Returns
+    -------
+    moment, pair : s, and two bodies; None if nothing overlaps at the rows and every ``STEP`` between them
+    """
+    moving = [body for body in (*arm_bodies(robot), *carried_bodies(robot, scene)) if body.link != BASE]
+    solids = [body for solid in scene.solids for body in solid_bodies(solid)]
+    pairs = [(i, len(moving) + j) for i in range(len(moving)) for j in range(len(solids))]
+    steps = np.abs(np.diff(q, axis=0, append=q[-1:])).max(axis=1)
+    counts = np.where(np.isfinite(steps), np.maximum(np.ceil(steps / STEP), 1), 1).astype(int)
+    row = np.repeat(np.arange(len(t)), counts)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[row]
+    after = np.minimum(row + 1, len(t) - 1)
+    tried = np.where(share[:, None] > 0, q[row] + share[:, None] * (q[after] - q[row]), q[row])
+    known = np.flatnonzero(np.isfinite(tried).all(axis=1))
+    found = np.empty((len(known), len(pairs)), bool)
+    which_overlap(layout_of(robot, [*moving, *solids], pairs), np.ascontiguousarray(tried[known]), found)
+    (hits,) = np.nonzero(found.any(axis=1))
+    if not len(hits):
+        return None
+    at, (first, second) = known[hits[0]], pairs[int(found[hits[0]].argmax())]
+    moment = t[row[at]] + share[at] * (t[after[at]] - t[row[at]])
+    return float(moment), named_pair(moving[first], solids[second - len(moving)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from er3a.collision.along import _Motion, clearance, clearance_along
+from er3a.collision.along import STEP, _Motion, clearance, clearance_along, first_overlap
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import LinkAndSolid, LinkPair
-from er3a.collision.scene import Scene
+from er3a.collision.scene import Cylinder, Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
 from er3a.geometry.transforms import transform
@@ -164,3 +164,20 @@ def test_rows_of_coupled_joints_move_by_the_sum_of_what_their_joints_can():
     robot = load_robot("er3_600").replace(coupling=np.eye(6) - 0.5 * np.eye(6, k=-1))
     motion = _Motion(Bodies(robot, None), None, None)
     np.testing.assert_allclose(motion.of_rows(np.arange(1.0, 7.0)), [1, 2.5, 4, 5.5, 7, 8.5])
+
+
+def test_a_stored_motion_is_compared_with_solids_between_its_rows():
+    """J1 turns by 3 rad in one row's time, past a post that it meets at neither row; the moment by fine sampling."""
+    robot = load_robot("er3a_c60")
+    post = Cylinder("post", transform(np.array([0.4, 0.0, 0.6]), np.zeros(3)), 0.03, 1.2)
+    scene = Scene("post", (post,))
+    bodies = Bodies(robot, scene)
+    t, q = np.array([0.0, 1, 2]), np.zeros((3, 6))
+    q[:, 0] = -1.5, 1.5, np.nan
+    share = np.linspace(0, 1, 30_001)
+    hit = bodies.overlaps(q[0] + share[:, None] * (q[1] - q[0]))[:, bodies.second < 0].any(axis=1)
+    found = first_overlap(robot, scene, t, q)
+    assert found is not None
+    assert 0 <= found[0] - share[hit.argmax()] <= STEP / 3
+    assert found[1].label.endswith("post")
+    assert first_overlap(robot, scene, t, np.where(np.arange(6) == 0, np.pi, q)) is None

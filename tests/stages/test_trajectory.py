@@ -52,6 +52,7 @@ from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, pla
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.stages.trajectory.page.record import record
 from er3a.pipeline.stages.trajectory.page.report import report, strategies_shown
+from er3a.pipeline.stages.workspace.page.tray import Meeting
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
@@ -661,6 +662,20 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
         in path_text(path)
     )
     assert "it takes at least 9.00 s" in path_text(replace(path, fastest_s=9.0))
+
+
+def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
+    """In its row, in the section's answer, beside its programs and in their heads, and in the player."""
+    met = {"line_limits, repaired": Meeting(0.21, "link 4")}
+    monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
+    report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 3
+    assert page.count('"text": "meets the tray at 0.21 s: link 4"') == 1
+    for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', page):
+        text = gzip.decompress(base64.b64decode(packed)).decode()
+        told = "er3a: meets the tray that the workspace page places at 0.21 s" in text
+        assert told == (file.startswith("line_limits_repaired") and not file.endswith((".dat", ".var")))
 
 
 def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):

@@ -14,12 +14,12 @@ from PIL import Image
 
 from er3a.files.kept_files import ROOT
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.overview.index import sound_grasps
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.vision.compute import figures_of, verdict_of
 from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.workspace.page.tray import sound_motions
 from er3a.pipeline.study import load_study
 from testing.hand_eye_sets import pose
 from testing.on_demand import OnDemand
@@ -85,7 +85,7 @@ def test_only_grasps_that_pass_are_told_to_succeed(folders):
     def told(near=(), expect="grasped"):
         objects, shapes = (replace(can, expect=expect), *others), replace(verdict.shapes, near=near)
         summary = replace(results.summary, objects=objects, verdict=replace(verdict, shapes=shapes))
-        return sound_grasps(replace(results, summary=summary))
+        return sound_motions(replace(results, summary=summary))
 
     assert told() == ["can", "box"]
     assert told(near=("box",)) == ["can"]

@@ -22,7 +22,7 @@ from er3a.pipeline.stages.workspace.compute import _left_out
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.tray import trays
+from er3a.pipeline.stages.workspace.page.tray import placing
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
@@ -50,7 +50,8 @@ def context_of(robot: Robot, found: ToolCapability) -> dict:
     verdict = SimpleNamespace(shapes=None)
     summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict, not_examined=())
     results = SimpleNamespace(summary=summary, capability=found.cells, places=found.places)
-    return capability_context(robot, results, places=trays(summary))
+    placed = placing({"workspace": SimpleNamespace(results=results)}, robot, {}, {})
+    return capability_context(robot, results, placing=placed)
 
 
 def test_summary_and_tables_belong_together(done):

@@ -9,10 +9,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from er3a.collision.bodies import Bodies
+from er3a.files.robot_library import load_robot
 from er3a.identifiability.entry_evidence import Tolerance
 from er3a.identifiability.proposals import LookAtMotion
 from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
+from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
@@ -22,11 +25,15 @@ from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundatio
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.page.report import rule_rows
+from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
+from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
+from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
+from er3a.pipeline.stages.workspace.page import tray
 from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
-from er3a.pipeline.stages.workspace.page.tray import trays
+from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 
 TALLY = CheckTally(24)
@@ -130,6 +137,36 @@ def _foundation(found: LeftOpen, folder: Path) -> str:
     return read_foundation(folder)
 
 
+def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
+    """Also if no vertex lies in the box; a vertex that is not known hides only the pieces that it ends."""
+    low, high = np.array([-0.3, -0.2, -0.1]), np.array([0.2, 0.3, 0.25])
+    entered = 0
+    for _ in range(300):
+        t = np.cumsum(random.uniform(0.1, 2, 8))
+        points = random.uniform(-1, 1, (8, 3))
+        points[3, :2] = points[2, :2]  # straight up
+        found = first_inside(t, points, low, high)
+        times = np.linspace(t[0], t[-1], 20_001)
+        walked = np.column_stack([np.interp(times, t, column) for column in points.T])
+        inside = times[((walked >= low) & (walked <= high)).all(axis=1)]
+        if len(inside):
+            assert found == pytest.approx(inside[0], abs=2 * (times[1] - times[0]))
+            entered += 1
+        elif found is not None:  # a corner cut between two points of the walk
+            place = np.array([np.interp(found, t, column) for column in points.T])
+            np.testing.assert_allclose(place, np.clip(place, low, high), atol=1e-9)
+    assert 50 < entered < 250
+    across = np.array([[-1.0, 0, 0], [1, 0, 0]])
+    assert first_inside(np.array([0.0, 2]), across, low, high) == pytest.approx(0.7)
+    assert first_inside(np.array([0.0, 2]), across + np.array([0, 0, 0.25]), low, high) == pytest.approx(
+        0.7
+    )  # along a face
+    assert first_inside(np.array([0.0, 2]), across + np.array([0, 0, 0.26]), low, high) is None
+    lost = np.array([[-1.0, 0, 0], [np.nan] * 3, [1, 0, 0], [0, 0, 0]])
+    assert first_inside(np.arange(4.0), lost, low, high) == pytest.approx(2.8)
+    assert first_inside(np.zeros(0), np.zeros((0, 3)), low, high) is None
+
+
 def placed(**stands) -> SimpleNamespace:
     """The workspace stage's results, which put a box of 200 x 150 x 50 mm at (350, 0, 400) mm."""
     spot = PlaceSummary((0.35, 0.0, 0.4), (0.15, 0.2, 0.05), True, None, 1, 1, None, (0,) * 3, (0,) * 3)
@@ -139,28 +176,195 @@ def placed(**stands) -> SimpleNamespace:
     return SimpleNamespace(results=SimpleNamespace(summary=SimpleNamespace(placement=found)))
 
 
+def moving(kind, table, key, summary, motions) -> SimpleNamespace:
+    """Results of a stage with motions, all from x = 0 to x = 1000 mm in 10 s, at y and z of each, by name."""
+    rows = [(name, 10.0 * x, (1000.0 * x, y, z)) for name, (y, z) in motions.items() for x in (0, 0.5, 1)]
+    columns = {name: np.zeros((len(rows), 6) if each.is_group else len(rows)) for name, each in table.columns().items()}
+    columns["t_s"] = np.array([row[1] for row in rows])
+    columns |= {key: np.array([row[0] for row in rows]), "xyz_mm": np.array([row[2] for row in rows]).reshape(-1, 3)}
+    return SimpleNamespace(results=kind(summary, *([table(**columns)] * (5 if kind is TrajectoryResults else 3))))
+
+
+def named(*names) -> list[SimpleNamespace]:
+    return [SimpleNamespace(name=name, chosen=None) for name in names]
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
+    """First times by hand: the box begins at x = 275 mm, which is passed after 2.75 s."""
+    paths = SimpleNamespace(paths=named("into", "below", "beside"), not_followed=tuple(named("lost")))
+    programs = SimpleNamespace(programs=named("through", "still"))
+    motions = {"into": (99.0, 424.0), "below": (0.0, 150.0), "beside": (101.0, 400.0)}
+    stored = {
+        "workspace": placed(over=over),
+        "trajectory": moving(TrajectoryResults, PathChecks, "path", paths, motions),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+        "inverse": SimpleNamespace(
+            results=SimpleNamespace(
+                summary=SimpleNamespace(
+                    targets=[
+                        SimpleNamespace(name="on_edge", xyz_mm=(275.0, 100.0, 425.0), chosen_deg=(0.0,)),
+                        SimpleNamespace(name="under", xyz_mm=(350.0, 0.0, 200.0), chosen_deg=(0.0,)),
+                        SimpleNamespace(name="unsolved", xyz_mm=(350.0, 0.0, 400.0), chosen_deg=None),
+                        SimpleNamespace(name="outside", xyz_mm=(274.0, 0.0, 400.0), chosen_deg=(0.0,)),
+                    ]
+                )
+            )
+        ),
+    }
+    sound = {"trajectory": ["below", "beside"], "programs": ["through", "still"]}
+    found = placing(stored, load_robot("er3a_c60"), {}, sound)
+    assert found.targets == (("on_edge", "under") if over else ("on_edge",))
+    said = found.compared
+    assert said.startswith("“Meets the tray”: ")
+    assert f"Targets in it or its stand: {', '.join(found.targets)}." in said
+    enters = Meeting(pytest.approx(2.75), "tool point")
+    below = {"below": enters} if over else {}
+    assert found.met == {"trajectory": {"into": enters} | below, "programs": {"through": enters}}
+    assert said.endswith("Not compared, or not all of it: still, lost.")
+    names = "below, through" if over else "through"
+    count = 1 + over
+    assert found.line.endswith(f"in the way of {count} of the 4 motions that pass without it: {names}.")
+    assert found.rows == [
+        [found.tray.where, "350, 0, 400", "150 × 200 × 50", f"{int(over)} of 2 paths, 1 of 2 programs", "–", "–"]
+    ]
+
+
+def test_the_place_that_fewest_motions_meet_comes_first():
+    """The floor's is 500 mm to the side, where the tool point does not come."""
+    robot = load_robot("er3a_c60")
+    programs = SimpleNamespace(programs=named("through"))
+    stored = {
+        "workspace": placed(over=True),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+    }
+    sound = {"programs": ["through"]}
+    assert placing(stored, robot, {}, sound).line == (
+        "On a stand 275 mm high on table (z = 100 mm), centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
+        "in the way of 1 of the 1 motions that pass without it: through."
+    )
+    placement = stored["workspace"].results.summary.placement
+    aside = replace(placement.places[0], centre_m=(0.35, 0.5, 0.4))
+    floor = StandSummary("floor", 0.0, None, None, "in_the_way", aside)
+    stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
+    found = placing(stored, robot, {}, sound)
+    assert found.line == (
+        "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
+        "of none of the 1 motions that pass without it (1 programs); nothing was planned around it."
+    )
+    assert [row[3] for row in found.rows] == ["0 of 1 programs", "1 of 1 programs"]
+    assert found.met == {"programs": {}}  # of the place that is recommended
+    half = replace(found.tray.place, size_m=(0.0125, 0.15, 0.05))
+    assert replace(found.tray, place=half).edges == "12.5 × 150 × 50"
+    many = {"programs": ["through", "a", "b", "c"]}
+    met = {name: Meeting(1.0, "link 3") for name in many["programs"]}
+    crowded = replace(found, tried=(replace(found.tried[0], met={"programs": met}),), sound=many)
+    assert crowded.line.endswith("in the way of 4 of the 4 motions that pass without it.")  # too many to be named
+
+
+def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):
+    """First times by hand, as above; the repair of a path that is clear is compared on its own. Without a place there
+    are no marks, which is not the same as no motion in it."""
+    paths = SimpleNamespace(paths=named("into", "beside"), not_followed=())
+    paths.paths[1] = SimpleNamespace(name="beside", chosen=True, strategy="slow")
+    motions = {"into": (99.0, 424.0), "beside": (101.0, 400.0)}
+    results = moving(TrajectoryResults, PathChecks, "path", paths, motions).results
+    rows = moving(TrajectoryResults, AvoidanceRows, "path", paths, {"beside": (0.0, 400.0)}).results.avoidance
+    rows = replace(rows, strategy=np.full(3, "slow"))
+    study = SimpleNamespace(robot=lambda name: load_robot(name), scene=lambda name, stage: None)
+    folder = tmp_path / "trajectory"
+    stored = SimpleNamespace(
+        folder=folder, robot="er3a_c60", stage="trajectory", results=replace(results, avoidance=rows)
+    )
+    assert tray.in_tray(study, stored) is None
+    monkeypatch.setattr(tray, "is_computed", lambda folder: folder == tmp_path / "workspace")
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: placed())
+    monkeypatch.setattr(tray, "sound_motions", lambda results: ["into", "beside"])
+    marked = tray.in_tray(study, stored)
+    assert marked.keys() == {"into", "beside, repaired"}
+    assert 'data-play="into"' in marked["into"]
+    assert "meets the tray at 2.75 s: tool point" in marked["into"]
+    elsewhere = moving(TrajectoryResults, PathChecks, "path", paths, {})
+    monkeypatch.setattr(tray, "read_stage", lambda folder, stage: elsewhere)
+    assert tray.in_tray(study, stored) is None
+
+
+def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
+    """J1 carries the flange from -60 deg to 0 in 2 s: by hand its chord enters the tray at y = -100 mm; the wrist's
+    shapes are in it before, at the time that fine sampling of the same shapes gives."""
+    robot = load_robot("er3a_c60")
+    down = np.array([[1.0, 0, 0, 0.35], [0, -1, 0, 0], [0, 0, -1, 0.4], [0, 0, 0, 1]])
+    there = np.degrees(inverse(robot, down, np.zeros(6)).q[0])
+    q = np.stack([there - np.array([60.0, 0, 0, 0, 0, 0]), there, there + np.array([0, 0, 0, 0, 0, 30.0])])
+    names = np.array(["can"] * 3 + ["missed"] * 3)
+    ways = PathRows(names, names, np.arange(6), np.tile([0.0, 2, 3], 2), np.vstack([q, q]))
+    objects = [SimpleNamespace(name=name, outcome=outcome) for name, outcome in GRASPED.items()]
+    empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 4)
+    vision = SimpleNamespace(results=replace(empty, ways=ways))
+    sound = {"vision": ["can"]}
+    found = placing({"workspace": placed(), "vision": vision}, robot, {}, sound)
+    (place,) = tray.trays(placed().results)
+    bodies = Bodies(robot, place.scene(None))
+    t = np.linspace(0, 2, 2001)
+    rows = np.radians(q[0] + t[:, None] / 2 * (q[1] - q[0]))
+    link = t[bodies.overlaps(rows)[:, bodies.second < 0].any(axis=1).argmax()]
+    meeting = found.met["vision"]["can"]
+    assert 0 <= meeting.t - link < 0.05
+    assert link < 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
+    assert meeting.body.startswith("link ")
+    assert found.line.endswith("in the way of 1 of the 1 motions that pass without it: can.")
+
+
+GRASPED = {"can": "grasped", "missed": "not graspable"}
+
+
 def test_the_workspace_page_says_how_far_a_tray_can_be_moved():
     results = placed().results
     placement = results.summary.placement
     spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
     results.summary = SimpleNamespace(placement=replace(placement, places=(spot,)), not_examined=[LeftOut("tool")])
     results.places = None
-    (found,) = trays(results.summary)
+    found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    room = "x ±75, y −200 to 175, z −200 to 50"
-    assert rows["Margins"].endswith(f"Reach and limits allow to move it by {room} mm, one direction at a time.")
+    moved = "Reach and limits allow to move it by x ±75, y −200 to 175, z −200 to 50 mm, one direction at a time; "
+    assert rows["Margins"].endswith(f"{moved}motions were compared with it at this place only.")
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
     assert "put the tray into the study's scene file as a box, and run again" in rows["What to do first"]
     assert "No tool is given" in rows["What to do first"]
 
 
-def test_a_tray_stands_on_a_surface_or_on_a_stand_over_it():
-    (tray,) = trays(placed(over=True).results.summary)
-    assert tray.line == (
-        "On a stand 275 mm high on table (z = 100 mm), centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z"
+def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment():
+    programs = SimpleNamespace(programs=named("through"))
+    stored = {
+        "workspace": placed(over=True),
+        "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
+    }
+    found = placing(stored, load_robot("er3a_c60"), {}, {"programs": ["through"]})
+    results = stored["workspace"].results
+    results.summary.not_examined, results.places = [], None
+    rows = dict(tray_rows(found, results, results.summary.placement, ""))
+    assert rows["Motions"].startswith("In the way of 1 of the 1 motions that pass without it. <a href=")
+    assert 'href="programs.html?play=through&amp;t=2.75#player">through</a> (tool point).' in rows["Motions"]
+    assert "Others" not in rows["Motions"]
+    failing = placing(stored, load_robot("er3a_c60"), {}, {"programs": []})
+    others = dict(tray_rows(failing, results, results.summary.placement, ""))["Motions"]
+    assert others.startswith("No motion passes that it could be in the way of. Others that meet it: <a href=")
+    assert "put the tray and its stand into the study's scene file as boxes" in rows["What to do first"]
+
+
+def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
+    assert placing({}, None, {}, {}) is None
+    alone = placing({"workspace": placed()}, None, {}, {})
+    assert alone.line.endswith(": no path, program or grasp was compared with it.")
+    assert alone.compared == ""
+    clear = moving(
+        ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
     )
-    assert tray.row[1:3] == ["350, 0, 400", "150 × 200 × 50"]
-    half = replace(tray, place=replace(tray.place, size_m=(0.0125, 0.15, 0.05)))
-    assert half.edges == "12.5 × 150 × 50"
-    assert trays(SimpleNamespace()) == []
+    found = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
+    assert found.met == {"programs": {}}
+    parts = "(1 programs); nothing was planned around it."
+    assert found.line.endswith(f"in the way of none of the 1 motions that pass without it {parts}")
+    assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
+    nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
+    assert nothing.line.endswith("no motion passes that it could be in the way of.")

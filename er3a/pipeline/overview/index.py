@@ -67,9 +67,8 @@ from er3a.pipeline.stages.validation.model import (
     ValidationResults,
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.vision.model import VisionResults
 from er3a.pipeline.stages.workspace.model import VoidSummary, WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.page.tray import Tray, trays
+from er3a.pipeline.stages.workspace.page.tray import MOTIONS, Placing, placing, scene_of, sound_motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.sweeps import ENTRIES, entry_label
 from er3a.pipeline.verdicts import NOT_EXAMINED, StageVerdict, read_verdicts, write_junit
@@ -236,7 +235,7 @@ def _points(line: Reals) -> str:
 
 SHOWN_FIGURES = 3
 RATES = ("own_speeds", "own_accelerations")
-MAY_RUN = {name: stage.motions for name, stage in STAGES.items() if stage.may_run}
+MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
 OF_ALL_RUNS = (  # what may turn any of them unsafe
     *("obstacles", "uncovered_links", "partial_links", "bare_tool", "base_inside", "allowed_contacts"),
     *("program_rest", "program_findings", "given_rates", "missed_rows", "controller_language", "tool", "carried"),
@@ -389,8 +388,7 @@ def _entry(
     unproven, settled = _settled(finding, evidence)
     entries = evidence_section(robot, evidence, _evidence(of_robots[instead]) if instead else None)
     computed = {stage: each for stage, each in stored.items() if heads[stage].status != "not_computed"}
-    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
-    places = trays(computed["workspace"].results.summary) if "workspace" in computed else []
+    runs, grasped, placed = _motions(study, robot, name, computed)
     return {
         "robot": robot,
         "table": table,
@@ -402,7 +400,7 @@ def _entry(
         "entries": entries,
         "instead": {instead: f"#{instead}"} if instead else {},
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
-        "answers": [*([settled] if settled else []), *_answers(heads, robot, places)],
+        "answers": [*([settled] if settled else []), *_answers(heads, robot, placed)],
         "outdated": changed_text(outdated, {name}),
         "notes": {
             stage: tr("changed since") if stage in changed else _note(head, [r for r in runs if r["stage"] == stage])
@@ -413,13 +411,14 @@ def _entry(
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
-        "grasped": sound_grasps(computed["vision"].results) if "vision" in computed else [],
+        "grasped": grasped,
         "grasps_missed": say(NoPass(missed))
         if "vision" in computed and (missed := computed["vision"].results.summary.verdict.missed)
         else "",
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
         "rates": rates,
-        "box": _without_box() if places else "",
+        "box": joined([_without_box(), placed.compared], " ") if placed else "",
+        "in_box": placed.met if placed else {},
         "shapes": next(
             (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
         ),
@@ -440,6 +439,17 @@ def _entry(
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _motions(
+    study: Study, robot: Robot, name: str, computed: Mapping[str, Stored[Any]]
+) -> tuple[list[dict[str, Any]], Sequence[str], Placing | None]:
+    """The paths and programs of a robot, the objects that its tool can grasp, and where to put the tray."""
+    runs = [_run(stage, name, computed[stage].results) for stage in MAY_RUN if stage in computed]
+    grasped = sound_motions(computed["vision"].results) if "vision" in computed else []
+    sound = {run["stage"]: run["sound"] for run in runs} | {"vision": grasped}
+    scenes = {stage: scene_of(study, name, stage) for stage in MOTIONS}
+    return runs, grasped, placing(computed, robot, scenes, sound)
 
 
 def _conflict(finding: object) -> str:
@@ -510,8 +520,8 @@ class Answer:
     places: Sequence[Sequence[str]] = ()
 
 
-def _answers(heads: Mapping[str, Head], robot: Robot, places: Sequence[Tray]) -> Iterator[Answer]:
-    """What is asked of an arm first; ``places``: where to put the tray, the best first."""
+def _answers(heads: Mapping[str, Head], robot: Robot, placing: Placing | None) -> Iterator[Answer]:
+    """What is asked of an arm first; ``placing``: where to put the tray."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if isinstance(workspace, WorkspaceSummary):
         reach = _reach_text(workspace, bare=_misses(heads["workspace"], "tool"))
@@ -524,12 +534,12 @@ def _answers(heads: Mapping[str, Head], robot: Robot, places: Sequence[Tray]) ->
     if isinstance(workspace, WorkspaceSummary) and workspace.enclosed_voids:
         row = f"#void-{workspace.voids.index(judged_void(workspace)) + 1}"
     yield Answer(tr("Void"), *void_text(workspace, confirmed=_limits_confirmed(heads)), f"workspace.html{row}")
-    if not places:
+    if placing is None:
         yield Answer(tr("Tray"), no_box_text(workspace), page="workspace.html#placement")
         return
-    rest = run_again_text(workspace, stand=places[0].floor is not None)
-    rows = [each.row for each in places] if len(places) > 1 else ()
-    yield Answer(tr("Tray"), tr("{place}.", place=places[0].line), rest, "workspace.html#placement", rows)
+    rest = run_again_text(workspace, stand=placing.tray.floor is not None)
+    places = placing.rows if len(placing.rows) > 1 else ()
+    yield Answer(tr("Tray"), placing.line, rest, "workspace.html#placement", places)
 
 
 def _reach_text(summary: WorkspaceSummary, *, bare: bool) -> str:
@@ -576,17 +586,6 @@ def _without_box() -> str:
     )
 
 
-def sound_grasps(results: VisionResults) -> list[str]:
-    """Names of the objects whose grasp passes: no other outcome was expected, and no assumed shape is near it."""
-    summary, shapes = results.summary, results.summary.verdict.shapes
-    near = shapes.near if shapes else ()
-    return [
-        each.name
-        for each in summary.objects
-        if each.grasp and each.expect in (None, "grasped") and each.name not in near
-    ]
-
-
 def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -> dict[str, Any]:
     """How many paths or programs there are, which may be run as they are, and why the others may not."""
     followed: Sequence[ProgramSummary | PathSummary]
@@ -595,8 +594,7 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
     else:
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faults += _otherwise(stage, followed, {fault.name for fault in faults})
-    faulty = {fault.name for fault in faults}
-    sound = [each.name for each in followed if each.name not in faulty]
+    sound = sound_motions(results)
     left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
     count = len(sound) + len(faults) + lost
     return {

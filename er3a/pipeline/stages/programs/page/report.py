@@ -30,6 +30,7 @@ from er3a.pipeline.stages.programs.page.played import (
     when,
     worst_first,
 )
+from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of
 from er3a.pipeline.viewing.page import render_stage
@@ -51,6 +52,8 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         output,
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
+        entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
+        compared_with_tray=compared_with_tray,
         limits_assumed=limits_assumed(
             summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
         ),

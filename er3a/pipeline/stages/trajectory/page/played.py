@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -55,20 +55,29 @@ def weight_of(verdict: PathVerdict) -> Weight:
     return "fail" if verdict in FAULTS else "plain" if verdict == "safe" else "caution"
 
 
-def motions(robot: Robot, results: model.TrajectoryResults) -> list[PlayedMotion]:
-    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it."""
+def motions(
+    robot: Robot, results: model.TrajectoryResults, more: Mapping[str, PlayedEvent] | None = None
+) -> list[PlayedMotion]:
+    """The paths as programmed, as far as the arm reaches them, each followed by the motion that repairs it.
+
+    ``more``: an event of motions, by their names.
+    """
+
+    def added(name: str) -> list[PlayedEvent]:
+        return [more[name]] if more and name in more else []
+
     checks, avoidance, motions = results.checks, results.avoidance, []
     for path in worst_first(results.summary.paths):
         rows = checks.take((checks.path == path.name) & checks.reachable)
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
-        seen = [*events(path), *_near_events(path, near, results.clearance)]
+        seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
         motions.append(PlayedMotion(path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path)))
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
             q = meant(robot, repair.q_deg)
-            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q))
+            motions.append(PlayedMotion(repaired(path), text, repair.t_s, q, added(repaired(path))))
     return motions
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from er3a.collision.pairs import Pair
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import N_, tr, using, with_unit
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
@@ -27,6 +27,7 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
+from er3a.pipeline.player.motions import PlayedEvent
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import LeftOut, Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -37,10 +38,12 @@ from er3a.pipeline.stages.trajectory.page.played import (
     kinds,
     motions,
     near_assumed,
+    repaired,
     shown_verdict,
     worst_first,
 )
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
+from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
@@ -64,10 +67,11 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     box_asked = "workspace" in study.stages(stored.robot) and not contradicted
     boxes = [LeftOut("placed_box")] if box_asked else []
     lines = program_head(stored.validated, [*summary.not_examined, *boxes])
+    met = None if contradicted else met_in_tray(study, stored)
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
-        links = _programs(files, lines)
+        links = _programs(path, files, lines, met or {})
         drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
         sections.append(_section(path, rows, own, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
@@ -77,6 +81,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         output,
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
+        entered=linked(met),
+        compared_with_tray=compared_with_tray,
         faults={fault.name: fault for fault in faults(results)},
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_picture(results, count),
@@ -86,10 +92,14 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
-        player=player(robot, motions(robot, results), scene),
+        player=player(robot, motions(robot, results, _tray_events(met or {})), scene),
         drawing_head=drawing_head(),
         condition=condition_of(stored.validated),
     )
+
+
+def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:
+    return {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in met.items()}
 
 
 def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
@@ -102,8 +112,11 @@ def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
     return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
 
 
-def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, Any]]:
-    """The files to save, each with further lines at the beginning of its head."""
+def _programs(
+    path: model.PathSummary, rows: model.ProgramFiles, head: Sequence[str], met: Mapping[str, Meeting]
+) -> list[dict[str, Any]]:
+    """The files to save, each with further lines at the beginning of its head: ``head``, and in English when it meets
+    the tray; ``met``: by names of motions."""
     speeds = [
         ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
         for text in rows.assumed_speed.tolist()
@@ -111,8 +124,16 @@ def _programs(rows: model.ProgramFiles, head: Sequence[str]) -> list[dict[str, A
     texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
     found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
     for each in found:
-        each["packed"] = packed_text(with_head_lines(each.pop("text"), head))
+        meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
+        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *_in_head(meeting)]))
     return found
+
+
+def _in_head(meeting: Meeting | None) -> list[str]:
+    with using("en"):
+        return (
+            [] if meeting is None else [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
+        )
 
 
 def _section(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import AxLine, Line2D
@@ -28,9 +29,10 @@ from er3a.pipeline.messages.workspace import (
     run_again_text,
     stand_text,
 )
+from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.stages.workspace.page.tray import Tray, limit_text
+from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
 from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, slide_names
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -42,15 +44,16 @@ ROUNDING = 1e-6  # mm
 
 
 def tray_rows(
-    tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
+    placing: Placing, results: model.WorkspaceResults, placement: model.PlacementSummary, payload: str
 ) -> list[tuple[str, str]]:
     """What to know of the tray where it is put, each under a title; ``payload``: what is known of it."""
-    stand, place = tray.below, tray.place
-    served = (stand.served_from_m if stand and stand.place else None) or 0.0
+    tray, stand = placing.tray, placing.tray.below
+    place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
     reached = page.whole_sentence(reached_text(placement, place, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
         (tr("Margins"), _margins(place)),
+        (tr("Motions"), _hindered(placing)),
         (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
     ]
@@ -64,9 +67,36 @@ def _margins(place: model.PlaceSummary) -> str:
         _nearest_limit(place),
         _nearest_bodies(place),
         tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
-        room and tr("Reach and limits allow to move it by {room} mm, one direction at a time.", room=room),
+        room
+        and tr(
+            "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
+            "this place only.",
+            room=room,
+        ),
     ]
     return joined(texts, " ")
+
+
+def _hindered(placing: Placing) -> Markup:
+    """Of which motions the tray is in the way, each with a link to the moment; which others meet it; then what was
+    compared."""
+    here, hindered = placing.tried[0], placing.hindered(placing.tried[0])
+    named, others = list[Markup](), list[Markup]()
+    for stage, met in here.met.items():
+        for name, each in met.items():
+            link = Markup('<a href="{}">{}</a> ({})').format(
+                address_of(stage, name, each.t, "player"), page.breakable(name), each.body
+            )
+            (named if name in hindered.get(stage, ()) else others).append(link)
+    first = page.whole_sentence(placing.hindrance(here, most=0))
+    texts = [escape(first), *_sentence(named), *_sentence(others, tr("Others that meet it")), escape(placing.compared)]
+    return Markup(" ").join(texts)
+
+
+def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
+    """Links as a sentence; none where there are none."""
+    lead = escape(about + tr(": ") if about else "")
+    return [lead + Markup(", ").join(links) + "."] if links else []
 
 
 def _nearest_limit(place: model.PlaceSummary) -> str:
@@ -335,10 +365,10 @@ def capability_context(
     robot: Robot,
     results: model.WorkspaceResults,
     scene: Scene | None = None,
-    places: Sequence[Tray] = (),
+    placing: Placing | None = None,
     payload: str = "",
 ) -> dict[str, Any]:
-    """What the template include ``capability.html.j2`` needs; ``places``: where to put the tray, the best first."""
+    """What the template include ``capability.html.j2`` needs; ``placing``: where to put the tray, if anywhere."""
     capability, placement = results.summary.capability, results.summary.placement
     if isinstance(capability, model.CapabilityMissing) or placement is None:
         return {"missing": say(capability)}
@@ -347,12 +377,12 @@ def capability_context(
         "asked_text": _asked_text(capability),
         "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
         "task_text": _task_text(placement.task, capability),
-        "tray_line": tr("{place}.", place=places[0].line) if places else no_box_text(results.summary),
-        "tray_places": [each.row for each in places],
-        "tray_rows": tray_rows(places[0], results, placement, payload)
-        if places and isinstance(placement, model.PlacementSummary)
+        "tray_line": placing.line if placing else no_box_text(results.summary),
+        "tray_places": placing.rows if placing else [],
+        "tray_rows": tray_rows(placing, results, placement, payload)
+        if placing and isinstance(placement, model.PlacementSummary)
         else [],
-    } | _placement_context(robot, results, capability, placement, scene, places)
+    } | _placement_context(robot, results, capability, placement, scene, placing)
 
 
 def _placement_context(
@@ -361,11 +391,12 @@ def _placement_context(
     capability: model.CapabilitySummary,
     placement: model.Placement,
     scene: Scene | None,
-    trays: Sequence[Tray],
+    placing: Placing | None,
 ) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
         return {"nowhere": say(placement)}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
+    trays = [each.tray for each in placing.tried] if placing else []
     return {
         "nowhere": "",
         "placing_scene": placement.scene,

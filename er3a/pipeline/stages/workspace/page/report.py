@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.tray import Tray, trays
+from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
@@ -31,8 +30,8 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     contradicted = stored.rests_on.get("validation") == "fail"
-    places = [] if contradicted else trays(results.summary)
-    context = _context(robot, results, scene, places, _payload(study, stored) if places else "")
+    placing = None if contradicted else placing_of(study, stored)
+    context = _context(robot, results, scene, placing, _payload(study, stored) if placing else "")
     if contradicted:
         context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
     render_stage(
@@ -60,10 +59,10 @@ def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
 
 
 def _context(
-    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, places: Sequence[Tray], payload: str
+    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None, payload: str
 ) -> dict[str, Any]:
     summary = results.summary
-    return capability_context(robot, results, scene, places, payload) | {
+    return capability_context(robot, results, scene, placing, payload) | {
         "section": Picture(
             workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")

@@ -1,14 +1,42 @@
-"""The tray where the workspace stage can put it, in words: on what it stands, its centre, edges and margins."""
+"""The tray where the workspace stage can put it: which motions meet it, or what it stands on, and where it is in the
+way of the fewest."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+from markupsafe import Markup
+
+from er3a.collision.along import STEP, first_overlap
+from er3a.collision.scene import Box, Scene
+from er3a.geometry.transforms import transform
+from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import as_text, own_title, tr
+from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import bracketed
+from er3a.pipeline.messages.say import bracketed, joined
 from er3a.pipeline.messages.workspace import millimetres
+from er3a.pipeline.player.player import moment
+from er3a.pipeline.results import AbsentResults, Stored, is_computed, read_stage
+from er3a.pipeline.stages.expectations import unmet_expectations
+from er3a.pipeline.stages.programs.model import ProgramsResults, ProgramSummary
+from er3a.pipeline.stages.programs.page.played import faults as program_faults
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory.model import PathSummary, TrajectoryResults
+from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
+from er3a.pipeline.stages.trajectory.page.played import repaired
+from er3a.pipeline.stages.vision.model import ObjectResult, VisionResults
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
+from er3a.pipeline.study import Study
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+MOTIONS = {name: stage.motions for name, stage in STAGES.items() if stage.motions}
+NAMED = 3  # motions that a short line names
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +53,16 @@ class Tray:
     below: StandSummary | None
 
     @property
-    def underside(self) -> float:
-        """The height of its underside, m."""
-        return float(self.place.centre_m[2] - self.place.size_m[2] / 2)
+    def low(self) -> Reals:
+        """Its lower corner (3,), m."""
+        found: Reals = np.array(self.place.centre_m) - np.array(self.place.size_m) / 2
+        return found
+
+    @property
+    def high(self) -> Reals:
+        """Its upper corner (3,), m."""
+        found: Reals = np.array(self.place.centre_m) + np.array(self.place.size_m) / 2
+        return found
 
     @property
     def floor(self) -> float | None:
@@ -44,7 +79,7 @@ class Tray:
             name = bracketed(name, f"z = {height} mm")
         if self.floor is None:
             return tr("On {name}", name=name)
-        return tr("On a stand {gap} mm high on {name}", gap=millimetres([self.underside - self.floor]), name=name)
+        return tr("On a stand {gap} mm high on {name}", gap=millimetres([self.low[2] - self.floor]), name=name)
 
     @property
     def line(self) -> str:
@@ -62,10 +97,210 @@ class Tray:
         return " × ".join(as_text(1000 * edge, ".6g") for edge in self.place.size_m)
 
     @property
-    def row(self) -> list[str]:
-        """It as a row of a table: where, centre, edges, margins."""
-        margins = limit_text(self.place), fixed(self.place.clearance_mm, 0)
-        return [self.where, millimetres(self.place.centre_m), self.edges, *margins]
+    def corners(self) -> tuple[Reals, Reals]:
+        """Lower and upper corner (3,), m, of it and its stand together."""
+        low = self.low
+        low[2] = low[2] if self.floor is None else min(low[2], self.floor)
+        return low, self.high
+
+    def scene(self, carried: Scene | None) -> Scene:
+        """It and its stand as solids, for an arm that carries what that of ``carried`` does."""
+        low, high = self.corners
+        whole = Box("tray", transform((low + high) / 2, np.zeros(3)), high - low)
+        return Scene("tray", (whole,), carried.carried if carried else ())
+
+
+@dataclass(frozen=True, eq=False)
+class StoredMotion:
+    """A motion as it is stored: times (n,) in s, joints (n, joints) in rad or m, tool points (n, 3) in m."""
+
+    name: str
+    t: Reals
+    q: Reals
+    points: Reals
+
+    @property
+    def whole(self) -> bool:
+        """Whether the arm is known all along."""
+        return len(self.t) > 1 and bool(np.isfinite(self.points).all())
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """When a motion meets the tray first (s), and with what."""
+
+    t: float
+    body: str
+
+    @property
+    def text(self) -> str:
+        """When, and with what."""
+        return tr("meets the tray at {t:.2f} s: {body}", t=self.t, body=self.body)
+
+
+def trays(workspace: Any) -> list[Tray]:
+    """The tray at its best place, then at the best ones on or over other surfaces; empty if these results put none."""
+    placement = getattr(workspace.summary, "placement", None)
+    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+        return []
+    best = placement.best
+    below = placement.over if placement.stand is None else placement.stand
+    standing = [(stand.place or stand.above, stand) for stand in placement.stands]
+    return [Tray(best, below), *(Tray(place, stand) for place, stand in standing if place and place != best)]
+
+
+def stored_motions(results: object, robot: Robot) -> Iterator[StoredMotion]:
+    """The motions of a stage's results: paths and what repairs them, programs, grasps; of others none."""
+    if isinstance(results, VisionResults):
+        for each in results.summary.objects:
+            if each.outcome == "grasped":
+                way = results.ways.take(results.ways.target == each.name)
+                q = meant(robot, way.q_deg)
+                yield StoredMotion(each.name, way.t_s, q, forward(robot, q)[:, :3, 3])
+    elif isinstance(results, ProgramsResults):
+        for program in results.summary.programs:
+            motion = results.motion.take(results.motion.program == program.name)
+            yield StoredMotion(program.name, motion.t_s, meant(robot, motion.q_deg), motion.xyz_mm / 1000)
+    elif isinstance(results, TrajectoryResults):
+        for path in results.summary.paths:
+            rows = results.checks.take(results.checks.path == path.name)
+            yield StoredMotion(path.name, rows.t_s, meant(robot, rows.q_deg), rows.xyz_mm / 1000)
+            if path.chosen:
+                own = (results.avoidance.path == path.name) & (results.avoidance.strategy == path.strategy)
+                repair = results.avoidance.take(own)
+                yield StoredMotion(repaired(path), repair.t_s, meant(robot, repair.q_deg), repair.xyz_mm / 1000)
+
+
+def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[StoredMotion]) -> dict[str, Meeting]:
+    """Of each motion by name when its tool point or a body of the arm first meets a tray or its stand, if it does."""
+    found, scene = dict[str, Meeting](), tray.scene(carried)
+    for each in motions:
+        at = first_inside(each.t, each.points, *tray.corners)
+        meetings = [] if at is None else [Meeting(at, tr("tool point"))]
+        if len(each.t) and (overlap := first_overlap(robot, scene, each.t, each.q)):
+            first, _, _ = overlap[1].label.partition("/")
+            meetings.append(Meeting(overlap[0], body_word(first)))
+        if meetings:
+            found[each.name] = min(meetings, key=lambda meeting: meeting.t)
+    return found
+
+
+def scene_of(study: Study, robot: str, stage: str) -> Scene | None:
+    """The scene in which a stage's motions are checked; that of paths counts for programs too."""
+    return study.scene(robot, stage if stage == "vision" else "trajectory")
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A tray at a place, and of each stage's motions by name when they meet it or its stand first."""
+
+    tray: Tray
+    met: Mapping[str, Mapping[str, Meeting]]
+
+
+@dataclass(frozen=True, eq=False)
+class Placing:
+    """Where to put the tray: of the best places on or over each surface the one in the way of the fewest motions that
+    pass without it, of equals the one that comes first.
+
+    Attributes
+    ----------
+    tried : that place, then the others
+    sound : per stage, in the order of ``met``, the names of motions that pass without the tray
+    targets : those with a solution, whose tool points lie in the tray or its stand
+    unseen : names of motions that are not known, or not all
+    """
+
+    tried: tuple[Tried, ...]
+    sound: Mapping[str, Sequence[str]]
+    targets: tuple[str, ...]
+    unseen: tuple[str, ...]
+
+    @property
+    def tray(self) -> Tray:
+        """The tray at that place."""
+        return self.tried[0].tray
+
+    @property
+    def met(self) -> Mapping[str, Mapping[str, Meeting]]:
+        """What meets it there."""
+        return self.tried[0].met
+
+    @property
+    def passing(self) -> int:
+        """How many motions pass without it."""
+        return sum(len(self.sound.get(stage, ())) for stage in self.met)
+
+    def hindered(self, tried: Tried) -> dict[str, list[str]]:
+        """Of motions that pass without the tray those that meet it at a place, per stage."""
+        found = {stage: [name for name in self.sound.get(stage, ()) if name in met] for stage, met in tried.met.items()}
+        return {stage: names for stage, names in found.items() if names}
+
+    def hindrance(self, tried: Tried, most: int = NAMED) -> str:
+        """Of how many of the motions that pass it is in the way at a place; of at most so many by name."""
+        names = [name for each in self.hindered(tried).values() for name in each]
+        if not tried.met:
+            return tr("no path, program or grasp was compared with it")
+        if not self.passing:
+            return tr("no motion passes that it could be in the way of")
+        if not names:
+            return tr(
+                "in the way of none of the {count} motions that pass without it ({parts}); nothing was planned around "
+                "it",
+                count=self.passing,
+                parts=self._parts,
+            )
+        said = tr(
+            "in the way of {some} of the {count} motions that pass without it", some=len(names), count=self.passing
+        )
+        return said if len(names) > most else tr("{said}: {names}", said=said, names=joined(names, ", "))
+
+    @property
+    def _parts(self) -> str:
+        """Of how many paths, programs and grasps the motions that pass are made up."""
+        counts = [(len(self.sound.get(stage, ())), tr(MOTIONS[stage])) for stage in self.met]
+        return joined([tr("{count} {what}", count=count, what=what) for count, what in counts if count], ", ")
+
+    @property
+    def line(self) -> str:
+        """Where to put the tray, and what it is in the way of, in one sentence."""
+        return tr("{place}: {hindrance}.", place=self.tray.line, hindrance=self.hindrance(self.tried[0]))
+
+    @property
+    def compared(self) -> str:
+        """What was compared with the tray, and what of it was found; empty where nothing was."""
+        if not self.met:
+            return ""
+        said = [compared_with_tray([name for found in self.met.values() for name in found])]
+        if self.targets:
+            said.append(tr("Targets in it or its stand: {names}.", names=joined(self.targets, ", ")))
+        if self.unseen:
+            said.append(tr("Not compared, or not all of it: {names}.", names=joined(self.unseen, ", ")))
+        return joined(said, " ")
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Each place as a row: where, centre, edges, what it is in the way of, margins."""
+        return [
+            [
+                each.tray.where,
+                millimetres(each.tray.place.centre_m),
+                each.tray.edges,
+                self._counted(each),
+                limit_text(each.tray.place),
+                fixed(each.tray.place.clearance_mm, 0),
+            ]
+            for each in self.tried
+        ]
+
+    def _counted(self, tried: Tried) -> str:
+        hindered = self.hindered(tried)
+        counts = [
+            tr("{some} of {count} {what}", some=len(hindered.get(stage, ())), count=len(names), what=tr(MOTIONS[stage]))
+            for stage in tried.met
+            if (names := self.sound.get(stage, ()))
+        ]
+        return joined(counts, ", ") or "–"
 
 
 def limit_text(place: PlaceSummary) -> str:
@@ -74,12 +309,120 @@ def limit_text(place: PlaceSummary) -> str:
     return bracketed(margin, f"J{place.limit_joint}" if place.limit_joint is not None else "")
 
 
-def trays(summary: object) -> list[Tray]:
-    """The tray at its best place, then at the best ones on or over other surfaces; empty if these results put none."""
-    placement = getattr(summary, "placement", None)
-    if not isinstance(placement, PlacementSummary) or not placement.named_places:
+def placing(
+    stored: Mapping[str, Stored[Any]],
+    robot: Robot,
+    scenes: Mapping[str, Scene | None],
+    sound: Mapping[str, Sequence[str]],
+) -> Placing | None:
+    """Where to put the tray of the study among the places of the workspace stage; None if it puts none.
+
+    ``scenes``: of each stage, for what the arm carries. ``sound``: what passes in each.
+    """
+    places = trays(stored["workspace"].results) if "workspace" in stored else []
+    if not places:
+        return None
+    motions = {stage: [*stored_motions(stored[stage].results, robot)] for stage in MOTIONS if stage in stored}
+    tried = [
+        Tried(tray, {stage: met(robot, tray, scenes.get(stage), each) for stage, each in motions.items()})
+        for tray in places
+    ]
+    best = min(
+        tried, key=lambda each: sum(len(found.keys() & sound.get(stage, ())) for stage, found in each.met.items())
+    )
+    unseen = [each.name for moved in motions.values() for each in moved if not each.whole]
+    for stage in motions:
+        unseen += [each.name for each in getattr(stored[stage].results.summary, "not_followed", ())]
+    low, high = (1000 * corner for corner in best.tray.corners)
+    targets = stored["inverse"].results.summary.targets if "inverse" in stored else ()
+    inside = (each.name for each in targets if each.chosen_deg and np.all((low <= each.xyz_mm) & (each.xyz_mm <= high)))
+    return Placing((best, *(each for each in tried if each is not best)), sound, tuple(inside), tuple(unseen))
+
+
+def sound_motions(results: object) -> list[str]:
+    """Names of a stage's motions that pass as they are."""
+    if isinstance(results, VisionResults):
+        return [each.name for each in results.summary.objects if each.grasp and _is_sound(each, results)]
+    followed: Sequence[ProgramSummary | PathSummary]
+    if isinstance(results, ProgramsResults):
+        followed, faults = results.summary.programs, program_faults(results)
+    elif isinstance(results, TrajectoryResults):
+        followed, faults = results.summary.paths, path_faults(results)
+    else:
         return []
-    best = placement.best
-    below = placement.over if placement.stand is None else placement.stand
-    standing = [(stand.place or stand.above, stand) for stand in placement.stands]
-    return [Tray(best, below), *(Tray(place, stand) for place, stand in standing if place and place != best)]
+    unmet = unmet_expectations(followed)
+    faulty = {fault.name for fault in faults} | {each.name for each in (unmet.unmet if unmet else ())}
+    return [each.name for each in followed if each.name not in faulty]
+
+
+def _is_sound(grasped: ObjectResult, results: VisionResults) -> bool:
+    """Whether a grasp passes: no other outcome was expected, and no assumed shape is near it."""
+    shapes = results.summary.verdict.shapes
+    return grasped.expect in (None, "grasped") and (shapes is None or grasped.name not in shapes.near)
+
+
+def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
+    """Where to put the tray, from the results that lie beside those of a stage; None if that is nowhere."""
+    beside = stored.folder.parent if stored.folder else None
+    names = [name for name in ("workspace", "inverse", *MOTIONS) if beside and is_computed(beside / name)]
+    found = {name: read_stage(beside / name, STAGES[name]) for name in names} if beside else {}
+    found = {name: each for name, each in found.items() if not isinstance(each.results, AbsentResults)}
+    found[stored.stage] = stored
+    if "workspace" not in found:
+        return None
+    sound = {stage: sound_motions(found[stage].results) for stage in MOTIONS if stage in found}
+    scenes = {stage: scene_of(study, stored.robot, stage) for stage in sound}
+    return placing(found, study.robot(stored.robot), scenes, sound)
+
+
+def met_in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Meeting] | None:
+    """Of each motion of a stage that meets the tray when it first does; None where no place of the tray is known."""
+    found = placing_of(study, stored)
+    return None if found is None else found.met.get(stored.stage, {})
+
+
+def in_tray(study: Study, stored: Stored[Any]) -> Mapping[str, Markup] | None:
+    """The same as links to these moments."""
+    return linked(met_in_tray(study, stored))
+
+
+def linked(met: Mapping[str, Meeting] | None) -> Mapping[str, Markup] | None:
+    """When motions meet the tray, as links to these moments of the page's player."""
+    return None if met is None else {name: moment(name, each.t, each.text) for name, each in met.items()}
+
+
+def compared_with_tray(met_it: Collection[str] | None) -> str:
+    """What a page says of motions that were compared with the tray, ``met_it`` those that do; empty for None."""
+    if met_it is None:
+        return ""
+    found = (
+        tr(
+            "“Meets the tray”: when the tool point, or a link's shape or what is carried, is first found in the tray "
+            "or its stand."
+        )
+        if met_it
+        else tr("Neither the tool point nor a link's shape nor what is carried was found in the tray or its stand.")
+    )
+    how = tr(
+        "Compared at the stored times and every {turn:.1f} deg or {way:.0f} mm of a joint between them.",
+        turn=np.degrees(STEP),
+        way=1000 * STEP,
+    )
+    return joined([found, how], " ")
+
+
+def first_inside(t: Reals, points: Reals, low: Reals, high: Reals) -> float | None:
+    """When a point that moves straight from each of ``points`` (n, 3) at ``t`` (n,) to the next enters a box first.
+
+    ``low``, ``high``: (3,), the box's corners. None if it never does.
+    """
+    way = np.diff(points, axis=0, append=points[-1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([low - points, high - points]) / way
+    ends = np.sort(np.where(np.isnan(ends), [[[-np.inf]], [[np.inf]]], ends), axis=0)  # 0/0: along a face
+    enters, leaves = np.maximum(ends[0].max(axis=1), 0), np.minimum(ends[1].min(axis=1), 1)
+    (hits,) = np.nonzero((enters <= leaves) & np.isfinite(points + way).all(axis=1))
+    if not len(hits):
+        return None
+    row = hits[0]
+    return float(t[row] + enters[row] * (t[min(row + 1, len(t) - 1)] - t[row]))
