@@ -29,8 +29,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.convex import ROOM
-from er3a.collision.distances import FREE, MEETS, measure, pair_distance, place, search_boxes, unplaced, which_overlap
+from er3a.collision.distances import FREE, MEETS, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
@@ -261,11 +260,19 @@ def _centres(robot: Robot, pair: BodyPair) -> list[Reals]:
     layout = layout_of(robot, pair, [(0, 1)])
     measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
     apart = q[int(found[:, 0].argmax())]
-    (T, world, middles), near = unplaced(layout), np.empty((2, 3))
-    place(layout, apart, T, world, middles)
-    pair_distance(layout, T, world, 0, 1, np.empty((ROOM, 3)), near, np.inf)
+    near = _measured(robot, pair, [(0, 1)], apart)[2][0]
     frames = (link_frames(robot, apart)[body.link] for body in pair)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
+
+
+def _measured(
+    robot: Robot, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]], q: Reals
+) -> tuple[Reals, Flags, Reals]:
+    """Distances (k,), m, of pairs of bodies at joint values (n,), whether their cores overlap, and the nearest points
+    (k, 2, 3) of these."""
+    found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
+    some_distances(layout_of(robot, bodies, pairs), q, np.arange(len(pairs)), found, deep, near)
+    return found, deep, near
 
 
 def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, float, int]:
@@ -327,16 +334,13 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     pairs = list(product(range(len(base)), range(2 * len(base), len(bodies))))
     if not pairs:
         return ()
-    layout = layout_of(robot, bodies, pairs)
-    T, w, middles = unplaced(layout)
-    place(layout, np.zeros(robot.joints), T, w, middles)
+    both = [(first + more, second) for more in (0, len(base)) for first, second in pairs]
+    distances, deep, _ = _measured(robot, bodies, both, np.zeros(robot.joints))
     found: dict[str, BaseContact] = {}
-    for a, b in pairs:
-        room, near = np.empty((ROOM, 3)), np.empty((2, 3))
-        distance, touches = pair_distance(layout, T, w, a, b, room, near, np.inf)
-        middle, deep = pair_distance(layout, T, w, len(base) + a, b, room, near, np.inf)
+    for k, (a, b) in enumerate(pairs):
+        distance, touches, middle = distances[k], deep[k], distances[len(pairs) + k]
         margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
-        inside = bool(deep) or middle + bodies[a].radius + margin < -INSIDE
+        inside = bool(deep[len(pairs) + k]) or middle + bodies[a].radius + margin < -INSIDE
         contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
         before = found.get(contact.solid)
         if (touches or distance < 0) and (
@@ -359,11 +363,9 @@ def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
     """
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
     bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
-    layout = layout_of(robot, bodies, [(0, k) for k in range(1, len(bodies))])
-    (T, w, middles), room, near = unplaced(layout), np.empty((ROOM, 3)), np.empty((2, 3))
-    place(layout, np.zeros(robot.joints), T, w, middles)
-    found = [pair_distance(layout, T, w, 0, k, room, near, np.inf) for k in range(1, len(bodies))]
-    met = (body.name for body, (distance, deep) in zip(bodies[1:], found) if deep or distance < 0)
+    pairs = [(0, k) for k in range(1, len(bodies))]
+    distances, deep, _ = _measured(robot, bodies, pairs, np.zeros(robot.joints))
+    met = (body.name for body, touches in zip(bodies[1:], deep | (distances < 0)) if touches)
     return tuple(dict.fromkeys(met))
 
 

@@ -346,7 +346,7 @@ def _holds_probe(trees: Trees, T: Reals, S: Reals, a: int, b: int, probe: Reals)
 
 
 @inner_kernel
-def surface_distance(  # noqa: C901, PLR0912, PLR0915
+def surface_distance(  # noqa: C901, PLR0912
     trees: Trees,
     a: int,
     T: Reals,
@@ -374,19 +374,11 @@ def surface_distance(  # noqa: C901, PLR0912, PLR0915
     """
     w, first, last, disc = core
     convex = trees.root[b] < 0
-    count = last - first if convex else 3
+    count, disc = (last - first, disc) if convex else (3, 0.0)
     points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.box, trees.root[b]
     if convex:
         boxes, nb = np.empty((1, 2, 3)), 0
-        for r in range(3):
-            R[r, r], low, high = 1.0, np.inf, -np.inf
-            for p in range(count):
-                value = 0.0
-                for k in range(3):
-                    value += T[k, r] * (w[first + p, k] - T[k, 3])
-                points[3 + p, r] = value
-                low, high = min(low, value), max(high, value)
-            boxes[0, 0, r], boxes[0, 1, r] = (low + high) / 2, (high - low) / 2 + disc
+        _core_in_frame(T, core, R, points, boxes[0])
     else:
         _turned(T, S, R, t)
     axis, close = np.empty((2, 3)), np.empty((2, 3))
@@ -403,46 +395,83 @@ def surface_distance(  # noqa: C901, PLR0912, PLR0915
         if bound[height] >= best * best:
             continue
         deep_a, deep_b = trees.child[n, 0] >= 0, not convex and trees.child[m, 0] >= 0
-        if not deep_a and not deep_b:
-            for k in range(3):
-                for r in range(3):
-                    points[k, r] = trees.corner[trees.child[n, 1], k, r]
-                    if not convex:
-                        c = trees.corner[trees.child[m, 1], k]
-                        points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
-            if _apart_along(points, count, axis) - (disc if convex else 0.0) >= best:
-                continue
-            distance = cores_distance(points, (0, 3, 3, 3 + count), 0.0, disc if convex else 0.0, room, close)
-            if distance < best:
-                best = distance
-                _keep_axis(close, R, axis)
-                for k in range(2):
-                    for r in range(3):
-                        near[k, r] = T[r, 0] * close[k, 0] + T[r, 1] * close[k, 1] + T[r, 2] * close[k, 2] + T[r, 3]
-            if best <= TOUCHING:
-                return 0.0
+        if deep_a or deep_b:  # the larger one is opened
+            of_a = deep_a and not (deep_b and _girth(boxes[m]) >= _girth(trees.box[n]))
+            height = _open_boxes(trees, boxes, of_a, R, t, axis, best * best, stack, bound, height)
             continue
-        of_a = deep_a
-        if deep_a and deep_b:  # the larger one is opened
-            of_a = boxes[m, 1, 0] + boxes[m, 1, 1] + boxes[m, 1, 2] < (
-                trees.box[n, 1, 0] + trees.box[n, 1, 1] + trees.box[n, 1, 2]
-            )
-        kept = height
-        for side in range(2):
-            one = trees.child[n, side] if of_a else n
-            other = m if of_a else trees.child[m, side]
-            apart = _boxes_apart(trees.box, one, boxes, other, R, t, axis, best * best)
-            if apart < best * best:
-                stack[height, 0], stack[height, 1], bound[height] = one, other, apart
-                height += 1
-        if height == kept + 2 and bound[kept] < bound[kept + 1]:  # the nearer one is looked at first
+        for k in range(3):
+            for r in range(3):
+                points[k, r] = trees.corner[trees.child[n, 1], k, r]
+                if not convex:
+                    c = trees.corner[trees.child[m, 1], k]
+                    points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
+        if _apart_along(points, count, axis) - disc >= best:
+            continue
+        distance = cores_distance(points, (0, 3, 3, 3 + count), 0.0, disc, room, close)
+        if distance < best:
+            best = distance
+            _keep_axis(close, R, axis)
             for k in range(2):
-                stack[kept, k], stack[kept + 1, k] = stack[kept + 1, k], stack[kept, k]
-            bound[kept], bound[kept + 1] = bound[kept + 1], bound[kept]
+                for r in range(3):
+                    near[k, r] = T[r, 0] * close[k, 0] + T[r, 1] * close[k, 1] + T[r, 2] * close[k, 2] + T[r, 3]
+        if best <= TOUCHING:
+            return 0.0
     if convex:
         return -best if holds_point(trees, T, trees.root[a], w[first]) else best
     within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
     return -best if within else best
+
+
+@inner_kernel
+def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], R: Reals, points: Reals, box: Reals) -> None:
+    """The points of a core in a surface's frame, from row 3 of ``points`` on, and the box (2, 3) around it; R becomes
+    the identity."""
+    w, first, last, disc = core
+    for r in range(3):
+        R[r, r], low, high = 1.0, np.inf, -np.inf
+        for p in range(last - first):
+            value = 0.0
+            for k in range(3):
+                value += T[k, r] * (w[first + p, k] - T[k, 3])
+            points[3 + p, r] = value
+            low, high = min(low, value), max(high, value)
+        box[0, r], box[1, r] = (low + high) / 2, (high - low) / 2 + disc
+
+
+@inner_kernel
+def _girth(box: Reals) -> float:
+    """Half the sum of a box's edges."""
+    return float(box[1, 0] + box[1, 1] + box[1, 2])
+
+
+@inner_kernel
+def _open_boxes(
+    trees: Trees,
+    boxes: Reals,
+    of_a: bool,
+    R: Reals,
+    t: Reals,
+    axis: Reals,
+    limit: float,
+    stack: Integers,
+    bound: Reals,
+    height: int,
+) -> int:
+    """Replace the pair of boxes at ``stack[height]`` by those of the two boxes in one of them that are nearer than the
+    root of ``limit``, the nearer one on top; returns the new height."""
+    n, m, kept = stack[height, 0], stack[height, 1], height
+    for side in range(2):
+        one = trees.child[n, side] if of_a else n
+        other = m if of_a else trees.child[m, side]
+        apart = _boxes_apart(trees.box, one, boxes, other, R, t, axis, limit)
+        if apart < limit:
+            stack[height, 0], stack[height, 1], bound[height] = one, other, apart
+            height += 1
+    if height == kept + 2 and bound[kept] < bound[kept + 1]:
+        for k in range(2):
+            stack[kept, k], stack[kept + 1, k] = stack[kept + 1, k], stack[kept, k]
+        bound[kept], bound[kept + 1] = bound[kept + 1], bound[kept]
+    return height
 
 
 @inner_kernel

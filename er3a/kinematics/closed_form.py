@@ -119,7 +119,7 @@ def _off_folds(angle: float, to_low: float, to_high: float, low_offset: float, h
 
 
 @kernel
-def solve(  # noqa: C901, PLR0912
+def solve(
     arm: ArmConstants, joints: Joints, T: Reals, q_ref: Reals, keep_folds: bool, keep_free: bool, out: Slots
 ) -> None:
     """Solve poses in closed form, all eight branches [1]_ [2]_. Kernel.
@@ -161,41 +161,56 @@ def solve(  # noqa: C901, PLR0912
             x = subtract(add(rotated(v, arm.axis_1, c, s), arm.point_1), arm.point_2)
             x = subtract(x, scaled(arm.axis_2, dot(arm.axis_2, x)))
             axis_6_1, beside_6_1 = rotated(axis_6, arm.axis_1, c, s), rotated(beside_6, arm.axis_1, c, s)
+            part = slice(4 * shoulder, 4 * shoulder + 4)
+            for slot in range(4):
+                q[n, 4 * shoulder + slot, 0] = theta_1
+            rows = q[n, part], fault[n, part], gap[n, part]
+            _solve_elbows(arm, joints, (x, axis_6_1, beside_6_1), q_ref[n], (keep_folds, keep_free), rows)
 
-            D = np.sqrt(dot(x, x))
-            far, near = D - arm.reach, arm.min_reach - D
-            if far > BOUNDARY_M or near > BOUNDARY_M:
-                for slot in range(4 * shoulder, 4 * shoulder + 4):
-                    fault[n, slot] = TOO_FAR if far > 0 else TOO_NEAR
-                    gap[n, slot] = max(far, near)
-                continue
-            bend = 2.0 * np.arctan2(
-                np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.min_reach))
-            )
-            if keep_folds:
-                bend = _off_folds(bend, -far, -near, FOLD_OFFSET, arm.folded_offset)
-            for elbow in range(2):
-                turn = (bend if elbow == 0 else -bend) - arm.elbow_angle
-                y = add(arm.upper_arm, rotated(arm.forearm, arm.axis_2, np.cos(turn), np.sin(turn)))
-                theta_2 = signed_angle(y, x, arm.axis_2)
-                if D < FREE:
-                    theta_2 = direction[1] * q_ref[n, 1] + offset[1] + (np.pi if keep_free and elbow == 1 else 0.0)
-                # Axes 2 and 3 are parallel, so one rotation undoes both joints.
-                c, s = np.cos(theta_2 + turn), -np.sin(theta_2 + turn)
-                slot = 4 * shoulder + 2 * elbow
-                for wrist in range(2):
-                    q[n, slot + wrist, 0] = theta_1
-                    q[n, slot + wrist, 1] = theta_2
-                    q[n, slot + wrist, 2] = arm.elbow_sign * turn
-                free_4, pair = direction[3] * q_ref[n, 3] + offset[3], q[n, slot : slot + 2]
-                axis_6_3, beside_6_3 = rotated(axis_6_1, arm.axis_2, c, s), rotated(beside_6_1, arm.axis_2, c, s)
-                beyond = _solve_wrist(arm, axis_6_3, beside_6_3, free_4, keep_folds, keep_free, pair)
-                for wrist in range(slot, slot + 2):
-                    if beyond > BOUNDARY_RAD:
-                        fault[n, wrist] = ORIENTATION
-                        gap[n, wrist] = beyond
-                    for j in range(6):
-                        q[n, wrist, j] = _wrap(direction[j] * (q[n, wrist, j] - offset[j]))
+
+@inner_kernel
+def _solve_elbows(
+    arm: ArmConstants,
+    joints: Joints,
+    seen: tuple[Vector, Vector, Vector],
+    q_ref: Reals,
+    keep: tuple[bool, bool],
+    rows: Slots,
+) -> None:
+    """Solve the four rows of one shoulder branch, whose first column holds theta_1, by both elbows and wrists.
+
+    ``seen``: the wrist centre across axis 2, axis 6 and the vector across it, turned back by joint 1.
+    """
+    (direction, offset), (x, axis_6, beside_6) = joints, seen
+    (keep_folds, keep_free), (q, fault, gap) = keep, rows
+    D = np.sqrt(dot(x, x))
+    far, near = D - arm.reach, arm.min_reach - D
+    if far > BOUNDARY_M or near > BOUNDARY_M:
+        q[:, 0] = np.nan
+        fault[:] = TOO_FAR if far > 0 else TOO_NEAR
+        gap[:] = max(far, near)
+        return
+    bend = 2.0 * np.arctan2(np.sqrt(max(-far, 0.0) * (arm.reach + D)), np.sqrt(max(-near, 0.0) * (D + arm.min_reach)))
+    if keep_folds:
+        bend = _off_folds(bend, -far, -near, FOLD_OFFSET, arm.folded_offset)
+    for elbow in range(2):
+        turn = (bend if elbow == 0 else -bend) - arm.elbow_angle
+        y = add(arm.upper_arm, rotated(arm.forearm, arm.axis_2, np.cos(turn), np.sin(turn)))
+        theta_2 = signed_angle(y, x, arm.axis_2)
+        if D < FREE:
+            theta_2 = direction[1] * q_ref[1] + offset[1] + (np.pi if keep_free and elbow == 1 else 0.0)
+        # Axes 2 and 3 are parallel, so one rotation undoes both joints.
+        c, s = np.cos(theta_2 + turn), -np.sin(theta_2 + turn)
+        for slot in range(2 * elbow, 2 * elbow + 2):
+            q[slot, 1], q[slot, 2] = theta_2, arm.elbow_sign * turn
+        free_4, pair = direction[3] * q_ref[3] + offset[3], q[2 * elbow : 2 * elbow + 2]
+        axis_6_3, beside_6_3 = rotated(axis_6, arm.axis_2, c, s), rotated(beside_6, arm.axis_2, c, s)
+        beyond = _solve_wrist(arm, axis_6_3, beside_6_3, free_4, keep_folds, keep_free, pair)
+        for slot in range(2 * elbow, 2 * elbow + 2):
+            if beyond > BOUNDARY_RAD:
+                fault[slot], gap[slot] = ORIENTATION, beyond
+            for j in range(6):
+                q[slot, j] = _wrap(direction[j] * (q[slot, j] - offset[j]))
 
 
 @inner_kernel

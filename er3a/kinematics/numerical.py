@@ -6,12 +6,12 @@ limit that the step would leave are held there (projected Gauss-Newton). A start
 one; random numbers depend on seed, pose and start alone [4]_.
 
 ``LANES`` poses are iterated in parallel, so that the arithmetic becomes vector instructions; a lane that is done takes
-the next pose. The result of a lane depends on its own pose only. Its six equations with a symmetric positive matrix are
-solved by Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries of
-the lower factor, ``r_i`` the reciprocals of its diagonal.
+the next pose. The result of a lane depends on its own pose only. The damped step is ``-J^T y`` with
+``(J J^T + damping) y = e``: six equations for any number of joints. Their symmetric positive matrix is solved by
+Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries of the lower
+factor, ``r_i`` the reciprocals of its diagonal.
 
-Arms with another number of joints, or with prismatic or coupled ones, take the same steps without lanes. Values of
-prismatic joints are divided by the arm's length.
+Steps of prismatic joints are counted in parts of the arm's length; coupled joints have the sum of their rows' columns.
 
 References
 ----------
@@ -27,12 +27,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Integral, Real
+from typing import NamedTuple
 
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.geometry.transforms import check_poses
-from er3a.kinematics.chain import arm_length, constant_links, joint_starts, multiply_rigid, post_rotate_z
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import (
     BadGuess,
@@ -53,6 +54,7 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import shortest_move
 
 LANES = 32  # four or more vectors of any processor, while the scratch memory stays in its cache
+TOGETHER = 3  # columns whose products are added at a time; J has room for a multiple
 MIN_PIVOT = 1e-15  # keeps the root of a pivot that rounding has made negative
 
 
@@ -113,37 +115,74 @@ PATIENCE = 3  # ... within so many iterations
 MIN_DAMPING = 1e-15  # keeps the normal matrix positive at the solution
 
 # Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
-_FRAME, _TARGET, _Q, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 36, 39, 40, 41
-_STEP, _FREE, _SCALE, _TURNS, _ROWS = 42, 48, 54, 55, 57
+_FRAME, _TARGET, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 33, 34, 35
+_Y, _SCALE, _TURNS, _MOVED, _ROWS = 36, 42, 43, 45, 46
 
-Arm = tuple[Reals, Reals, Reals]  # direction, offset, links
+Arm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
+"""Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n) or none (0, n), each joint's unit
+(n,): 1, or the arm's length in m if it slides."""
 Limits = tuple[Reals, Reals, bool]  # lower, upper, and whether the iteration keeps to them
 Goal = tuple[Reals, Reals, float]  # mask, tolerances, length
 Draws = tuple[int, np.uint64, int]  # restarts, seed, number of the first pose
+
+
+class Lanes(NamedTuple):
+    """Scratch memory of ``LANES`` poses, flat.
+
+    ``w`` has ``_ROWS`` rows; joints ``q`` and their steps n each; columns ``J`` of the joints and those of the table's
+    rows 6 n and 6 m (one array without coupling); the equations ``A`` 36.
+    """
+
+    w: Reals
+    q: Reals
+    step: Reals
+    J: Reals
+    of_rows: Reals
+    A: Reals
+
+
+@kernel
+def new_lanes(arm: Arm) -> Lanes:
+    """Scratch memory for an arm of n joints and m rows. Kernel.
+
+    Parameters
+    ----------
+    arm : see ``Arm``
+
+    Returns
+    -------
+    lanes : zeros; without coupling the columns of the rows are those of the joints
+    """
+    n = arm[5].shape[0]
+    J = np.zeros((n + TOGETHER - 1) // TOGETHER * TOGETHER * 6 * LANES)
+    of_rows = J if arm[4].shape[0] == 0 else np.zeros(6 * arm[0].shape[0] * LANES)
+    x, step = np.zeros(n * LANES), np.zeros(n * LANES)
+    return Lanes(np.zeros(_ROWS * LANES), x, step, J, of_rows, np.zeros(36 * LANES))
 
 
 @kernel
 def solve_numerically(
     arm: Arm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
 ) -> None:
-    """Solve poses of an arm of six revolute joints by iteration, ``LANES`` at a time. Kernel.
+    """Solve poses of any arm by iteration, ``LANES`` at a time. Kernel.
 
     Random starts depend on the pose's number. Where no start reaches the tolerances, ``q`` is the nearest arm found and
     ``starts`` is 0.
 
     Parameters
     ----------
-    arm : direction and offset (6,), links (7, 4, 4)
-    limits : lower and upper (6,), rad, and whether to keep to them
+    arm : see ``Arm``
+    limits : lower and upper (n,), rad or m, and whether to keep to them
     T : (N, 4, 4), m
-    q0 : (N, 6), rad, first start
+    q0 : (N, n), rad or m, first start
     goal : mask (6,), tolerances (m, rad), length (m)
     draws : restarts, seed, number of the first pose
-    out : fills ``q`` (N, 6), rad, ``error`` (N, 2) in m and rad, ``starts`` (N,)
+    out : fills ``q`` (N, n), ``error`` (N, 2) in m and rad, ``starts`` (N,)
     """
-    (lower, upper, respect), (mask, tolerances, length), (restarts, _, _) = limits, goal, draws
+    (mask, tolerances, length), (restarts, _, _) = goal, draws
     q, error, starts = out
-    w, J, A = np.zeros(_ROWS * LANES), np.zeros(36 * LANES), np.zeros(36 * LANES)
+    lanes = new_lanes(arm)
+    w = lanes.w
     pose, start, count = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     mark, since, best = np.empty(LANES), np.zeros(LANES, np.int64), np.empty(LANES)
     taken, active = 0, 0
@@ -151,11 +190,11 @@ def solve_numerically(
         _take(w, i, T, min(taken, T.shape[0] - 1))
         if taken < T.shape[0]:
             pose[i], start[i], count[i], mark[i], since[i], best[i] = taken, 0, 0, np.inf, 0, np.inf
-            _begin(w, i, q0, taken, 0, limits, draws)
+            _begin(lanes.q, i, q0, taken, 0, limits, draws)
             taken += 1
             active += 1
     while active > 0:
-        _evaluate(arm, mask, length, w, J)
+        _evaluate(arm, mask, length, lanes)
         for i in range(LANES):
             n = pose[i]
             w[_SCALE * LANES + i] = 1.0
@@ -173,13 +212,13 @@ def solve_numerically(
                 continue
             if solved or square < best[i] or start[i] == 0:
                 best[i], error[n, 0], error[n, 1], starts[n] = square, position, rotation, 0
-                for j in range(6):
-                    q[n, j] = w[(_Q + j) * LANES + i]
+                for j in range(q.shape[1]):
+                    q[n, j] = lanes.q[j * LANES + i]
             w[_SCALE * LANES + i] = 0.0
             count[i], mark[i], since[i] = 0, np.inf, 0
             if not solved and start[i] < restarts:
                 start[i] += 1
-                _begin(w, i, q0, n, start[i], limits, draws)
+                _begin(lanes.q, i, q0, n, start[i], limits, draws)
                 continue
             starts[n] = start[i] + 1 if solved else 0
             pose[i], start[i], best[i] = -1, 0, np.inf
@@ -187,10 +226,10 @@ def solve_numerically(
             if taken < T.shape[0]:
                 pose[i] = taken
                 _take(w, i, T, taken)
-                _begin(w, i, q0, taken, 0, limits, draws)
+                _begin(lanes.q, i, q0, taken, 0, limits, draws)
                 taken += 1
                 active += 1
-        _step(lower, upper, respect, w, J, A)
+        _step(arm[5], limits, lanes)
 
 
 @kernel
@@ -222,36 +261,60 @@ def _take(w: Reals, i: int, T: Reals, n: int) -> None:
 
 
 @kernel
-def _begin(w: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
+def _begin(q: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
     """Set a lane's joints to a start: the guess, or a random one within the limits."""
     (lower, upper, respect), (_, seed, first) = limits, draws
-    for j in range(6):
+    for j in range(q0.shape[1]):
         angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
         if respect:
             angle = min(max(angle, lower[j]), upper[j])
-        w[(_Q + j) * LANES + i] = angle
+        q[j * LANES + i] = angle
 
 
 @kernel
-def _evaluate(arm: Arm, mask: Reals, length: float, w: Reals, J: Reals) -> None:
-    """Pose errors in the target's tool frame and their derivatives by the joints, masked; J[k] holds 6 rows."""
-    direction, offset, links = arm
+def _evaluate(arm: Arm, mask: Reals, length: float, lanes: Lanes) -> None:
+    """Pose errors in the target's tool frame and their derivatives by the joints, masked; a column holds 6 rows."""
+    direction, start, links, sliding, coupling, units = arm
+    w, J, of_rows = lanes.w, lanes.J, lanes.of_rows
     for r in range(3):
         for c in range(4):
             w[(4 * r + c) * LANES : (4 * r + c + 1) * LANES] = links[0, r, c]
-    for k in range(6):
-        _joint(direction[k], offset[k], links[k + 1], k, w, J[6 * k * LANES : (6 * k + 6) * LANES])
+    for k in range(direction.shape[0]):
+        moved = lanes.q[k * LANES : (k + 1) * LANES]
+        if coupling.shape[0] > 0:
+            moved = w[_MOVED * LANES : (_MOVED + 1) * LANES]
+            moved[:] = 0.0
+            for j in range(units.shape[0]):
+                _add(moved, coupling[k, j], lanes.q[j * LANES : (j + 1) * LANES])
+        column = of_rows[6 * k * LANES : (6 * k + 6) * LANES]
+        _joint(direction[k], start[k], sliding[k], links[k + 1], moved, w, column)
     _pose_error(mask, length, w)
-    for k in range(6):
-        _column(mask, length, w, J[6 * k * LANES : (6 * k + 6) * LANES])
+    for k in range(direction.shape[0]):
+        _column(mask, length, sliding[k], w, of_rows[6 * k * LANES : (6 * k + 6) * LANES])
+    for j in range(units.shape[0]):
+        column = J[6 * j * LANES : (6 * j + 6) * LANES]
+        if coupling.shape[0] > 0:
+            column[:] = 0.0
+            for k in range(direction.shape[0]):
+                _add(column, coupling[k, j], of_rows[6 * k * LANES : (6 * k + 6) * LANES])
+        if units[j] != 1.0:
+            for i in range(6 * LANES):
+                column[i] *= units[j]
+
+
+@inner_kernel
+def _add(total: Reals, factor: float, part: Reals) -> None:
+    """Add a multiple of rows to others."""
+    for i in range(total.shape[0]):
+        total[i] += factor * part[i]
 
 
 @kernel
-def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Reals) -> None:
-    """Keep the joint's point and axis, then go over its rotation and its link."""
-    angles, turns = w[(_Q + k) * LANES : (_Q + k + 1) * LANES], w[_TURNS * LANES : (_TURNS + 2) * LANES]
+def _joint(sign: float, zero: float, slides: bool, link: Reals, moved: Reals, w: Reals, column: Reals) -> None:
+    """Keep the joint's point and axis, then go over its rotation, or its shift, and its link."""
+    turns = w[_TURNS * LANES : (_TURNS + 2) * LANES]
     for i in range(LANES):
-        turns[i], turns[LANES + i] = cos_sin(sign * angles[i] + zero)
+        turns[i], turns[LANES + i] = cos_sin(0.0 if slides else sign * moved[i] + zero)
     a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
     d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
     g, h, m, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
@@ -267,6 +330,9 @@ def _joint(sign: float, zero: float, link: Reals, k: int, w: Reals, column: Real
             row[LANES + i] = p * b + s * e + t * h
             row[2 * LANES + i] = p * c + s * f + t * m
             row[3 * LANES + i] += p * x + s * y + t * z
+        if slides:  # the axis, which the shift goes along
+            for i in range(LANES):
+                row[3 * LANES + i] += axis[i] * moved[i]
 
 
 @inner_kernel
@@ -308,14 +374,16 @@ def _pose_error(mask: Reals, length: float, w: Reals) -> None:
 
 
 @inner_kernel
-def _column(mask: Reals, length: float, w: Reals, column: Reals) -> None:
-    """One joint's column: a point and an axis in, the derivative of the pose error out."""
+def _column(mask: Reals, length: float, slides: bool, w: Reals, column: Reals) -> None:
+    """One row's column: a point and an axis in, the derivative of the pose error out."""
     m0, m1, m2, m3, m4, m5 = mask[0] / length, mask[1] / length, mask[2] / length, mask[3], mask[4], mask[5]
     for i in range(LANES):
         rx, ry, rz = w[3 * LANES + i] - column[i], w[7 * LANES + i] - column[LANES + i], w[11 * LANES + i]
         rz = rz - column[2 * LANES + i]
         ax, ay, az = column[3 * LANES + i], column[4 * LANES + i], column[5 * LANES + i]
         vx, vy, vz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
+        if slides:
+            vx, vy, vz, ax, ay, az = ax, ay, az, 0.0, 0.0, 0.0
         column[i] = (w[12 * LANES + i] * vx + w[16 * LANES + i] * vy + w[20 * LANES + i] * vz) * m0
         column[LANES + i] = (w[13 * LANES + i] * vx + w[17 * LANES + i] * vy + w[21 * LANES + i] * vz) * m1
         column[2 * LANES + i] = (w[14 * LANES + i] * vx + w[18 * LANES + i] * vy + w[22 * LANES + i] * vz) * m2
@@ -331,6 +399,35 @@ def _column(mask: Reals, length: float, w: Reals, column: Reals) -> None:
         column[5 * LANES + i] = -(bz - 0.5 * cz + squared * (wx * cy - wy * cx)) * m5
 
 
+@kernel
+def _step(units: Reals, limits: Limits, lanes: Lanes) -> None:
+    """Move by a damped step, by Cholesky factors; joints that press against a limit stay."""
+    lower, upper, respect = limits
+    A, e, y = lanes.A, lanes.w[_E * LANES : (_E + 6) * LANES], lanes.w[_Y * LANES : (_Y + 6) * LANES]
+    for i in range(LANES):
+        total = 0.0
+        for r in range(6):
+            y[r * LANES + i] = e[r * LANES + i]
+            total += e[r * LANES + i] * e[r * LANES + i]
+        for r in range(6):
+            for c in range(r):
+                A[(6 * r + c) * LANES + i] = 0.0
+            A[7 * r * LANES + i] = DAMPING * total + MIN_DAMPING
+    if respect:
+        for j in range(units.shape[0]):
+            column, angle = lanes.J[6 * j * LANES : (6 * j + 6) * LANES], lanes.q[j * LANES : (j + 1) * LANES]
+            _hold(lower[j], upper[j], e, column, angle)
+    for j in range(0, lanes.J.shape[0], 6 * TOGETHER * LANES):
+        for r in range(6):
+            for c in range(r + 1):
+                entry = A[(6 * r + c) * LANES : (6 * r + c + 1) * LANES]
+                _add_products(lanes.J[j + r * LANES :], lanes.J[j + c * LANES :], entry)
+    solve_by_cholesky(A, y)
+    for j in range(units.shape[0]):
+        _dot_rows(lanes.J[6 * j * LANES : (6 * j + 6) * LANES], y, lanes.step[j * LANES : (j + 1) * LANES])
+    _move(units, limits, lanes)
+
+
 @inner_kernel
 def _dot_rows(a: Reals, b: Reals, out: Reals) -> None:
     """Sum over 6 rows of the products of two columns."""
@@ -340,205 +437,41 @@ def _dot_rows(a: Reals, b: Reals, out: Reals) -> None:
         out[i] = total + a[5 * LANES + i] * b[5 * LANES + i]
 
 
-@kernel
-def _step(lower: Reals, upper: Reals, respect: bool, w: Reals, J: Reals, A: Reals) -> None:
-    """Move by a damped step, by Cholesky factors; joints that press against a limit stay."""
-    e, damping = w[_E * LANES : (_E + 6) * LANES], w[_SQUARED * LANES : (_SQUARED + 1) * LANES]
+@inner_kernel
+def _add_products(a: Reals, b: Reals, out: Reals) -> None:
+    """Add the products of two components of ``TOGETHER`` neighbouring columns."""
     for i in range(LANES):
-        total = 0.0
-        for r in range(6):
-            total += e[r * LANES + i] * e[r * LANES + i]
-        damping[i] = DAMPING * total + MIN_DAMPING
-    for k in range(6):
-        column = J[6 * k * LANES : (6 * k + 6) * LANES]
-        gradient = w[(_STEP + k) * LANES : (_STEP + k + 1) * LANES]
-        free, angle = w[(_FREE + k) * LANES : (_FREE + k + 1) * LANES], w[(_Q + k) * LANES : (_Q + k + 1) * LANES]
-        _dot_rows(column, e, gradient)
-        low, high = lower[k], upper[k]
-        for i in range(LANES):
-            pressed = ((angle[i] <= low) & (gradient[i] > 0.0)) | ((angle[i] >= high) & (gradient[i] < 0.0))
-            free[i] = 0.0 if pressed & respect else 1.0
-            gradient[i] = -gradient[i] * free[i]
-        for j in range(k + 1):
-            entry = A[(6 * k + j) * LANES : (6 * k + j + 1) * LANES]
-            _dot_rows(column, J[6 * j * LANES : (6 * j + 6) * LANES], entry)
-            other = w[(_FREE + j) * LANES : (_FREE + j + 1) * LANES]
-            for i in range(LANES):
-                entry[i] = entry[i] * free[i] * other[i]
-        pivot = A[7 * k * LANES : (7 * k + 1) * LANES]
-        for i in range(LANES):
-            pivot[i] = pivot[i] + damping[i] + (1.0 - free[i])
-    solve_by_cholesky(A, w[_STEP * LANES : (_STEP + 6) * LANES])
-    _move(lower, upper, respect, w)
-
-
-@kernel
-def _move(lower: Reals, upper: Reals, respect: bool, w: Reals) -> None:
-    """Add the step, at most ``LONGEST_STEP`` for any joint, to the lanes that are to move."""
-    scale = w[_SCALE * LANES : (_SCALE + 1) * LANES]
-    step = w[_STEP * LANES : (_STEP + 6) * LANES]
-    for i in range(LANES):
-        longest = LONGEST_STEP
-        for k in range(6):
-            longest = max(longest, abs(step[k * LANES + i]))
-        scale[i] = scale[i] * (LONGEST_STEP / longest)
-    for k in range(6):
-        angle, low, high = w[(_Q + k) * LANES : (_Q + k + 1) * LANES], lower[k], upper[k]
-        for i in range(LANES):
-            moved = angle[i] + scale[i] * step[k * LANES + i]
-            angle[i] = min(max(moved, low), high) if respect else moved
-
-
-ABOVE_ROUNDING = 1e-13  # of the normal matrix, which is singular where the arm is
-
-AnyArm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
-"""Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n), each joint's unit (n,), 1 or m."""
-
-
-@kernel
-def solve_any(
-    arm: AnyArm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
-) -> None:
-    """Solve poses of any arm by iteration, one after another. Kernel.
-
-    Parameters
-    ----------
-    arm : see ``AnyArm``
-    limits : lower and upper (n,), rad or m, and whether to keep to them
-    T : (N, 4, 4), m
-    q0 : (N, n), rad or m, first start
-    goal : mask (6,), tolerances (m, rad), length (m)
-    draws : restarts, seed, number of the first pose
-    out : fills ``q`` (N, n), ``error`` (N, 2) in m and rad, ``starts`` (N,), 0 where none succeeded
-    """
-    (lower, upper, respect), (_, tolerances, length), (restarts, seed, first) = limits, goal, draws
-    q, error, starts = out
-    n = lower.shape[0]
-    x, best, e, J = np.empty(n), np.empty(n), np.empty(6), np.empty((6, n))
-    for pose in range(T.shape[0]):
-        smallest = np.inf
-        starts[pose] = 0
-        for start in range(restarts + 1):
-            for j in range(n):
-                drawn = lower[j] + uniform(seed, first + pose, start, j) * (upper[j] - lower[j])
-                x[j] = q0[pose, j] if start == 0 else drawn
-                if respect:
-                    x[j] = min(max(x[j], lower[j]), upper[j])
-            position, rotation = _descend(arm, limits, T[pose], goal, x, e, J)
-            square = (position / length) ** 2 + rotation**2
-            solved = position <= tolerances[0] and rotation <= tolerances[1]
-            if solved or square < smallest:
-                smallest, error[pose, 0], error[pose, 1] = square, position, rotation
-                best[:] = x
-            if solved:
-                starts[pose] = start + 1
-                break
-        q[pose] = best
+        total = a[i] * b[i] + a[6 * LANES + i] * b[6 * LANES + i]
+        out[i] += total + a[12 * LANES + i] * b[12 * LANES + i]
 
 
 @inner_kernel
-def _descend(arm: AnyArm, limits: Limits, T: Reals, goal: Goal, x: Reals, e: Reals, J: Reals) -> tuple[float, float]:
-    """Iterate from x; returns the errors in position (m) and rotation (rad) where it ends."""
-    (lower, upper, respect), (mask, tolerances, length) = limits, goal
-    n, mark, since = x.shape[0], np.inf, 0
-    free = np.ones(n, np.bool_)
-    units = arm[5]
-    position, rotation = _evaluate_any(arm, T, mask, length, x, e, J)
-    for _ in range(MAX_ITERATIONS):
-        square = (position / length) ** 2 + rotation**2
-        if position <= tolerances[0] and rotation <= tolerances[1]:
-            break
-        if square < STALLED * mark:
-            mark, since = square, 0
-        else:
-            since += 1
-            if since > PATIENCE:
-                break
-        gradient = -(J.T @ e)
-        for j in range(n):
-            at_low, at_high = x[j] <= lower[j], x[j] >= upper[j]
-            free[j] = not (respect and ((at_low and gradient[j] < 0.0) or (at_high and gradient[j] > 0.0)))
-        M = J.T @ J
-        smallest = MIN_DAMPING + ABOVE_ROUNDING * np.trace(M)
-        for i in range(n):
-            for j in range(n):
-                if not (free[i] and free[j]):
-                    M[i, j] = 0.0
-            M[i, i] += DAMPING * square + smallest + (0.0 if free[i] else 1.0)
-            if not free[i]:
-                gradient[i] = 0.0
-        step = np.linalg.solve(M, gradient)
-        longest = max(LONGEST_STEP, np.abs(step).max())
-        for j in range(n):
-            x[j] += step[j] * units[j] * LONGEST_STEP / longest
-            if respect:
-                x[j] = min(max(x[j], lower[j]), upper[j])
-        position, rotation = _evaluate_any(arm, T, mask, length, x, e, J)
-    return position, rotation
+def _hold(low: float, high: float, e: Reals, column: Reals, angle: Reals) -> None:
+    """Make a joint's column 0 in lanes where it is at a limit that the step would leave."""
+    for i in range(LANES):
+        gradient = column[i] * e[i]
+        for r in range(1, 6):
+            gradient += column[r * LANES + i] * e[r * LANES + i]
+        pressed = ((angle[i] <= low) & (gradient > 0.0)) | ((angle[i] >= high) & (gradient < 0.0))
+        for r in range(6):
+            column[r * LANES + i] = 0.0 if pressed else column[r * LANES + i]
 
 
 @kernel
-def _evaluate_any(
-    arm: AnyArm, T: Reals, mask: Reals, length: float, x: Reals, e: Reals, J: Reals
-) -> tuple[float, float]:
-    """Masked pose error ``e`` (6,) in the target's tool frame and its derivatives ``J`` (6, n) by the joints."""
-    direction, start, links, sliding, coupling, units = arm
-    m, n = direction.shape[0], x.shape[0]
-    columns = np.zeros((6, m))
-    frame, other = links[0].copy(), np.empty((4, 4))
-    for k in range(m):
-        along = start[k]
-        for j in range(n):
-            along += direction[k] * coupling[k, j] * x[j]
-        for i in range(3):
-            columns[3 + i, k], columns[i, k] = frame[i, 2] * direction[k], frame[i, 3]
-        if sliding[k]:
-            for i in range(3):
-                frame[i, 3] += frame[i, 2] * along
-        else:
-            post_rotate_z(frame, np.cos(along), np.sin(along))
-        multiply_rigid(frame, links[k + 1], other)
-        frame, other = other, frame
-    for k in range(m):
-        z = columns[3:, k].copy()
-        if sliding[k]:
-            columns[:3, k] = z
-            columns[3:, k] = 0.0
-        else:
-            r = frame[:3, 3] - columns[:3, k]
-            columns[0, k], columns[1, k] = z[1] * r[2] - z[2] * r[1], z[2] * r[0] - z[0] * r[2]
-            columns[2, k] = z[0] * r[1] - z[1] * r[0]
-    R, S = np.ascontiguousarray(frame[:3, :3]), np.ascontiguousarray(T[:3, :3])
-    w, inverse_left = _rotation_vector(R.T @ S)
-    e[:3] = S.T @ (frame[:3, 3] - T[:3, 3])
-    e[3:] = w
-    linear = S.T @ np.ascontiguousarray(columns[:3]) @ coupling
-    angular = -(inverse_left @ (R.T @ np.ascontiguousarray(columns[3:]))) @ coupling
-    for i in range(3):
-        e[i] *= mask[i]
-        e[3 + i] *= mask[3 + i]
-        for j in range(n):
-            J[i, j], J[3 + i, j] = linear[i, j] * units[j] * mask[i] / length, angular[i, j] * units[j] * mask[3 + i]
-    position: float = np.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2)
-    rotation: float = np.sqrt(e[3] ** 2 + e[4] ** 2 + e[5] ** 2)
-    e[:3] /= length
-    return position, rotation
-
-
-@kernel
-def _rotation_vector(D: Reals) -> tuple[Reals, Reals]:
-    """Rotation vector (3,) of a rotation matrix, and the inverse of its left Jacobian (3, 3)."""
-    w = np.array([0.5 * (D[2, 1] - D[1, 2]), 0.5 * (D[0, 2] - D[2, 0]), 0.5 * (D[1, 0] - D[0, 1])])
-    cosine, sine = 0.5 * (D[0, 0] + D[1, 1] + D[2, 2] - 1.0), np.sqrt(w @ w)
-    squared = 1.0 / 12.0
-    if sine > 1e-8:
-        theta = np.arctan2(sine, cosine)
-        w *= theta / sine
-        squared = 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * sine)
-    elif cosine < 0.0:
-        w[:] = np.pi
-    K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
-    return w, np.eye(3) - 0.5 * K + squared * (K @ K)
+def _move(units: Reals, limits: Limits, lanes: Lanes) -> None:
+    """Add the step, at most ``LONGEST_STEP`` for any joint, to the lanes that are to move."""
+    lower, upper, respect = limits
+    scale, step = lanes.w[_SCALE * LANES : (_SCALE + 1) * LANES], lanes.step
+    for i in range(LANES):
+        longest = LONGEST_STEP
+        for k in range(units.shape[0]):
+            longest = max(longest, abs(step[k * LANES + i]))
+        scale[i] = scale[i] * (LONGEST_STEP / longest)
+    for k in range(units.shape[0]):
+        angle, low, high = lanes.q[k * LANES : (k + 1) * LANES], lower[k], upper[k]
+        for i in range(LANES):
+            moved = angle[i] - scale[i] * step[k * LANES + i] * units[k]
+            angle[i] = min(max(moved, low), high) if respect else moved
 
 
 RESTARTS = 500  # random starts of a caller who names no other number
@@ -742,21 +675,16 @@ class _Search:
         low, high = (for_kernel(each) for each in ((robot.lower, robot.upper) if respect else self.without_limits()))
         limits, mask, tolerances = (low, high, respect), for_kernel(self.mask), for_kernel(self.tolerances)
         T, q0, length = for_kernel(T), for_kernel(q0), arm_length(robot)
-        plain = robot.joints == robot.rows == 6 and robot.coupling is None and not robot.sliding.any()
-        links = for_kernel(constant_links(robot))
-        lanes = for_kernel(robot.direction), for_kernel(robot.offset), links
-        coupling = for_kernel(np.eye(robot.rows) if robot.coupling is None else robot.coupling)
+        links, none = for_kernel(constant_links(robot)), np.empty((0, robot.joints))
+        coupling = for_kernel(none if robot.coupling is None else robot.coupling)
         units = for_kernel(np.where(robot.slides, length, 1.0))
         starts_at, sliding = for_kernel(joint_starts(robot)), for_kernel(robot.sliding)
-        each = for_kernel(robot.direction), starts_at, links, sliding, coupling, units
+        arm = for_kernel(robot.direction), starts_at, links, sliding, coupling, units
 
         def part(rows: slice) -> None:
             goal, draws = (mask, tolerances, length), (restarts, np.uint64(self.seed), rows.start)
             out = q[rows], error[rows], starts[rows]
-            if plain:
-                solve_numerically(lanes, limits, T[rows], q0[rows], goal, draws, out)
-            else:
-                solve_any(each, limits, T[rows], q0[rows], goal, draws, out)
+            solve_numerically(arm, limits, T[rows], q0[rows], goal, draws, out)
 
         parallel_for(count, threads, SMALLEST_PART, part)
         return (q if respect else unwound(robot, q)), error, starts

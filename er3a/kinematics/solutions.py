@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import MAX_ROWS, ByValue, Displayed, Finding, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Finding, Sheet, shortly
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
@@ -138,13 +138,11 @@ class ByClass(Finding):
     ----------
     certain : whether the solver left no doubt that these are all
     named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
-    cuspidal : whether :mod:`er3a.kinematics.cuspidal` was run and joined two solutions without a singularity
     """
 
     arm_class: ArmClassCode
     certain: bool
     named: bool
-    cuspidal: bool = False
 
 
 Method = ClosedForm | ByClass | Iteration
@@ -351,11 +349,12 @@ class Solutions(ByValue, Displayed):
 
         Returns
         -------
-        sheet : one pose: each solution. Many: how many solutions each pose has, or the arm that iteration found for it
+        sheet : one pose: each solution. Many, or a search: how many solutions there are in all
         """
-        if self.position_error is not None:
-            return self._sheet_of_search()
-        return self._sheet_of_pose() if self.q.ndim == 2 else self._sheet_of_batch()
+        if self.q.ndim == 2 and self.position_error is None:
+            return self._sheet_of_pose()
+        poses = int(np.prod(self.solved.shape if self.position_error is not None else self.solved.shape[:-1]))
+        return Sheet(f"Solutions of {poses} poses of {self.robot.name}: {self._counted()} ({self.method.code})")
 
     def _counted(self) -> str:
         """How many rows are solutions, and how many of these are within the limits, in words."""
@@ -383,32 +382,6 @@ class Solutions(ByValue, Displayed):
                 *(f"self-motion: {family!r}" for family in self.families),
                 *(f"unsolved: {shortly(why)}" for why in self.unsolved),
             ),
-        )
-
-    def _sheet_of_batch(self) -> Sheet:
-        """How many solutions each pose has."""
-        solved, inside = (each.sum(axis=-1) for each in (self.solved, self.within_limits))
-        columns, rows = ("pose", "solutions", "within the limits"), zip(range(len(self.q)), solved, inside)
-        heading = f"Solutions of {len(self.q)} poses of {self.robot.name}: {self._counted()}"
-        return Sheet.of_table(heading, columns, rows, len(self.q))
-
-    def _sheet_of_search(self) -> Sheet:
-        """The arm that iteration found for each pose."""
-        q, solved = self.q.reshape(-1, self.robot.joints), self.solved.reshape(-1)
-        first = shown(self.robot, q[:MAX_ROWS])
-        errors = [np.asarray(error).reshape(-1) for error in (self.position_error, self.rotation_error)]
-        rows = (
-            (pose, bool(done), *angles, 1000 * position, turn)
-            for pose, done, angles, position, turn in zip(
-                range(len(q)), solved, first, errors[0], np.degrees(errors[1])
-            )
-        )
-        return Sheet.of_table(
-            f"Search for {len(q)} pose{'s' * (len(q) != 1)} of {self.robot.name}: {np.count_nonzero(solved)} solved",
-            ("pose", "solved", *joint_columns(self.robot), "off_mm", "off_deg"),
-            rows,
-            len(q),
-            facts=tuple(f"unsolved: {shortly(why)}" for why in self.unsolved[:MAX_ROWS]),
         )
 
 

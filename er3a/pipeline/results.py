@@ -87,7 +87,7 @@ class Verdict(Generic[FindingT]):
         """
         return self._lowered(bool(missed), missed=missed)
 
-    def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
+    def with_assumed_shapes(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
         """The verdict where shapes of the arm are assumed.
 
         Parameters

@@ -354,35 +354,6 @@ class FlangeTurn(QuantityAtPose):
 
 
 @dataclass(frozen=True)
-class CarriedCoordinate(QuantityAtPose):
-    """A coordinate (base frame) of a point that the flange carries, at a pose; ``offset_mm`` in the flange's frame."""
-
-    offset_mm: Vector
-    coordinate: Coordinate
-
-    def value(self, state: ModelState) -> Reals:
-        """Coordinate of the carried point at the pose.
-
-        Parameters
-        ----------
-        state : of one model, or of a batch
-
-        Returns
-        -------
-        coordinate : (...), mm, base frame
-        """
-        T = state.at(self.pose)[..., FRAME_OF_POINT["flange"], :3, :]
-        k = COORDINATES.index(self.coordinate)
-        carried: Reals = T[..., k, 3] * MM + T[..., k, :3] @ np.array(self.offset_mm)
-        return carried
-
-    @property
-    def vector(self) -> Hashable:
-        """The carried point's position at the pose, of which this is one coordinate."""
-        return self.pose, self.offset_mm
-
-
-@dataclass(frozen=True)
 class SectionCoordinate(QuantityAtPose):
     """The wrist centre in a side view (joint 1 at 0): x from axis 1, z from axis 2; ``unsigned``: ``|x|``, ``|z|``."""
 

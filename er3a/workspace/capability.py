@@ -8,10 +8,6 @@ Joint 1 only turns everything about its axis, or shifts it. So each cell of the 
 with joint 1 free; the result at another azimuth follows exactly by turning joint 1. With a limited joint 1, azimuths
 are divided into sectors, judged at their middles; so are positions along a prismatic joint 1.
 
-:func:`try_poses` estimates, from random poses, the ratio of the reached poses in a cell that can be held without
-contact; it proves nothing about other poses. A pose counts as reached if a solution within the limits is found, and as
-clear if one of its solutions touches neither the surroundings nor the arm itself.
-
 References
 ----------
 .. [1] F. Zacharias, C. Borst, G. Hirzinger, "Capturing robot workspace structure: representing robot capabilities",
@@ -21,15 +17,13 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.kinematics.block_inverse import BlockConstants
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, wrist_partition_missing
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import kernel
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame, places_served, without_first_limits
@@ -230,63 +224,3 @@ def _tally(places: _Places, within: Flags, values: Reals, out: tuple[Reals, Real
         for sector in range(sectors):
             solutions[cell, sector] /= max(reachability[cell, sector], 1.0)
             reachability[cell, sector] /= within.shape[1]
-
-
-Free = Callable[[Reals], Flags]
-"""Which arms (N, n), rad, are free of collisions, (N,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class ClearPoses:
-    """What came of the poses tried in cells: of ``tries`` in each, how many were reached and clear, both (n,)."""
-
-    tries: int
-    reached: Integers
-    clear: Integers
-
-
-def try_poses(
-    robot: Robot,
-    middles: Reals,
-    places: tuple[Reals, float],
-    tries: int,
-    free: Free,
-    random: np.random.Generator,
-    *,
-    asked: AskedOrientations,
-) -> ClearPoses:
-    """Try random poses with the tool point on the circles (or bars) of cells' middles.
-
-    Parameters
-    ----------
-    robot : with its own limits
-    middles : (n, 2), m, radius and height about axis 1
-    places : their sectors' middles (n,) and width, rad or m
-    tries : poses in each
-    free : which arms count as clear
-    random : the generator
-    asked : the required orientations. Directions: orientations uniform over all; else even among those required
-
-    Returns
-    -------
-    poses : (n,), how many were reached, and how many of these were clear
-    """
-    frame = cell_frame(robot)
-    reached, clear = (np.zeros(len(middles), np.int64) for _ in range(2))
-    for start in range(0, len(middles), step := max(1, _POSES // tries)):
-        part = slice(start, start + step)
-        rho, z = middles[part, 0, None], middles[part, 1, None]
-        at = places[0][part, None] + places[1] * (random.random((len(rho), tries)) - 0.5)
-        points = frame.points(rho, at, z)
-        if asked.kind == "directions":
-            rotations = Rotation.random(at.size, rng=random).as_matrix().reshape(*at.shape, 3, 3)
-        else:
-            rotations = asked.at_random(points.reshape(-1, 3), random).reshape(*at.shape, 3, 3)
-        q, inside = all_solutions(robot, poses(points, rotations).reshape(-1, 4, 4))
-        held = np.zeros(at.size, bool)
-        for slot, within in enumerate(inside.T):  # arms of one branch after another are alike
-            pose = np.flatnonzero(within & ~held)
-            held[pose] = free(q[pose, slot])
-        reached[part] = inside.any(axis=1).reshape(at.shape).sum(axis=1)
-        clear[part] = held.reshape(at.shape).sum(axis=1)
-    return ClearPoses(tries, reached, clear)

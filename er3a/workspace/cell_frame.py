@@ -14,7 +14,7 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.chain_solvers import LockedJoint
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, ChainSolver, PaddedChain
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 from er3a.sampling.grid import tool_bound
@@ -56,26 +56,13 @@ class CellFrame:
         """Of a sector, rad, or of a part of a bar, m."""
         return (self.bar or TURN) / self.sectors
 
-    def place_of(self, sector: Integers) -> Reals:
-        """Middles of sectors.
-
-        Parameters
-        ----------
-        sector : any shape, from 0
-
-        Returns
-        -------
-        place : same shape, rad about axis 1, or m along the bar
-        """
-        return np.asarray(self.width * (sector + (0.5 if self.bar else 0.0)), dtype=float)
-
     def points(self, rho: Reals, place: Reals, z: Reals) -> Reals:
         """Points of cells in the base frame.
 
         Parameters
         ----------
         rho : m, radius, or x across bars
-        place : rad or m, see :meth:`place_of`
+        place : rad about axis 1, or m along the bar
         z : m, height; the three broadcast against each other
 
         Returns

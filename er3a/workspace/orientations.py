@@ -175,26 +175,6 @@ class AskedOrientations:
             return self.plane.tilted_within(points, axis, half_angle, step)
         return tool_rotations(cone_directions(axis, half_angle, step), self.roll)[None]
 
-    def at_random(self, points: Reals, random: np.random.Generator) -> Reals:
-        """One random turn or tilt at each point.
-
-        Parameters
-        ----------
-        points : (n, 3), m, base frame
-        random : the generator
-
-        Returns
-        -------
-        rotations : (n, 3, 3); of tilts with one of the plane's two turns; the identity where only points are asked
-        """
-        turns = 2 * np.pi * random.random(len(points))
-        if self.kind == "turns":
-            return self._about_axis(turns)
-        if self.plane is not None:
-            found = self.plane.tilted(points, np.stack([turns, turns], axis=1)[:, None])[:, 0]
-            return np.asarray(found[np.arange(len(points)), random.integers(2, size=len(points))])
-        return np.broadcast_to(np.eye(3), (len(points), 3, 3))
-
     def _about_axis(self, turns: Reals) -> Reals:
         """The tool turned about the axis by angles (n,), rad: (n, 3, 3)."""
         return np.asarray(Rotation.from_rotvec(turns[:, None] * self.axis).as_matrix() @ self.tool)

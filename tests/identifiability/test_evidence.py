@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -29,7 +29,7 @@ from er3a.identifiability.proposals import (
 )
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.pipeline.stages.validation.checks import parts_found
-from er3a.references.quantities import CarriedCoordinate, PointCoordinate
+from er3a.references.quantities import PointCoordinate, QuantityAtPose
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import Robot
@@ -328,6 +328,23 @@ def test_a_tracker_settles_a_foreign_arm_but_for_how_its_flange_is_turned(random
     found = evidence_of(robot, stated, Documents(), only=tuple(expected))
     for name, statuses in expected.items():
         assert found[name].status in statuses
+
+
+@dataclass(frozen=True)
+class CarriedCoordinate(QuantityAtPose):
+    """A coordinate (base frame, mm) of a point that the flange carries, at a pose."""
+
+    offset_mm: tuple[float, float, float]
+    coordinate: str
+
+    def value(self, state):
+        T = state.at(self.pose)[..., -1, :3, :]
+        k = "xyz".index(self.coordinate)
+        return T[..., k, 3] * 1000 + T[..., k, :3] @ np.array(self.offset_mm)
+
+    @property
+    def vector(self):
+        return self.pose, self.offset_mm
 
 
 @pytest.mark.long

@@ -6,7 +6,6 @@ import re
 import shutil
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from er3a.pipeline.overview.index import write_index
@@ -49,11 +48,7 @@ def test_a_variant_at_the_base_s_own_value_gives_the_base_s_tables(swept):
     tables = sorted(path.name for path in base.glob("*.parquet"))
     assert len(tables) >= 10
     for table in tables:
-        if table == "capability.parquet":  # what is clear rests on shapes of links, which a variant has by default only
-            found, wanted = (pd.read_parquet(folder / table).drop(columns="clear_tries") for folder in (own, base))
-            pd.testing.assert_frame_equal(found, wanted, check_exact=True)
-        else:
-            assert (base / table).read_bytes() == (own / table).read_bytes(), table
+        assert (base / table).read_bytes() == (own / table).read_bytes(), table
 
 
 def test_results_tell_the_base_s_file_and_the_value(swept):

@@ -12,7 +12,6 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics import by_class
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import parameters_of, task_mask
-from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
@@ -203,17 +202,6 @@ def test_axes_that_become_dependent_are_named():
     straight = np.array([0.3, 0.5, 0.0, 0.4, 1.0, 0.2])
     assert dependent_axes(arm(UR5), straight) == (2, 3, 4)
     assert dependent_axes(arm(IIWA), np.array([0.3, 0.5, 0.2, 0.9, 0.4, 0.0, 0.7])) == (5, 7)
-
-
-def test_the_crx_is_cuspidal_and_the_ur_is_not_found_to_be():
-    robot, _ = ARMS["general_six"]
-    move = cuspidal_move(robot)
-    assert np.abs(forward(robot, move.start) - forward(robot, move.end)).max() < 1e-9
-    assert np.abs(wrap_to_pi(move.end - move.start)).max() > 0.1
-    share = np.linspace(0, 1, 2001)[:, None]
-    along = np.linalg.det(scaled_jacobian(robot, move.start + share * (move.end - move.start)))
-    assert (np.sign(along) == np.sign(along[0])).all()
-    assert cuspidal_move(ARMS["three_parallel"][0]) is None
 
 
 def test_a_reference_whose_redundancy_parameters_lead_nowhere_does_not_hide_the_solutions():

@@ -13,7 +13,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.numerical import _E, _Q, _ROWS, _TARGET, LANES, _evaluate, all_found, solve, uniform
+from er3a.kinematics.numerical import _E, _ROWS, _TARGET, LANES, _evaluate, all_found, new_lanes, solve, uniform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import within
@@ -66,14 +66,15 @@ def test_singular_poses_are_solved(robot, random, kind):
 @pytest.mark.long
 def test_jacobian_of_the_error_is_its_derivative(robot, random):
     """Lane k of the scratch memory holds the arm with joint k moved a little."""
-    arm = robot.direction, robot.offset, constant_links(robot)
+    arm = robot.direction, robot.offset, constant_links(robot), robot.sliding, np.empty((0, 6)), np.ones(6)
     step, targets = 1e-6, joints_at_random(robot, random, 20)
     for q, target in zip(joints_at_random(robot, random, 20), targets):
-        w, J = np.zeros((_ROWS, LANES)), np.zeros((6, 6, LANES))
+        lanes = new_lanes(arm)
+        w, J = lanes.w.reshape(_ROWS, LANES), lanes.J.reshape(6, 6, LANES)
         w[_TARGET : _TARGET + 12] = forward(robot, target)[:3].reshape(12, 1)
         moves = np.concatenate([step * np.eye(6), -step * np.eye(6), np.zeros((LANES - 12, 6))])
-        w[_Q : _Q + 6] = (q + moves).T
-        _evaluate(arm, np.ones(6), 0.7, w.reshape(-1), J.reshape(-1))
+        lanes.q.reshape(6, LANES)[:] = (q + moves).T
+        _evaluate(arm, np.ones(6), 0.7, lanes)
         errors = w[_E : _E + 6]
         if np.linalg.norm(errors[3:, 12]) < 2.8:
             by_differences = (errors[:, :6] - errors[:, 6:12]) / (2 * step)

@@ -49,7 +49,7 @@ def test_shapes_that_a_document_gives_need_no_word():
 def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
     shapes = shapes_assumed(load_robot("er3a_c60"), 0.02, {"a": least})
     assert shapes.near == near
-    verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).resting_on(shapes)
+    verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).with_assumed_shapes(shapes)
     assert verdict.status == ("caution" if near else "pass")
     assert say(verdict.findings[-1]).startswith("Link shapes are assumed")
     assert ("not settled: a." in say(shapes)) == bool(near)

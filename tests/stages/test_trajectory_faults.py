@@ -33,7 +33,7 @@ from er3a.pipeline.stages import run
 from er3a.pipeline.stages.dynamics.compute import PathJudge
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, sound_end
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, advised_end
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
 from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
 from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
@@ -302,17 +302,17 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     results = compute(study_of(tmp_path, "line_collides"), ROBOT)
     (path,), rows, limits = results.summary.paths, results.checks, results.summary.joint_limits
-    assert sound_end(path, rows, limits) == path.sound_end
+    assert advised_end(path, rows, limits) == path.sound_end
     assert path.sound_end.t_s == path.clear_until.t_s > 0.5
     passed, crossed = (Singularity(0.5, 0.5, "wrist", crossing, 0.0, None) for crossing in (False, True))
-    assert sound_end(replace(path, singularities=(passed,)), rows, limits).t_s == path.clear_until.t_s
+    assert advised_end(replace(path, singularities=(passed,)), rows, limits).t_s == path.clear_until.t_s
     early = replace(path, singularities=(crossed,))
-    early = replace(early, sound_end=sound_end(early, rows, limits))
+    early = replace(early, sound_end=advised_end(early, rows, limits))
     assert 0.4 < early.sound_end.t_s < 0.5
     assert "keeps" not in advice(early)
-    assert 0.2 < sound_end(path, replace(rows, near_singular=rows.t_s > 0.3), limits).t_s <= 0.3
+    assert 0.2 < advised_end(path, replace(rows, near_singular=rows.t_s > 0.3), limits).t_s <= 0.3
     near = replace(rows, near_singular=rows.t_s >= 0)
-    assert sound_end(path, near, limits) is None
+    assert advised_end(path, near, limits) is None
     nowhere = replace(path, sound_end=None)
     assert "end the path there" not in advised(nowhere, near, results.avoidance, limits)
     assert "near-singular at the start" in advised(nowhere, near, results.avoidance, limits)
@@ -325,7 +325,7 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
     beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
-        replace(beyond, sound_end=sound_end(beyond, rows, limits))
+        replace(beyond, sound_end=advised_end(beyond, rows, limits))
     )
 
 

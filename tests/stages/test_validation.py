@@ -23,7 +23,7 @@ from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.identifiability.reactions import CheckCounts, CheckTally, bases_of
 from er3a.kinematics.forward import frames
-from er3a.kinematics.round_trips import slot_round_trips
+from er3a.kinematics.round_trips import batch_round_trips
 from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.pages import next_step
 from er3a.pipeline.messages.say import say
@@ -373,13 +373,13 @@ def test_table_checks_see_faults_that_a_file_could_not_hold():
 
 
 def test_round_trips_find_the_joints_again(robot):
-    result = slot_round_trips(robot, 3000, 7)
-    assert result.poses == 3000
+    result = batch_round_trips(robot, np.random.default_rng(7), 3000)
+    assert result.poses == result.own_found == 3000
     assert 0 < result.near_singular < 300
     assert result.unsolved == 0
-    assert result.joint_error_deg < 1e-6
-    assert result.position_error_mm < 1e-6
-    assert result.orientation_error_deg < 1e-6
+    assert np.degrees(result.worst_regular) < 1e-6
+    assert 1000 * result.worst_position < 1e-6
+    assert np.degrees(result.worst_orientation) < 1e-6
 
 
 def test_the_page_tells_the_articles_reader(study, stored, tmp_path):

@@ -13,11 +13,9 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Box, Plane, Scene
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
-from er3a.files.scene_file import load_scene
 from er3a.files.yaml_file import load
 from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline.messages.scope import assumed_text
 from er3a.pipeline.stages.workspace.compute import _assumed
@@ -29,10 +27,7 @@ from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.robot import Robot
-from er3a.workspace.capability import try_poses
-from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.directions import cone_directions, poses, roll_of, tool_rotations
-from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import narrowed
 from er3a.workspace.proven import prove_robot
 from er3a.workspace.tool_inverse import InverseUnknown
@@ -104,46 +99,6 @@ def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done
         turns_fully = np.degrees(robot.upper - robot.lower) >= 360
         assert np.where(turns_fully, np.inf, room).min() == pytest.approx(place.limit_margin_deg, abs=1e-6)
         assert room[:, place.limit_joint - 1].min() == pytest.approx(place.limit_margin_deg, abs=1e-6)
-
-
-@pytest.mark.long
-def test_clear_poses_are_some_of_those_reached_and_fewer_among_obstacles(done):
-    robot = load_robot("er3_600")
-    among = tool_capability(robot, settings(), 0.08, load_scene(ROOT / "data/scenes/table_and_post.yaml"))
-    for found in (done, among):
-        cells, clear = found.cells, found.capability.clear
-        assert (cells.clear_tries <= cells.reached_tries).all()
-        assert (cells.reached_tries <= clear.tries).all()
-        assert (clear.reached, clear.clear) == (cells.reached_tries.sum(), cells.clear_tries.sum())
-        assert clear.without == ((cells.reached_tries > 0) & (cells.clear_tries == 0)).sum()
-    assert (among.cells.reached_tries == done.cells.reached_tries).all()
-    assert (among.cells.clear_tries <= done.cells.clear_tries).all()
-    assert 0.1 < among.capability.clear.share < done.capability.clear.share < 1
-    assert among.capability.clear.scene
-    # Every sector holds the share of its azimuths: all poses are reached where directions and rolls are.
-    whole = done.cells.reachability == 1
-    assert not whole.any() or done.cells.reached_tries[whole].mean() > 0.9 * done.capability.clear.tries
-
-
-def test_poses_are_tried_where_the_cells_are():
-    robot = load_robot("er3a_c60")
-    random, seen = np.random.default_rng(1), []
-
-    def free(q):
-        seen.append(q)
-        return np.arange(len(q)) % 2 == 0
-
-    middles, width = np.array([[0.45, 0.3], [0.5, 0.35]]), 2 * np.pi / 64
-    azimuth = np.array([0.3, -0.5])
-    found = try_poses(robot, middles, (azimuth, width), 40, free, random, asked=asked_of(robot, 1))
-    R, origin = cell_frame(robot).R, cell_frame(robot).origin
-    local = (forward(robot, np.concatenate(seen))[:, :3, 3] - origin) @ R.T
-    rho, turned = np.hypot(local[:, 0], local[:, 1]), np.arctan2(local[:, 1], local[:, 0])
-    which = np.argmin(np.abs(rho[:, None] - middles[:, 0]), axis=1)
-    assert np.allclose(rho, middles[which, 0])
-    assert np.allclose(local[:, 2], middles[which, 1])
-    assert np.abs(turned - azimuth[which]).max() <= width / 2 + 1e-12
-    assert 0 < found.clear.sum() <= found.reached.sum() <= 80
 
 
 @pytest.mark.long

@@ -21,7 +21,6 @@ from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.overview.index import condition, proposed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
@@ -34,7 +33,7 @@ from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
-from er3a.pipeline.stages.workspace.page import capability_section, tray
+from er3a.pipeline.stages.workspace.page import tray
 from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
@@ -321,11 +320,7 @@ def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
 GRASPED = {"can": "grasped", "missed": "not graspable"}
 
 
-@pytest.mark.parametrize(
-    ("height", "room"), [("", "x ±75, y −200 to 175, z −200 to 50"), ("Keep.", "x ±75, y −200 to 175")]
-)
-def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be_kept(monkeypatch, height, room):
-    monkeypatch.setattr(capability_section, "range_text", lambda *_: height)
+def test_the_workspace_page_says_how_far_a_tray_can_be_moved():
     results = placed().results
     placement = results.summary.placement
     spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
@@ -333,9 +328,8 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     results.places = None
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    moved = f"Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it "
-    moved = f"{moved}at this place only. {height}".strip()
-    assert rows["Margins"].endswith(moved)
+    moved = "Reach and limits allow to move it by x ±75, y −200 to 175, z −200 to 50 mm, one direction at a time; "
+    assert rows["Margins"].endswith(f"{moved}motions were compared with it at this place only.")
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
     assert "put the tray into the study's scene file as a box, and run again" in rows["What to do first"]
@@ -359,22 +353,6 @@ def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment()
     others = dict(tray_rows(failing, results, results.summary.placement, ""))["Motions"]
     assert others.startswith("No motion passes that it could be in the way of. Others that meet it: <a href=")
     assert "put the tray and its stand into the study's scene file as boxes" in rows["What to do first"]
-
-
-def test_other_heights_of_a_stand_are_told_with_what_they_have_less_of():
-    """Of three heights the lower has half the manipulability, the higher 4 deg less to a joint's limit; the task asks
-    for 2 deg."""
-    placement = placed(over=True).results.summary.placement
-    spot = replace(placement.best, limit_margin_deg=10.0, room_down_m=(0.0, 0, 0.1), room_up_m=(0.0, 0, 0.1))
-    gaps = replace(placement.stands[0], above=spot).gaps_m
-    heights = np.array([[0.35, 0, 0.3], [0.35, 0, 0.4], [0.35, 0, 0.5], [0.0, 0, 0.4]])
-    shares, margins = np.array([0.5, 1, 1.5, 0.1]), np.array([10.0, 8, 4, 0])
-    places = SimpleNamespace(centre_m=heights, manipulability_m3=shares, limit_margin_deg=margins)
-    text = range_text(spot, gaps, placement.task.limit_margin_deg, places)
-    assert "manipulability 50 % of that at 275 mm, 6.0 deg from a joint limit instead of 10.0 deg" in text
-    alone = SimpleNamespace(centre_m=heights[1:2], manipulability_m3=shares[1:2], limit_margin_deg=margins[1:2])
-    assert range_text(spot, gaps, placement.task.limit_margin_deg, alone) == ""
-    assert range_text(spot, None, placement.task.limit_margin_deg, places) == ""  # on a surface itself
 
 
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():

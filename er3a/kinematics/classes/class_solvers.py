@@ -12,7 +12,7 @@ from typing import Literal, Protocol, get_args
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN
+from er3a.geometry.vectors import TURN, Vector
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
@@ -294,12 +294,7 @@ class SphericalWristSolver(WithoutParameters):
         -------
         names : eight, in the order of the slots
         """
-        k = self.constants
-        w1, w2 = np.array(k.axis_1), np.array(k.axis_2)
-        T = poses_of(self.links, x)
-        W = T[:3, 3] + T[:3, :3] @ np.array(k.wrist_in_tool) - np.array(k.point_1)
-        side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
-        return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0)
+        return _names_by_side(self.links, self.constants.wrist_in_tool, x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,11 +355,7 @@ class ParallelAxes(WithoutParameters):
         -------
         names : eight, in the order of the slots
         """
-        axes, points = axes_of(self.arm.links)
-        T = poses_of(self.arm.links, x)
-        W = T[:3, 3] + T[:3, :3] @ np.array(self.arm.constants.wrist_in_tool) - points[0]
-        side = float(np.cross(axes[0], axes[1]) @ _turned_back(W, axes[0], x[0]))
-        return _three_signs(axes[0], axes[1], side if abs(side) > BOUNDARY_M else 1.0)
+        return _names_by_side(self.arm.links, self.arm.constants.wrist_in_tool, x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -641,6 +632,15 @@ def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
     """A vector as seen with joint 1 at 0."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(c * v - s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis)
+
+
+def _names_by_side(links: Reals, wrist_in_tool: Vector, x: Reals) -> tuple[SlotName, ...]:
+    """Names by the side of axis 1 on which the wrist is in the zero pose x (n,), by the elbow and by the wrist."""
+    (w1, w2, *_), points = axes_of(links)
+    T = poses_of(links, x)
+    W = T[:3, 3] + T[:3, :3] @ np.array(wrist_in_tool) - points[0]
+    side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
+    return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0)
 
 
 def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]:

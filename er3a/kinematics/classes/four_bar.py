@@ -97,7 +97,7 @@ class FourBar:
         q = np.empty((*phi.shape, 6))
         q[..., 0], q[..., 4] = self.theta_1, self.theta_5
         q[..., 1], q[..., 2] = first - k.zero_2, k.sense_3 * (bend - k.zero_3)
-        q[..., 3] = k.sense_4 * (phi - k.zero_sum - (first - k.zero_2) - (bend - k.zero_3))
+        q[..., 3] = k.sense_4 * (phi - k.wrist.zero_1 - (first - k.zero_2) - (bend - k.zero_3))
         q[..., 5] = self.sense_6 * (self.total - phi)
         return np.where(np.isfinite(bend)[..., None], wrap_to_pi(q), np.nan)
 
@@ -174,7 +174,7 @@ def turn_of_three(arm: ThreeParallel, x: Reals) -> Reals:
     phi : (...), rad, not wrapped
     """
     k = arm.constants
-    return np.asarray(x[..., 1] + k.sense_3 * x[..., 2] + k.sense_4 * x[..., 3] + k.zero_sum)
+    return np.asarray(x[..., 1] + k.sense_3 * x[..., 2] + k.sense_4 * x[..., 3] + k.wrist.zero_1)
 
 
 def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
@@ -237,7 +237,7 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
         up = 1.0 if z[2] > 0 else -1.0
         # w, axis 5, axis 6 lie in one plane: phi_5 is 0 (axis 6 = w) or pi (against it)
         phi_5 = 0.0 if up > 0 else np.pi
-        if abs(k.cos_w5 * k.cos_56 + k.sin_w5 * k.sin_56 * (1.0 if up > 0 else -1.0) - up) > 1e-9:
+        if abs(k.wrist.cos_12 * k.wrist.cos_23 + up * k.wrist.sin_12 * k.wrist.sin_23 - up) > 1e-9:
             continue
         # Rz(phi) Rx(w5) Rz(phi_5) Rx(-s56) Rz(theta_6): a turn by phi + theta_6, or Rz(phi) Ry(pi) Rz(theta_6)
         total = float(np.arctan2(x[1], x[0])) - phi_5
@@ -248,7 +248,7 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
                 FourBar(
                     arm,
                     float(wrap_to_pi(np.array(theta_1))),
-                    float(wrap_to_pi(np.array(phi_5 - k.zero_5))),
+                    float(wrap_to_pi(np.array(phi_5 - k.wrist.zero_2))),
                     W,
                     total,
                     up,

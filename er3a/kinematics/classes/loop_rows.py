@@ -78,7 +78,7 @@ def new_memory(sliding: Flags) -> LoopMemory:
         stack=np.zeros((100, TERMS + 2)),
         F=np.zeros((6, 9)),
         M=np.zeros((9, 9)),
-        frames=np.zeros((8, 4, 4)),
+        frames=np.zeros((2, 4, 4)),
         J=np.zeros((6, 7)),
         dq=np.zeros(12),
         columns=np.zeros(6, dtype=np.int64),

@@ -27,7 +27,12 @@ import numpy as np
 
 from er3a.geometry.vectors import TURN, Vector
 from er3a.kinematics.chain import axes_of, poses_of, size_of
-from er3a.kinematics.classes.arm_angle import Rows, about_x, about_z, vector_of
+from er3a.kinematics.classes.arm_angle import (
+    Rows,
+    SphericalConstants,
+    spherical_constants,
+    vector_of,
+)
 from er3a.kinematics.classes.polish import newton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
@@ -53,7 +58,8 @@ class ParallelConstants(NamedTuple):
     """The arm in a frame with z on axis 1 and w in the plane of x and z; lengths in m, angles in rad.
 
     ``place`` and ``turn`` bring the base into that frame. Plane coordinates are across w, the first one in the plane of
-    w and axis 1. ``axis_2`` and ``rest`` are axis 2 there and the vector from axis 4 to W at phi = 0.
+    w and axis 1. ``axis_2`` and ``rest`` are axis 2 there and the vector from axis 4 to W at phi = 0. ``wrist`` takes
+    w, axis 5 and axis 6 for three joints through one point; its first angle is phi.
     """
 
     turn: Rows
@@ -70,16 +76,9 @@ class ParallelConstants(NamedTuple):
     rest: tuple[float, float]
     zero_2: float
     zero_3: float
-    zero_5: float
-    zero_sum: float
     sense_3: float
     sense_4: float
-    cos_w5: float
-    sin_w5: float
-    cos_56: float
-    sin_56: float
-    half_sum: tuple[float, float]
-    half_difference: tuple[float, float]
+    wrist: SphericalConstants
     near_m: float
 
 
@@ -140,22 +139,15 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
     first, second, rest = plane[2] - plane[1], plane[3] - plane[2], plane[6] - plane[3]
     zero_2 = float(np.arctan2(first[1], first[0]))
     zero_3 = float(np.arctan2(second[1], second[0])) - zero_2
-    axis_5, axis_6 = to_plane @ axes[4], to_plane @ axes[5]
-    zero_sum = float(np.arctan2(axis_5[1], axis_5[0])) + np.pi / 2
-    w5 = float(np.arctan2(np.hypot(axis_5[0], axis_5[1]), axis_5[2]))
-    s56 = float(np.arctan2(np.linalg.norm(np.cross(axis_5, axis_6)), axis_5 @ axis_6))
-    B = about_z(zero_sum) @ about_x(w5)
-    seen = B.T @ axis_6
-    zero_5 = float(np.arctan2(-seen[0], seen[1]))
-    beside = to_plane.T @ (B @ about_z(zero_5) @ about_x(-s56))[:, 0]
+    spherical, G = spherical_constants(np.array([w, axes[4], axes[5]]), to_plane)
     T = poses_of(links, np.zeros(6))
-    c, s = np.cos(zero_sum), np.sin(zero_sum)
+    c, s = np.cos(spherical.zero_1), np.sin(spherical.zero_1)
     return ParallelConstants(
         turn=(vector_of(turn[0]), vector_of(turn[1]), vector_of(turn[2])),
         place=vector_of(origin),
         wrist_in_tool=vector_of(T[:3, :3].T @ (wrist - T[:3, 3])),
         axis_6_in_tool=vector_of(T[:3, :3].T @ axes[5]),
-        beside_6_in_tool=vector_of(T[:3, :3].T @ beside),
+        beside_6_in_tool=vector_of(T[:3, :3].T @ G[:, 0]),
         cos_lean=cos_lean,
         sin_lean=sin_lean,
         height=float(w @ (wrist - origin)),
@@ -165,16 +157,9 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
         rest=(float(c * rest[0] + s * rest[1]), float(c * rest[1] - s * rest[0])),
         zero_2=zero_2,
         zero_3=zero_3,
-        zero_5=zero_5,
-        zero_sum=zero_sum,
         sense_3=float(np.sign(axes[2] @ w)),
         sense_4=float(np.sign(axes[3] @ w)),
-        cos_w5=float(np.cos(w5)),
-        sin_w5=float(np.sin(w5)),
-        cos_56=float(np.cos(s56)),
-        sin_56=float(np.sin(s56)),
-        half_sum=(float(np.sin((w5 + s56) / 2)), float(np.cos((w5 + s56) / 2))),
-        half_difference=(float(np.sin((w5 - s56) / 2)), float(np.cos((w5 - s56) / 2))),
+        wrist=spherical,
         near_m=NEAR * size_of(links),
     )
 
@@ -192,13 +177,15 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
     marked : (N,), filled with where branches meet, for the careful solver
     """
     pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
+    turn = np.empty(7 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         _into_frame(k, T, start, size, pose)
         for shoulder in range(2):
             _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
             for wrist in range(2):
-                _wrist_and_elbow(k, pose, side, 1.0 - 2.0 * wrist, slack, out)
+                _wrist(k.wrist, side, 1.0 - 2.0 * wrist, turn)
+                _elbows(k, pose, side, turn, slack, out)
                 slot = 4 * shoulder + wrist
                 for i in range(size):
                     for j in range(6):
@@ -253,67 +240,79 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
 
 
 @inner_kernel
-def _wrist_and_elbow(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float, out: Reals) -> None:  # noqa: PLR0915
-    """All joints of both elbows for one root of joint 5."""
+def _wrist(k: SphericalConstants, side: Reals, sign: float, turn: Reals) -> None:
+    """Joints 5 and 6 by one root, as :func:`.arm_angle.three_angles` has them, written out so that lanes are vectors.
+
+    ``turn`` gets cosine and sine of phi, joint 5's geometric angle, joint 6, and how far both roots are from meeting:
+    squares of sine and cosine of half that angle, but for a factor, and the sine of axis 6 from w.
+    """
     sum_s, sum_c = k.half_sum
     less_s, less_c = k.half_difference
-    per_turn, nan = 1.0 / TURN, np.nan
-    slack = slack * NEAR  # a miss of d beyond an edge is a value of order d^2 below 0
     for i in range(BLOCK):
         zx, zy, zz = side[5 * BLOCK + i], side[6 * BLOCK + i], side[7 * BLOCK + i]
         xx, xy, xz = side[8 * BLOCK + i], side[9 * BLOCK + i], side[10 * BLOCK + i]
         tilt = np.sqrt(zx * zx + zy * zy)
-        length = np.sqrt(tilt * tilt + zz * zz)
-        total = length + abs(zz)
+        total = np.sqrt(tilt * tilt + zz * zz) + abs(zz)
         cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
         per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
         upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
         lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
-        mark = (tilt < NEAR) | (abs(upper) < NEAR * NEAR) | (abs(lower) < NEAR * NEAR)
-        valid = (side[BLOCK + i] > 0.0) & (upper > -slack) & (lower > -slack)
+        turn[4 * BLOCK + i], turn[5 * BLOCK + i], turn[6 * BLOCK + i] = upper, lower, tilt
         upper, lower = max(upper, 0.0), max(lower, 0.0)
-        a, d = np.sqrt(upper), sign * np.sqrt(lower)
+        a, d = np.sqrt(upper), np.sqrt(lower)
         per = 1.0 / (upper + lower)
-        phi_5 = 2.0 * sign * arctan2(a, np.sqrt(lower))
-        cos_5, sin_5 = (lower - upper) * per, 2.0 * a * d * per
+        turn[2 * BLOCK + i] = 2.0 * sign * arctan2(a, d)
+        cos_5, sin_5 = (lower - upper) * per, 2.0 * sign * a * d * per
         # axis 6 as seen with phi = 0, then phi by one angle
-        px, py = -sin_5 * k.sin_56, k.cos_w5 * cos_5 * k.sin_56 - k.sin_w5 * k.cos_56
+        px, py = -sin_5 * k.sin_23, k.cos_12 * cos_5 * k.sin_23 - k.sin_12 * k.cos_23
         c, s = zx * px + zy * py, zy * px - zx * py
         size = np.sqrt(c * c + s * s)
         lost = size < 1e-30
         per = 1.0 / (1.0 if lost else size)
         c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
-        phi = arctan2(s, c)
         ux, uy = xx * c + xy * s, xy * c - xx * s
-        uy, uz = uy * k.cos_w5 + xz * k.sin_w5, xz * k.cos_w5 - uy * k.sin_w5
+        uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
         ux, uy = ux * cos_5 + uy * sin_5, uy * cos_5 - ux * sin_5
-        theta_6 = arctan2(uy * k.cos_56 - uz * k.sin_56, ux)
+        turn[i], turn[BLOCK + i] = c, s
+        turn[3 * BLOCK + i] = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
+
+
+@inner_kernel
+def _elbows(k: ParallelConstants, pose: Reals, side: Reals, turn: Reals, slack: float, out: Reals) -> None:
+    """All joints of both elbows, by what :func:`_wrist` has put into ``turn``."""
+    per_turn, least = 1.0 / TURN, -slack * NEAR  # a miss of d beyond an edge is a value of order d^2 below 0
+    reach, smallest = k.upper_arm + k.forearm, k.upper_arm - k.forearm
+    edge = k.near_m * reach * NEAR
+    for i in range(BLOCK):
+        c, s, phi_5, theta_6 = turn[i], turn[BLOCK + i], turn[2 * BLOCK + i], turn[3 * BLOCK + i]
+        upper, lower, tilt = turn[4 * BLOCK + i], turn[5 * BLOCK + i], turn[6 * BLOCK + i]
+        mark = (tilt < NEAR) | (abs(upper) < NEAR * NEAR) | (abs(lower) < NEAR * NEAR)
+        valid = (side[BLOCK + i] > 0.0) & (upper > least) & (lower > least)
+        phi = arctan2(s, c)
         # axis 4's place, from axis 2
         x = side[2 * BLOCK + i] - (c * k.rest[0] - s * k.rest[1]) - k.axis_2[0]
         y = side[3 * BLOCK + i] - (s * k.rest[0] + c * k.rest[1]) - k.axis_2[1]
         squared = x * x + y * y
-        reach, smallest = k.upper_arm + k.forearm, k.upper_arm - k.forearm
         far, near = (reach * reach - squared), (squared - smallest * smallest)
-        edge = k.near_m * reach * NEAR
         mark = mark | (abs(far) < edge) | (abs(near) < edge) | (squared < k.near_m * k.near_m)
         marked = mark & (side[BLOCK + i] > 0.0)
         pose[_MARK * BLOCK + i] = 1.0 if marked else pose[_MARK * BLOCK + i]
-        valid = valid & (far > -slack) & (near > -slack)
+        valid = valid & (far > least) & (near > least)
         far, near = max(far, 0.0), max(near, 0.0)
         root_far, root_near = np.sqrt(far), np.sqrt(near)
         bend = 2.0 * arctan2(root_far, root_near)
         per = 1.0 / (far + near)
         cos_bend, sin_bend = (near - far) * per, 2.0 * root_far * root_near * per
         along, beside = k.upper_arm + k.forearm * cos_bend, k.forearm * sin_bend
-        one = 1.0 if valid else nan
-        theta_5 = (phi_5 - k.zero_5) * one
+        one = 1.0 if valid else np.nan
+        theta_5 = (phi_5 - k.wrist.zero_2) * one
         theta_5 -= TURN * np.ceil(theta_5 * per_turn - 0.5)
         for elbow in range(2):
             bent = beside if elbow == 0 else -beside
             first = arctan2(y * along - x * bent, x * along + y * bent) - k.zero_2
             second = (bend if elbow == 0 else -bend) - k.zero_3
             theta_3 = k.sense_3 * second
-            theta_4 = k.sense_4 * (phi - k.zero_sum - first - second)
+            theta_4 = k.sense_4 * (phi - k.wrist.zero_1 - first - second)
             first -= TURN * np.ceil(first * per_turn - 0.5)
             theta_3 -= TURN * np.ceil(theta_3 * per_turn - 0.5)
             theta_4 -= TURN * np.ceil(theta_4 * per_turn - 0.5)
@@ -337,7 +336,7 @@ def polish_rows(links: Reals, size: float, T: Reals, q: Reals, apart: bool) -> N
     q : (N, 8, 6), rad, changed in place; rows that do not solve the pose become NaN
     apart : whether the second of two rows that meet becomes NaN, too
     """
-    scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((8, 4, 4)), np.empty((6, 7))
+    scaled, pose, w, J = links.copy(), np.empty((4, 4)), np.empty((2, 4, 4)), np.empty((6, 7))
     dq, columns, sliding = np.empty(12), np.zeros(6, np.int64), np.zeros(6, np.bool_)
     scaled[:, :3, 3] /= size
     for n in range(T.shape[0]):

@@ -21,21 +21,22 @@ PROBE = 1e-2  # rad or parts of the size, step to either side that shows the fol
 
 
 @inner_kernel
-def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:  # noqa: C901, PLR0912
-    """Pose error and geometric Jacobian of a chain of six joints, lengths in parts of its size. Kernel.
+def error_and_columns(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, e: Reals, J: Reals) -> float:
+    """Pose error and geometric Jacobian of a chain of any length, lengths in parts of its size. Kernel.
 
     Parameters
     ----------
-    links : (7, 4, 4), in units of the chain's size
-    sliding : (6,), prismatic joints
+    links : (n + 1, 4, 4), in units of the chain's size
+    sliding : (n,), prismatic joints
     T : (4, 4), the pose, in units of the chain's size
-    q : (6,), rad, or parts of the size
-    w : (8, 4, 4), scratch memory
-    J : (6, 7), filled: linear rows, angular rows; the last column is the pose error
+    q : (n,), rad, or parts of the size
+    w : (2, 4, 4), scratch memory; one of both is left with the tool's frame, the first where n is even
+    e : (6,), filled: position, then half the sum of the vector products of the axes
+    J : (6, n) or wider, filled: linear rows, then angular rows
 
     Returns
     -------
-    largest : the error's largest component, rad and parts of the size; at least 1 beyond 90 deg
+    trace : of the rotation between tool and pose; negative beyond about 90 deg, where the error shrinks again
     """
     n = q.shape[0]
     frame, other = w[0], w[1]
@@ -45,8 +46,7 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
     for k in range(n):
         for i in range(3):
             J[3 + i, k] = frame[i, 2]
-            w[2, i, k % 4] = frame[i, 3]
-            w[3 + k // 4, i, k % 4] = frame[i, 3]
+            J[i, k] = frame[i, 3]
         if sliding[k]:
             for i in range(3):
                 frame[i, 3] += frame[i, 2] * q[k]
@@ -54,31 +54,60 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
             post_rotate_z(frame, np.cos(q[k]), np.sin(q[k]))
         multiply_rigid(frame, links[k + 1], other)
         frame, other = other, frame
-    p0, p1, p2 = frame[0, 3], frame[1, 3], frame[2, 3]
     for k in range(n):
         z0, z1, z2 = J[3, k], J[4, k], J[5, k]
         if sliding[k]:
             J[0, k], J[1, k], J[2, k] = z0, z1, z2
             J[3, k], J[4, k], J[5, k] = 0.0, 0.0, 0.0
         else:
-            r0, r1, r2 = p0 - w[3 + k // 4, 0, k % 4], p1 - w[3 + k // 4, 1, k % 4], p2 - w[3 + k // 4, 2, k % 4]
+            r0, r1, r2 = frame[0, 3] - J[0, k], frame[1, 3] - J[1, k], frame[2, 3] - J[2, k]
             J[0, k], J[1, k], J[2, k] = z1 * r2 - z2 * r1, z2 * r0 - z0 * r2, z0 * r1 - z1 * r0
-    largest = 0.0
+    trace = 0.0
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         turn = 0.0
         for j in range(3):
             turn += frame[a, j] * T[b, j] - frame[b, j] * T[a, j]
-        J[i, n] = T[i, 3] - frame[i, 3]
-        J[3 + i, n] = 0.5 * turn
-        largest = max(largest, max(abs(J[i, n]), abs(J[3 + i, n])))
-    trace = 0.0
-    for i in range(3):
-        for j in range(3):
             trace += frame[i, j] * T[i, j]
-    if trace < 0.0:  # turned by more than 90 deg, where the sum of products shrinks again
-        largest = max(largest, 1.0)
+        e[i] = T[i, 3] - frame[i, 3]
+        e[3 + i] = 0.5 * turn
+    return trace
+
+
+@inner_kernel
+def largest_of(e: Reals, trace: float) -> float:
+    """The largest component of a pose error. Kernel.
+
+    Parameters
+    ----------
+    e : (6,), rad and parts of the size
+    trace : as of :func:`error_and_columns`
+
+    Returns
+    -------
+    largest : at least 1 where the trace is negative
+    """
+    largest = 1.0 if trace < 0.0 else 0.0
+    for i in range(6):
+        largest = max(largest, abs(e[i]))
     return largest
+
+
+@inner_kernel
+def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: Reals, J: Reals) -> float:
+    """:func:`error_and_columns` of six joints, with the pose error beside the Jacobian. Kernel.
+
+    Parameters
+    ----------
+    links, sliding, T, q, w : of six joints
+    J : (6, 7), filled; the last column is the pose error
+
+    Returns
+    -------
+    largest : the error's largest component, rad and parts of the size; at least 1 beyond 90 deg
+    """
+    e = J[:, 6]
+    return largest_of(e, error_and_columns(links, sliding, T, q, w, e, J))
 
 
 @inner_kernel

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.kinematics.chain import multiply_rigid, post_rotate_z
+from er3a.kinematics.classes.polish import error_and_columns, largest_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -56,41 +56,11 @@ def error_and_jacobian(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     largest : the error's largest component; at least 1 beyond 90 deg
     """
     links, sliding, T, task = posed
-    n = x.shape[0]
-    frame, other = links[0].copy(), np.empty((4, 4))
-    for k in range(n):
-        for i in range(3):
-            J[3 + i, k] = frame[i, 2]
-            J[i, k] = frame[i, 3]
-        if sliding[k]:
-            for i in range(3):
-                frame[i, 3] += frame[i, 2] * x[k]
-        else:
-            post_rotate_z(frame, np.cos(x[k]), np.sin(x[k]))
-        multiply_rigid(frame, links[k + 1], other)
-        frame, other = other, frame
-    for k in range(n):
-        z0, z1, z2 = J[3, k], J[4, k], J[5, k]
-        if sliding[k]:
-            J[0, k], J[1, k], J[2, k] = z0, z1, z2
-            J[3, k], J[4, k], J[5, k] = 0.0, 0.0, 0.0
-        else:
-            r0, r1, r2 = frame[0, 3] - J[0, k], frame[1, 3] - J[1, k], frame[2, 3] - J[2, k]
-            J[0, k], J[1, k], J[2, k] = z1 * r2 - z2 * r1, z2 * r0 - z0 * r2, z0 * r1 - z1 * r0
-    largest, trace = 0.0, 0.0
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        turn = 0.0
-        for j in range(3):
-            turn += frame[a, j] * T[b, j] - frame[b, j] * T[a, j]
-            trace += frame[i, j] * T[i, j]
-        e[i] = T[i, 3] - frame[i, 3]
-        e[3 + i] = 0.5 * turn
+    w = np.empty((2, 4, 4))
+    trace = error_and_columns(links, sliding, T, x, w, e, J)
     if task != POSE:
-        trace = _without_what_is_open(T, task, frame, e, J)
-    for i in range(6):
-        largest = max(largest, abs(e[i]))
-    return max(largest, 1.0) if trace < 0.0 else largest
+        trace = _without_what_is_open(T, task, w[x.shape[0] % 2], e, J)
+    return largest_of(e, trace)
 
 
 @inner_kernel

@@ -319,7 +319,7 @@ def in_order(q: Reals, count: Integers) -> None:
 
 
 @inner_kernel
-def _by_reading(  # noqa: C901
+def _by_reading(
     reading: Reading, links: Reals, pose: Reals, pose_link: Reals, m: LoopMemory, q: Reals, rows: int
 ) -> tuple[int, int, float]:
     """Add the solutions that one reading of the loop finds; returns its verdict, the number of rows, and the
@@ -348,26 +348,51 @@ def _by_reading(  # noqa: C901
             for k in range(candidates):
                 for i in range(6):
                     m.candidate[reading.joint[i]] = reading.sense * m.x[k, i]
-                residual, pivot = newton(links, m.sliding, pose, m.candidate, 8, m.frames, m.J, m.dq, m.columns)
-                if residual < SOLVES:
+                rows, pivot = add_root(links, pose, m, 8, SOLVES, q, rows)
+                if pivot >= 0.0:
                     smallest = min(smallest, pivot)
                     away = m.candidate[reading.joint[2]] * reading.sense - m.zeros[z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
-                    rows = add_row(links, pose, m, m.candidate, pivot, q, rows)
-                    # Near a fold a second root is so close that its zero may have merged with this one's.
-                    if pivot < 1e-3 and twin_start(
-                        links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns
-                    ):
-                        residual, pivot = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
-                        if residual < SOLVES:
-                            rows = add_row(links, pose, m, m.start, pivot, q, rows)
         if m.zeros[z, 2] == 0.0 or not solved:
             verdict = UNCERTAIN
     # Complex zeros come in pairs, and each real zero has a solution of its own.
     if rows % 2 == 1 or (earlier == 0 and rows < distinct):
         verdict = UNCERTAIN
     return verdict, rows, smallest
+
+
+@inner_kernel
+def add_root(
+    links: Reals, pose: Reals, m: LoopMemory, most: int, solves: float, q: Reals, rows: int
+) -> tuple[int, float]:
+    """Move ``m.candidate`` to a root and add it, and near a fold the other root that meets it there. Kernel.
+
+    That one may be so close that its zero has merged with this one's.
+
+    Parameters
+    ----------
+    links, pose : (7, 4, 4) and (4, 4), in units of the chain's size
+    m : memory; its candidate is wrapped in place
+    most : how many of Newton's steps
+    solves : residual, rad and parts of the size, that a root may have
+    q : (16, 6), rows of the pose, changed in place
+    rows : how many there are
+
+    Returns
+    -------
+    rows : how many there are then
+    pivot : the last pivot's ratio at the root, -1 if there is none
+    """
+    residual, pivot = newton(links, m.sliding, pose, m.candidate, most, m.frames, m.J, m.dq, m.columns)
+    if not residual < solves:
+        return rows, -1.0
+    rows = add_row(links, pose, m, m.candidate, pivot, q, rows)
+    if pivot < 1e-3 and twin_start(links, m.sliding, pose, m.candidate, m.start, m.frames, m.J, m.columns):
+        residual, other = newton(links, m.sliding, pose, m.start, 12, m.frames, m.J, m.dq, m.columns)
+        if residual < solves:
+            rows = add_row(links, pose, m, m.start, other, q, rows)
+    return rows, pivot
 
 
 @kernel

@@ -26,14 +26,14 @@ import numpy as np
 from er3a.kinematics.chain import inverse_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
 from er3a.kinematics.classes.loop_rows import LoopMemory
-from er3a.kinematics.classes.polish import SOLVES, newton, twin_start
+from er3a.kinematics.classes.polish import SOLVES
 from er3a.kinematics.classes.six_revolute import (
     CERTAIN,
     CONTINUUM,
     STUCK,
     UNCERTAIN,
     RowsFound,
-    add_row,
+    add_root,
     all_rows,
 )
 from er3a.numerics.arrays import Complexes, Flags, Integers, Reals
@@ -378,22 +378,13 @@ def _rows(
                 _others(A, turns)
                 _ends(links, reading.slides, turns, shifts)
                 _as_joints(reading, turns, shifts, m.candidate)
-                residual, pivot = newton(chain, m.sliding, poses[n], m.candidate, 12, m.frames, m.J, m.dq, m.columns)
-                if residual < SOLVES * reach:
+                count[n], pivot = add_root(chain, poses[n], m, 12, SOLVES * reach, q[n], count[n])
+                if pivot >= 0.0:
                     away = m.candidate[reading.joint[0]] * reading.sense - zeros[i, z, 0]
                     away -= 2 * np.pi * np.round(away / (2 * np.pi))
                     solved = solved or abs(away) < 1e-2
                     if pivot < STUCK:
                         verdict = CONTINUUM
-                    count[n] = add_row(chain, poses[n], m, m.candidate, pivot, q[n], count[n])
-                    if pivot < 1e-3 and twin_start(
-                        chain, m.sliding, poses[n], m.candidate, m.start, m.frames, m.J, m.columns
-                    ):
-                        residual, pivot = newton(
-                            chain, m.sliding, poses[n], m.start, 12, m.frames, m.J, m.dq, m.columns
-                        )
-                        if residual < SOLVES * reach:
-                            count[n] = add_row(chain, poses[n], m, m.start, pivot, q[n], count[n])
             expected += off < ON_CIRCLE
             if off < CLUSTER and not solved:
                 verdict = max(verdict, UNCERTAIN)

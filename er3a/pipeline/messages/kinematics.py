@@ -142,9 +142,6 @@ TEXTS = texts(
         "not_six_turning_joints#sliding": "it has sliding joints ({sliding})",
         "by_class": "{arm_class}",
         "by_class_in_doubt": "{arm_class}; because of rounding, solutions may be missing",
-        "by_class_cuspidal": (
-            "{arm_class}; cuspidal: joint moves without a singularity join its branches, so they are numbered"
-        ),
         "by_class_numbered": "{arm_class}; no signs separate its branches, so they are numbered",
         "wrist_too_near_axis_1": "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
         "wrist_too_far": "{gap} beyond reach (the stretched arm brings the wrist centre {reach} from axis 2)",
@@ -243,8 +240,6 @@ def _(found: ByClass) -> str:
     parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
     if not found.certain:
         return sentence("by_class_in_doubt", **parts)
-    if found.cuspidal:
-        return sentence("by_class_cuspidal", **parts)
     if not found.named:
         return sentence("by_class_numbered", **parts)
     return say_as(found, **parts)

@@ -65,7 +65,6 @@ GLOSSARY = {
     ),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
-    N_("cuspidal"): N_("of an arm that can change between solutions of a pose without passing a singularity"),
     N_("manipulability"): N_(
         "the product of the Jacobian's singular values, lengths divided by the wrist's reach (in the workspace "
         "undivided, in m³); 0 at a singularity"

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
@@ -150,12 +148,6 @@ TEXTS = texts(
             "again: no path, program or grasp was planned around them."
         ),
         "box.no_tool": "No tool is given: the flange's own centre enters the tray. Repeat it with your tool's length.",
-        "box.range": (
-            "Keep the stand at {gap} mm: of the heights that pass the same checks, {least} to {most} mm, some of them "
-            "with the tray turned the other way, the worst has less to spare: {spare}."
-        ),
-        "box.spare.manipulability": "manipulability {percent:.2g} % of that at {gap} mm",
-        "box.spare.limits": "{least:.1f} deg from a joint limit instead of {here:.1f} deg",
         "box.sampled#all": "the tool point, {tilt}, reaches all points sampled in it; {unchecked}",
         "box.sampled#upper": (
             "the tool point, {tilt}, reaches all points sampled in it except the lowest {served_from} mm; {unchecked}"
@@ -178,8 +170,6 @@ def _(found: model.VoidUnexpected) -> str:
 
 
 SERVED_ALL_M = 1e-6
-SAME_PLACE_M = 1e-6
-SAME_SHARE = 0.99  # of what there is to spare at a place: less than that is told
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
 NAMED_CHANGES = 4
 
@@ -323,34 +313,6 @@ def run_again_text(summary: Summary, *, stand: bool) -> str:
     bare = any(each.reason == "tool" for each in summary.assumed)
     again = sentence("box.run_again#stand" if stand else "box.run_again#tray")
     return joined([again, sentence("box.no_tool") if bare else ""], " ")
-
-
-def range_text(
-    place: model.PlaceSummary, gaps: tuple[float, float, float] | None, margin_deg: float, places: model.BoxPlaces
-) -> str:
-    """How high the stand of the tray at a place may be, and how near to a singular pose and to joint limits the arm
-    comes over that range; empty where no stand is needed or only one height serves.
-
-    ``gaps``: its height, the least and the most, m; ``margin_deg``: what the task asks of joints' limits
-    """
-    if gaps is None or gaps[1] == gaps[2]:
-        return ""
-    gap, least, most = gaps
-    *xy, z = place.centre_m
-    above = np.abs(places.centre_m[:, :2] - xy).max(axis=1) < SAME_PLACE_M
-    heights = places.centre_m[:, 2] - z + gap
-    above &= (least - SAME_PLACE_M < heights) & (heights < most + SAME_PLACE_M)
-    shown = {"gap": millimetres([gap])}
-    worst = float(min(places.manipulability_m3[above], default=0.0)) / place.manipulability_m3
-    spare = [sentence("box.spare.manipulability", percent=100 * worst, **shown)] if worst < SAME_SHARE else []
-    near = float(min(places.limit_margin_deg[above], default=np.inf)) + margin_deg
-    if place.limit_margin_deg is not None and near < SAME_SHARE * place.limit_margin_deg:
-        spare.append(sentence("box.spare.limits", least=near, here=place.limit_margin_deg))
-    if not spare:
-        return ""
-    return sentence(
-        "box.range", least=millimetres([least]), most=millimetres([most]), spare=joined(spare, ", "), **shown
-    )
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:

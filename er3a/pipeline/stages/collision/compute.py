@@ -158,44 +158,32 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    # Some arms can't have all joints at 0: home is as near to it as the limits allow.
-    q_home = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
-    smallest, nearest = bodies.min_distance(q_home[None])
-    at_home = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
+    q_home, at_home, depth = _home(bodies)
     if at_home is None:
         places.joined[:] = free_space.joined_to_home(bodies, places, q_home, settings.neighbours)
     targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
-    tolerance = settings.penetration_tolerance_mm / 1000
     motions = list(study_motions(study, name, CHECKS))
-    paths, on_paths, first_touch = path_clearances(motions, bodies, tolerance)
-    pairs = _pair_shares(bodies, space)
+    paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
+    pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
-    matrix = _matrix(bodies)
-    places_found = _places_summary(places)
-    meant = {each.name for each in motions if "collides" in each.expected}
     wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
-    undecided = int((matrix.state == "undecided").sum())
     closest = (*at_targets, *on_paths)
-    assumed = shapes_assumed(
-        robot, study.assumed_margin(name), {each.name: each.clearance_mm / 1000 for each in closest}
-    )
-    joined = places_found.joined
+    assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
+    undecided = int((matrix.state == "undecided").sum())
     free = model.FreeSpace(
-        *(space.whole.value, places_found.reached, places_found.clear, joined, undecided, assumed is not None),
+        *(space.whole.value, places_found.reached, places_found.clear, places_found.joined, undecided),
+        assumed is not None,
         targets=len(at_targets),
         nearest=_nearest_target(at_targets),
-        colliding=tuple(
-            model.CollidingPath(each.name, first_touch.get(each.name, each.between), each.name in meant)
-            for each in on_paths
-            if each.clearance_mm < 0
-        ),
+        colliding=_colliding(motions, on_paths, first_touch),
         blocked=blocked,
     )
     covered = covered_collisions(robot, bodies, scene)
-    home = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), free)
+    home = None if at_home is None else model.HomeCollides(at_home, 1000 * depth, free)
+    rows = model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness))
     return model.CollisionResults(
         summary=model.CollisionSummary(
-            verdict=_verdict(pairs, mounting, wrong, free, home).resting_on(assumed),
+            verdict=_verdict(pairs, mounting, wrong, free, home).with_assumed_shapes(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,
@@ -217,11 +205,29 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         ),
         matrix=matrix,
         pairs=pairs,
-        places=model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness)).of_joints(
-            robot.slides
-        ),
+        places=rows.of_joints(robot.slides),
         targets=targets,
         paths=paths,
+    )
+
+
+def _home(bodies: Bodies) -> tuple[Reals, Pair | None, float]:
+    """Joint values as near to 0 as the limits allow, and what overlaps there by how much, m; None if nothing does."""
+    q = np.clip(np.zeros(bodies.robot.joints), bodies.robot.lower, bodies.robot.upper)
+    smallest, nearest = bodies.min_distance(q[None])
+    overlap = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
+    return q, overlap, float(-smallest[0])
+
+
+def _colliding(
+    motions: list[ListedMotion], on_paths: list[model.Closest], first_touch: dict[str, Pair]
+) -> tuple[model.CollidingPath, ...]:
+    """The paths on which something overlaps, with what touches first, and whether that is expected."""
+    meant = {each.name for each in motions if "collides" in each.expected}
+    return tuple(
+        model.CollidingPath(each.name, first_touch.get(each.name, each.between), each.name in meant)
+        for each in on_paths
+        if each.clearance_mm < 0
     )
 
 

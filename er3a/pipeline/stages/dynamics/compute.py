@@ -530,7 +530,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     masses = _masses_used(given, robot, load, (grade, load_grade if load else None), settings)
     imbalances = [path.imbalance for path in paths if path.imbalance is not None]
     summary = model.DynamicsSummary(
-        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped).resting_on(
+        verdict=verdict_of(paths, holding, uses, findings, unknown, masses, skipped=skipped).with_assumed_shapes(
             shapes_assumed(robot, margin, {}) if paths else None
         ),
         figures=_figures(summaries, holding, uses, imbalances, masses),

@@ -17,7 +17,6 @@ from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.closed_form import ORIENTATION
-from er3a.kinematics.cuspidal import cuspidal_move
 from er3a.kinematics.families import Family
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.neighbours import Usable, neighbours
@@ -122,7 +121,7 @@ def solve_target(
         obstacle=obstacle,
         outcome=_outcome(obstacle),
         unsolved=solutions.unsolved,
-        method=_method(robot, solutions.method),
+        method=solutions.method,
         families=tuple(map(_self_motion, solutions.families)),
         neighbours=near,
         advice=advice,
@@ -196,13 +195,6 @@ def _first_of_branch(branch: Integers, rank: Integers) -> Flags:
 def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
     direction = shown(family.robot, family.direction) / np.degrees(1.0)
     return stated(model.SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
-
-
-def _method(robot: Robot, method: Method) -> Method:
-    """The method, with what is known of numbered branches."""
-    if isinstance(method, ByClass) and not method.named and method.arm_class == "general_six":
-        return replace(method, cuspidal=cuspidal_move(robot) is not None)
-    return method
 
 
 def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
@@ -409,7 +401,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = model.InverseSummary(
-        verdict=_verdict(results, worst, trips, bool(scene and scene.solids)).resting_on(rests_on),
+        verdict=_verdict(results, worst, trips, bool(scene and scene.solids)).with_assumed_shapes(rests_on),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,

@@ -83,7 +83,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     covered = covered_collisions(robot, bodies_of(robot, scene), scene, arms)
     return model.ProgramsResults(
         summary=model.ProgramsSummary(
-            verdict=_verdict(summaries).resting_on(assumed),
+            verdict=_verdict(summaries).with_assumed_shapes(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~speeds_given(robot)),

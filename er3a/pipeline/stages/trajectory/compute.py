@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
+from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -392,61 +394,86 @@ def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> t
     return tuple(found)
 
 
+class JudgedPath(NamedTuple):
+    """A path's summary and its rows of the stage's tables."""
+
+    path: model.PathSummary
+    checks: model.PathChecks
+    clearance: model.Clearances
+    avoidance: model.AvoidanceRows
+    programs: model.ProgramFiles
+
+
+def _judged(
+    task: AvoidanceTask, each: ListedMotion, motion: Motion, settings: TrajectorySettings, assumed_margin: float
+) -> JudgedPath:
+    """A path with its faults, what avoids them, and its programs; ``assumed_margin``: m, around assumed shapes."""
+    robot, limits, surroundings = task.robot, task.limits, task.surroundings
+    found = judgement.judge(robot, motion, task.near, limits)
+    along = judgement.measured(surroundings, motion)
+    avoided = task.avoid(motion, found, along)
+    checks = _checks(robot, motion, found, task.near, limits)
+    path = replace(
+        path_summary(robot, motion, found, along, avoided, limits),
+        clear_until=judgement.last_safe_stop(surroundings, motion, found, along, task.margin, limits.acceleration),
+        of_program=tuple(map(finding_at, each.found)),
+    )
+    path = replace(path, sound_end=judgement.advised_end(path, checks, _limits_used(robot, limits, settings)))
+    repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
+    close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
+    asked = settings.programs, settings.write_unsafe
+    programs = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
+    return JudgedPath(path, checks, judgement.clearance_rows(each.name, along), avoided.rows, programs)
+
+
 def compute(study: Study, name: str) -> model.TrajectoryResults:
     """Plan and check every path of a robot, by its name in the study, and write programs of it.
+
     :class:`InputError` if a file of the study can't be used.
     """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
-    file = Path(study.entry(name).paths)
     near, limits = near_singular(settings), limits_of(robot, settings)
-    used = _limits_used(robot, limits, settings)
-    scene = study.scene(name, "trajectory")
+    scene, assumed_margin = study.scene(name, "trajectory"), study.assumed_margin(name)
     surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, surroundings.bodies, study.seed)
-    assumed_margin = study.assumed_margin(name)
     margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
-    avoidance = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
-    tables: list[model.PathChecks] = []
-    clearances: list[model.Clearances] = []
-    strategies: list[model.AvoidanceRows] = []
-    paths: list[model.PathSummary] = []
-    programs: list[model.ProgramFiles] = []
-    skipped: list[model.PathNotFollowed] = []
-    rest: list[Open] = []
-    chosen: list[Open] = []
-    turned: list[tuple[str, Reals, Reals]] = []
-    for each in listed_motions(file, planning, near, settings.checks_per_sample):
-        motion = each.motion
-        rest += each.gaps if each.meant_safe else ()
-        chosen += each.assumed if each.meant_safe else ()
-        if motion is None:
-            skipped.append(_not_followed(robot, each))
-            continue
-        turned += _asked_of_tool(each.name, motion) if each.meant_safe else ()
-        found = judgement.judge(robot, motion, near, limits)
-        along = judgement.measured(surroundings, motion)
-        avoided = avoidance.avoid(motion, found, along)
-        tables.append(_checks(robot, motion, found, near, limits))
-        clearances.append(judgement.clearance_rows(each.name, along))
-        strategies.append(avoided.rows)
-        last = judgement.clear_until(surroundings, motion, found, along, margin, limits.acceleration)
-        path = path_summary(robot, motion, found, along, avoided, limits)
-        path = replace(path, clear_until=last, of_program=tuple(map(finding_at, each.found)))
-        paths.append(replace(path, sound_end=judgement.sound_end(path, tables[-1], used)))
-        repair = avoided.rows.take(avoided.rows.strategy == (avoided.chosen or ""))
-        close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
-        asked = settings.programs, settings.write_unsafe
-        made = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
-        programs.append(made)
-    checks = model.PathChecks.stacked(tables).of_joints(robot.slides)
+    task = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
+    listed = list(listed_motions(Path(study.entry(name).paths), planning, near, settings.checks_per_sample))
+    judged = [_judged(task, each, each.motion, settings, assumed_margin) for each in listed if each.motion]
+    checks = model.PathChecks.stacked([each.checks for each in judged]).of_joints(robot.slides)
     own = checks.take(checks.sample)
-    length = characteristic_length(robot)
+    avoidance = model.AvoidanceRows.stacked([each.avoidance for each in judged])
+    return model.TrajectoryResults(
+        summary=_summary(task, listed, [each.path for each in judged], settings, scene, assumed_margin),
+        samples=model.Samples(**{name: getattr(own, name) for name in model.Samples.columns()}).of_joints(robot.slides),
+        checks=checks,
+        clearance=model.Clearances.stacked([each.clearance for each in judged]),
+        avoidance=avoidance.of_joints(robot.slides),
+        programs=model.ProgramFiles.stacked([each.programs for each in judged]),
+    )
+
+
+def _summary(
+    task: AvoidanceTask,
+    listed: Sequence[ListedMotion],
+    paths: list[model.PathSummary],
+    settings: TrajectorySettings,
+    scene: Scene | None,
+    assumed_margin: float,
+) -> model.TrajectorySummary:
+    """The stage's answer, its paths, and what it did not look at."""
+    robot, limits, bodies = task.robot, task.limits, task.surroundings.bodies
+    skipped = [_not_followed(robot, each) for each in listed if each.motion is None]
+    safe = [each for each in listed if each.meant_safe]
+    turned = [asked for each in safe if each.motion for asked in _asked_of_tool(each.name, each.motion)]
+    length, used = characteristic_length(robot), _limits_used(robot, limits, settings)
     clearance = {path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.meant_safe}
     assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
-    covered = covered_collisions(robot, surroundings.bodies, scene)
-    summary = model.TrajectorySummary(
-        verdict=_verdict(paths, skipped, assumed_shapes).resting_on(assumed_shapes),
+    covered = covered_collisions(robot, bodies, scene)
+    gaps = (*(gap for each in safe for gap in each.gaps), *gaps_of_orientations(robot, turned))
+    return model.TrajectorySummary(
+        verdict=_verdict(paths, skipped, assumed_shapes).with_assumed_shapes(assumed_shapes),
         figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
         near=model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm),
@@ -455,21 +482,13 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),
-        checked=_checked(covered, paths, skipped, (*rest, *gaps_of_orientations(robot, turned))),
+        checked=_checked(covered, paths, skipped, gaps),
         assumed=(
             *assumed_rates(speeds_given(robot), not used.acceleration_assumed),
-            *by_reason(chosen),
+            *by_reason(chosen for each in safe for chosen in each.assumed),
             *assumed_tool(robot),
             *covered.assumed,
         ),
-    )
-    return model.TrajectoryResults(
-        summary=summary,
-        samples=model.Samples(**{name: getattr(own, name) for name in model.Samples.columns()}).of_joints(robot.slides),
-        checks=checks,
-        clearance=model.Clearances.stacked(clearances),
-        avoidance=model.AvoidanceRows.stacked(strategies).of_joints(robot.slides),
-        programs=model.ProgramFiles.stacked(programs),
     )
 
 

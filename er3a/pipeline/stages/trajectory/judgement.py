@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -231,7 +232,7 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-def clear_until(
+def last_safe_stop(
     surroundings: Surroundings,
     motion: Motion,
     found: Judgement,
@@ -265,25 +266,11 @@ def clear_until(
         return np.minimum(spare, (apart(t) - kept).min(axis=1)) if joined.size else spare
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
-    end = last = min([first, *(BEFORE_STOP * stop for stop in stops)])
-    for _ in range(ATTEMPTS):
-        grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
-        spare = beyond(grid)
-        if not (end > 0 and spare[0] > 0):
-            return None
-        k = int(np.argmax(spare <= 0))
-        if k > 0:
-            end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * first)
-        known = np.append(motion.t[motion.t < end], end)
-        until = clearance_along(
-            bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], surroundings.tolerance
-        )
-        short = until.distance < margin - surroundings.tolerance
-        if not short.any():
-            break
-        end = float(until.t[int(np.argmax(short))])
-    else:
+    last = min([first, *(BEFORE_STOP * stop for stop in stops)])
+    kept_to = _margin_end(surroundings, motion, beyond, last, margin)
+    if kept_to is None:
         return None
+    end = kept_to
     stop = float(_stop_time(motion, np.array([end]), acceleration)[0])
     if end < last:
         begun = _stop_before(motion, end, acceleration)
@@ -304,6 +291,33 @@ def clear_until(
     )
 
 
+def _margin_end(
+    surroundings: Surroundings, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
+) -> float | None:
+    """Up to when (s, ``last`` at most) a motion keeps a margin (m), proven; None if nowhere.
+
+    ``beyond``: by how much more than the margin is kept, m, at times (k,).
+    """
+    end = last
+    for _ in range(ATTEMPTS):
+        grid = np.linspace(0.0, end, STEPS_TO_CONTACT + 1)
+        spare = beyond(grid)
+        if not (end > 0 and spare[0] > 0):
+            return None
+        k = int(np.argmax(spare <= 0))
+        if k > 0:
+            end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * last)
+        known = np.append(motion.t[motion.t < end], end)
+        until = clearance_along(
+            surroundings.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], surroundings.tolerance
+        )
+        short = until.distance < margin - surroundings.tolerance
+        if not short.any():
+            return float(end)
+        end = float(until.t[int(np.argmax(short))])
+    return None
+
+
 def _stop_before(motion: Motion, end: float, acceleration: Reals) -> tuple[float, float] | None:
     """The last time (s) at which a stop along a motion can begin that ends by a time, and how long it takes; None if
     none can. What keeps the accelerations comes, in the time that a stop takes, at least as far as the stop does."""
@@ -319,7 +333,7 @@ def _stop_time(motion: Motion, t: Reals, acceleration: Reals) -> Reals:
     return found
 
 
-def sound_end(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> model.SoundEnd | None:
+def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.LimitsUsed) -> model.SoundEnd | None:
     """The last point of a path's ``rows``, or the last with the margin of a collision, at which it may end.
 
     ``STOPS``, ``LIMIT_MARGIN``, ``REACH_MARGIN`` and ``SPEED_MARGIN`` are kept before the first fault; a path of the

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from functools import reduce
 from typing import Any, Literal
 
@@ -248,21 +247,6 @@ def table_checks(robot: Robot) -> list[model.Check]:
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, NONE_ALLOWED)]
 
 
-def _class_checks(robot: Robot, poses: int, seed: int) -> list[model.Check]:
-    """Round trips of an arm without the closed form of spherical wrists, by its class."""
-    missing = wrist_partition_missing(robot)
-    if missing and not round_trips.has_class(robot):
-        return [model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))]
-    found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
-    return [
-        against_itself("unsolved_poses", GROUP, float(found.poses - found.own_found), NONE_ALLOWED),
-        against_itself("position_error", GROUP, found.worst_position * 1000, POSITION_TOLERANCE_MM, "mm"),
-        against_itself(
-            "orientation_error", GROUP, float(np.degrees(found.worst_orientation)), ORIENTATION_TOLERANCE_DEG, "deg"
-        ),
-    ]
-
-
 def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.Check], model.RoundTripErrors | None]:
     """Round trips from random joints to a pose and back, as checks.
 
@@ -277,20 +261,29 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     errors : None if the arm has no such closed form, or coupled joints
     """
     missing = wrist_partition_missing(robot)
-    if missing or robot.coupling is not None:
-        return _class_checks(robot, min(poses, round_trips.MAX_BY_CLASS), seed), None
-    found = round_trips.slot_round_trips(robot, poses, seed)
-    note = model.NearSingularLeftOut(
-        poses - found.near_singular, poses, round_trips.NEAR_WRIST_DEG, round_trips.NEAR_SHOULDER_MM
-    )
+    if missing and not round_trips.has_class(robot):
+        return [
+            model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))
+        ], None
+    by_class = missing is not None or robot.coupling is not None
+    poses = min(poses, round_trips.MAX_BY_CLASS) if by_class else poses
+    found = round_trips.batch_round_trips(robot, np.random.default_rng(seed), poses)
+    millimetres, degrees = 1000 * found.worst_position, float(np.degrees(found.worst_orientation))
+    lost = found.poses - found.own_found if by_class else found.unsolved
     checks: list[model.Check] = [
-        against_itself("unsolved_poses", GROUP, float(found.unsolved), NONE_ALLOWED),
-        against_itself("joint_error", GROUP, found.joint_error_deg, JOINT_TOLERANCE_DEG, "deg", note),
-        against_itself("position_error", GROUP, found.position_error_mm, POSITION_TOLERANCE_MM, "mm"),
-        against_itself("orientation_error", GROUP, found.orientation_error_deg, ORIENTATION_TOLERANCE_DEG, "deg"),
+        against_itself("unsolved_poses", GROUP, float(lost), NONE_ALLOWED),
+        against_itself("position_error", GROUP, millimetres, POSITION_TOLERANCE_MM, "mm"),
+        against_itself("orientation_error", GROUP, degrees, ORIENTATION_TOLERANCE_DEG, "deg"),
     ]
-    margins = model.Margins(round_trips.NEAR_WRIST_DEG, round_trips.NEAR_ELBOW_DEG, round_trips.NEAR_SHOULDER_MM)
-    return checks, model.RoundTripErrors(**asdict(found), margins=margins)
+    if by_class:
+        return checks, None
+    joints, regular = float(np.degrees(found.worst_regular)), poses - found.near_singular
+    wrist, elbow, shoulder = round_trips.NEAR_WRIST_DEG, round_trips.NEAR_ELBOW_DEG, round_trips.NEAR_SHOULDER_MM
+    note = model.NearSingularLeftOut(regular, poses, wrist, shoulder)
+    checks.insert(1, against_itself("joint_error", GROUP, joints, JOINT_TOLERANCE_DEG, "deg", note))
+    margins = model.Margins(wrist, elbow, shoulder)
+    errors = (poses, found.near_singular, joints, millimetres, degrees, found.unsolved)
+    return checks, model.RoundTripErrors(*errors, margins)
 
 
 OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")

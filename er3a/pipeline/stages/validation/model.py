@@ -14,7 +14,6 @@ from er3a.identifiability.evidence import PartName, PartStatus
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, CheckKind
 from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed, ToolOff
-from er3a.kinematics.round_trips import SlotRoundTrips
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_
@@ -470,9 +469,23 @@ class Margins:
 
 
 @dataclass(frozen=True)
-class RoundTripErrors(SlotRoundTrips):
-    """Worst errors of random poses taken back to joints, and the margins near to which joints are not judged."""
+class RoundTripErrors:
+    """Worst errors of random poses taken back to joints, and the margins near to which joints are not judged.
 
+    Attributes
+    ----------
+    poses : how many; near_singular : how many of them nearer to a singularity than the margins
+    joint_error_deg : worst angle between the joints and the nearest solution, over the other poses
+    position_error_mm, orientation_error_deg : worst over all solutions of all poses
+    unsolved : poses without any solution
+    """
+
+    poses: int
+    near_singular: int
+    joint_error_deg: float
+    position_error_mm: float
+    orientation_error_deg: float
+    unsolved: int
     margins: Margins
 
 

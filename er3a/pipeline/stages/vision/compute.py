@@ -222,7 +222,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     summary = model.VisionSummary(
-        verdict=judged.resting_on(shapes),
+        verdict=judged.with_assumed_shapes(shapes),
         figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,

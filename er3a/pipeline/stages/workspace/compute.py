@@ -99,7 +99,7 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
     asked = study.section(CapabilitySettings)
-    tool = tool_capability(robot, asked, grid.cell, scene, study.seed, margin=margin, proven=proven)
+    tool = tool_capability(robot, asked, grid.cell, scene, margin=margin, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
     corners = model.HullVertices(hull.vertices, shown(robot, samples.q_extreme[hull.of]))
     return model.WorkspaceResults(
@@ -147,7 +147,7 @@ def _summary(
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
-        verdict=judged.resting_on(assumed if examined else None),
+        verdict=judged.with_assumed_shapes(assumed if examined else None),
         figures=_figures(reach, voids, volume, hull, settings.samples),
         samples=settings.samples,
         sampling=settings.sampling,

@@ -20,7 +20,7 @@ from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import ReachExtremes
-from er3a.workspace.capability import Capability, ClearPoses, Overall
+from er3a.workspace.capability import Capability, Overall
 from er3a.workspace.causes import SingleChange, VoidCause
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
@@ -151,10 +151,6 @@ class CapabilityCells(Table):
     manipulability_m3: Singles = column(
         "greatest |det J| of any reached pose; of arms with joints that slide less one m for each that places the tool"
     )
-    reached_tries: NDArray[np.int16] = column("of the random poses tried there, those that are reached")
-    clear_tries: NDArray[np.int16] = column(
-        "of these, those that an arm holds that touches neither the scene nor itself"
-    )
 
 
 class BoxPlaces(Table):
@@ -274,22 +270,6 @@ class RollSummary:
 
 
 @dataclass(frozen=True)
-class ClearSummary:
-    """Random poses tried in each cell and sector, and of those reached the share held with nothing touched, by volume.
-
-    ``scene`` is as in :class:`PlacementSummary`; ``without`` counts cells and sectors with poses that are reached, but
-    none that was found clear.
-    """
-
-    scene: str | None
-    tries: int
-    reached: int
-    clear: int
-    share: float
-    without: int
-
-
-@dataclass(frozen=True)
 class CapabilitySummary:
     """What the tool can do in the cells of the section, in so many directions and sectors of azimuth.
 
@@ -314,7 +294,6 @@ class CapabilitySummary:
     arm_angles: int
     named_branches: bool
     coarse: bool
-    clear: ClearSummary
 
 
 class CapabilityMissing(Finding, code="workspace.capability_missing"):
@@ -401,14 +380,6 @@ class StandSummary:
     served_from_m: float | None
     why_none: WhyNoStand | None
     above: PlaceSummary | None
-
-    @property
-    def gaps_m(self) -> tuple[float, float, float] | None:
-        """How high what stands between them would be for the place above, and from what to what it may be."""
-        if self.above is None:
-            return None
-        gap = self.above.centre_m[2] - self.above.size_m[2] / 2 - self.height_m
-        return gap, max(0.0, gap - self.above.room_down_m[2]), gap + self.above.room_up_m[2]
 
 
 @dataclass(frozen=True)
@@ -630,19 +601,16 @@ def void_surfaces(voids: Sequence[Void]) -> tuple[VoidVertices, VoidTriangles]:
     )
 
 
-def capability(middles: Reals, found: Capability, tried: ClearPoses, bars: bool) -> CapabilityCells:
-    """Reached cells and sectors, with the random poses tried in each.
+def capability(middles: Reals, found: Capability, bars: bool) -> CapabilityCells:
+    """Reached cells and sectors.
 
     Parameters
     ----------
     middles : (n, 2), m, of all cells: distance from axis 1 and height, or of bars
-    tried : one entry for each reached cell and sector
     bars : whether cells are bars, divided along their length in place of sectors of azimuth
     """
     cell, sector = np.nonzero(found.reachability)
     return CapabilityCells(
-        reached_tries=tried.reached.astype(np.int16),
-        clear_tries=tried.clear.astype(np.int16),
         rho_m=middles[cell, 0],
         z_m=middles[cell, 1],
         azimuth_deg=360.0 * (sector + (0.5 if bars else 0.0)) / found.reachability.shape[1],

@@ -22,9 +22,8 @@ from er3a.numerics.si_units import stated
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import BoxTask, CapabilitySettings
 from er3a.robots.robot import Robot
-from er3a.workspace.capability import ClearPoses, map_capability, overall, rings, try_poses
+from er3a.workspace.capability import map_capability, overall, rings
 from er3a.workspace.cell_frame import cell_frame, is_quick
-from er3a.workspace.cells import ring_volumes
 from er3a.workspace.directions import RING, cone_directions
 from er3a.workspace.orientations import AskedOrientations, asked_of
 from er3a.workspace.placement import (
@@ -57,8 +56,7 @@ from er3a.workspace.tool_inverse import (
 
 SAME_HEIGHT = 1e-9  # m
 MAX_ACROSS, MAX_ACROSS_REDUNDANT = 64, 28
-CELL_TRIES, MIN_TRIES = 192, 3  # poses tried in a cell, and in each sector of it
-CELLS_S, CLEAR_S, PLACES_S = 8.0, 2.0, 8.0  # s by the model of `pose_cost`, never of a clock: equal on all machines
+CELLS_S, PLACES_S = 8.0, 8.0  # s by the model of `pose_cost`, never of a clock: equal on all machines
 _MIN_CELLS, _MIN_DIRECTIONS, _MAX_ROLLS = 400, 24, 4
 _FREE_S = 1.5e-5  # poses that take less are asked as the study says
 _WIDE_STEPS = np.radians([20.0, 30.0])
@@ -76,7 +74,7 @@ class CapabilityPlan:
     ----------
     step : rad, between directions of the box's cone; lattice : m, about the spacing of points for the box,
         None where it would be wider than the box
-    poses : how many may be tried for clear ones, None as many as it takes; coarse : whether time made it coarser
+    coarse : whether time made it coarser
     """
 
     asked: AskedOrientations
@@ -85,23 +83,7 @@ class CapabilityPlan:
     cells: Reals
     step: float
     lattice: float | None
-    poses: int | None
     coarse: bool
-
-    def tries_of(self, reached: int, sectors: int) -> int:
-        """How many random poses to try in each reached cell and sector.
-
-        Parameters
-        ----------
-        reached : cells and sectors that are reached, of which all together have ``poses`` to try at most
-        sectors : of azimuth; each cell's tries are shared out among them
-
-        Returns
-        -------
-        tries : at least 1
-        """
-        tries = max(MIN_TRIES, CELL_TRIES // sectors)
-        return tries if self.poses is None else max(1, min(tries, self.poses // max(1, reached)))
 
 
 def plan_of(
@@ -127,7 +109,7 @@ def plan_of(
         count = 1
     per_pose = pose_cost(robot) * values
     if is_quick(robot) and per_pose < _FREE_S:
-        return CapabilityPlan(asked, count, cell, cells, RING, cell, None, False)
+        return CapabilityPlan(asked, count, cell, cells, RING, cell, False)
     most, fine = int(CELLS_S / per_pose), len(cells)
     if len(asked.roll.angles) > _MAX_ROLLS and fine * count * len(asked.roll.angles) > most:
         asked = asked_of(robot, _MAX_ROLLS) or asked
@@ -138,7 +120,7 @@ def plan_of(
         cell *= _COARSER
         cells = _cells(robot, cell, proven)
     step, lattice = _for_places(robot, asked, task, min(cell, float(task.box[:2].min())), tries * per_pose)
-    return CapabilityPlan(asked, count, cell, cells, step, lattice, int(CLEAR_S / per_pose), len(cells) < fine)
+    return CapabilityPlan(asked, count, cell, cells, step, lattice, len(cells) < fine)
 
 
 def _for_places(
@@ -168,7 +150,6 @@ def _cells(robot: Robot, cell: float, proven: Proven | None) -> Reals:
 
 
 LISTED = 5
-CLEAR_STREAM = 11
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +167,6 @@ def tool_capability(
     settings: CapabilitySettings,
     cell: float,
     scene: Scene | None = None,
-    seed: int = 0,
     *,
     margin: float = 0.0,
     proven: Proven | None = None,
@@ -197,8 +177,7 @@ def tool_capability(
     ----------
     cell : m, edge of the workspace's cells; taken coarser where more would span the reach, or take too long, than
         the plan of cells allows
-    scene : what the arm may not touch where it serves the box, and in clear poses; nor may it touch itself
-    seed : of the poses tried
+    scene : what the arm may not touch where it serves the box; nor may it touch itself
     margin : m, that the arm keeps from the scene and from itself where it serves the box
     proven : what is known of the reach; cells that are proven empty need not be asked
     """
@@ -213,8 +192,6 @@ def tool_capability(
     asked, task, frame, cells = plan.asked, replace(task, step=plan.step), cell_frame(robot), plan.cells
     middles = np.stack([cells[:, :2].mean(axis=1), cells[:, 2:].mean(axis=1)], axis=1)
     found = map_capability(robot, middles, plan.count, asked)
-    bodies, random = Bodies(robot, scene), np.random.default_rng([seed, CLEAR_STREAM])
-    tried = _tried(robot, plan, middles, found.reachability, bodies, random)
     summary = model.CapabilitySummary(
         asked=asked.kind,
         directions=plan.count,
@@ -227,12 +204,11 @@ def tool_capability(
         arm_angles=tried_values(robot),
         named_branches=bool(slot_labels(robot)),
         coarse=plan.coarse,
-        clear=_clear_summary(cells, frame.bar, found.reachability, tried, scene),
     )
     placement, places = _placed(
         robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
     )
-    return ToolCapability(summary, placement, model.capability(middles, found, tried, frame.bar > 0), places)
+    return ToolCapability(summary, placement, model.capability(middles, found, frame.bar > 0), places)
 
 
 def _placed(
@@ -345,31 +321,6 @@ def _best_over(
             over &= ~(other.holds(corners).any(axis=1) & (underside >= other.height))
     rows = np.flatnonzero(over)
     return replace(placement, chosen=[int(rows[row]) for row in choose_places(within, task, places.rows(over), 1)])
-
-
-def _tried(
-    robot: Robot, plan: CapabilityPlan, middles: Reals, reachability: Reals, bodies: Bodies, random: np.random.Generator
-) -> ClearPoses:
-    (cell, sector), frame = np.nonzero(reachability), cell_frame(robot)
-    places, tries = (frame.place_of(sector), frame.width), plan.tries_of(len(cell), frame.sectors)
-    return try_poses(robot, middles[cell], places, tries, bodies.free, random, asked=plan.asked)
-
-
-def _clear_summary(
-    cells: Reals, bar: float, reachability: Reals, tried: ClearPoses, scene: Scene | None
-) -> model.ClearSummary:
-    """Cells weigh by their volume and reachability, since each was tried equally often."""
-    cell, _ = np.nonzero(reachability)
-    volume = ring_volumes(cells, bar)[cell]
-    reached = float(volume @ tried.reached)
-    return model.ClearSummary(
-        scene=scene.title if scene else None,
-        tries=tried.tries,
-        reached=int(tried.reached.sum()),
-        clear=int(tried.clear.sum()),
-        share=float(volume @ tried.clear) / reached if reached > 0 else 0.0,
-        without=int(((tried.reached > 0) & (tried.clear == 0)).sum()),
-    )
 
 
 def _task(asked: BoxTask) -> Task:

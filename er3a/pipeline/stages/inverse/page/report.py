@@ -31,7 +31,7 @@ from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import GRID, HIGHLIGHT, INK, JOINT_NAMES, MUTED, colour_of, shape_of
+from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
 from er3a.robots.joint_limits import LimitsExceeded, meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -43,20 +43,15 @@ TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
 
 
 def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Picture:
-    """All arm shapes that solve a target, from the side and from above, with the joint angles of each branch.
+    """All arm shapes that solve a target, from the side and from above.
 
     Parameters
     ----------
     branches : the best row of each branch
     """
-    panels = 3 if len(branches) else 2
-    ratios = [1, 1, 1.25][:panels]
-    width = 11.5 if panels == 3 else 8.5
-    figure, axes = row_of_panels(panels, width, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=ratios)
+    figure, axes = row_of_panels(2, 8.5, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
     handles = _draw_arms(axes[0], axes[1], robot, target, branches)
-    if panels == 3:
-        handles += _draw_joints(axes[2], robot, target, branches)
-    figure.legend(handles=handles, loc="lower center", ncols=5 if panels == 3 else 2, frameon=False, fontsize=9)
+    figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=9)
     alt = tr(
         "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
     )
@@ -80,7 +75,7 @@ def _conclude(target: model.TargetResult) -> str:
     if target.collide:
         return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
     if target.solutions:
-        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit: a cross on the right.")
+        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit.")
     return tr("The arm, drawn at the reference, can't reach the target.")
 
 
@@ -140,44 +135,6 @@ def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: st
     side.plot([point[:2] @ level], [point[2]], zorder=8, **style)
     top.plot([point[0]], [point[1]], zorder=8, **style)
     return Line2D([], [], label=label, **style)
-
-
-def _draw_joints(axes: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> list[Line2D]:
-    lower, upper = shown(robot, robot.lower), shown(robot, robot.upper)
-    angles = branches.q_deg
-    for joint in range(robot.joints):
-        axes.barh(joint, upper[joint] - lower[joint], 0.86, left=lower[joint], color=GRID, zorder=1)
-        reference = target.q_ref_deg[joint]
-        axes.plot([reference, reference], [joint - 0.43, joint + 0.43], color=INK, linewidth=0.9, zorder=2)
-        for place, rank in enumerate(branches.rank):
-            y = joint + 0.8 * ((place + 0.5) / max(len(branches), 1) - 0.5)
-            x = angles[place, joint]
-            outside = not lower[joint] - 1e-6 <= x <= upper[joint] + 1e-6
-            colour = colour_of(shape_of(int(branches.branch[place]), branches.label[place])) if rank else MUTED
-            style: dict[str, Any] = {"marker": "o", "markersize": 4.5, "color": colour}
-            if rank == 1:
-                style |= {"marker": "D", "markersize": 8}
-            elif outside:
-                style = {"marker": "x", "markersize": 5.5, "color": HIGHLIGHT, "markeredgewidth": 1.6}
-            elif not rank:
-                style |= {"markerfacecolor": "none"}
-            axes.plot([x], [y], linestyle="none", zorder=5 if rank == 1 else 4, **style)
-    axes.set_yticks(range(robot.joints), JOINT_NAMES[: robot.joints])
-    axes.invert_yaxis()
-    axes.grid(visible=False, axis="y")
-    axes.set_xticks(np.arange(-360, 361, 90))
-    widest = max(np.abs([lower, upper]).max(), np.abs(angles).max()) + 15
-    axes.set_xlim(-widest, widest)
-    what = tr("joint angle (deg); grey: allowed range, line: reference")
-    if robot.sliding.any():
-        what = tr("joint angle (deg), or mm where a joint slides;\ngrey: allowed range, line: reference")
-    axes.set_xlabel(what)
-    axes.set_title(tr("Joint angles, one mark per branch"), **TITLE)
-    handles = []
-    if not branches.within_limits.all():
-        mark: dict[str, Any] = {"marker": "x", "color": HIGHLIGHT, "markeredgewidth": 1.6, "linestyle": "none"}
-        handles.append(Line2D([], [], label=tr("joint beyond its limit"), **mark))
-    return handles
 
 
 def _shape_word(label: str, branch: int) -> str:

@@ -25,7 +25,6 @@ from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import (
     millimetres,
     no_box_text,
-    range_text,
     reached_text,
     run_again_text,
     stand_text,
@@ -53,30 +52,27 @@ def tray_rows(
     reached = page.whole_sentence(reached_text(placement, place, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
-        (tr("Margins"), _margins(tray, results, placement)),
+        (tr("Margins"), _margins(place)),
         (tr("Motions"), _hindered(placing)),
         (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
     ]
 
 
-def _margins(tray: Tray, results: model.WorkspaceResults, placement: model.PlacementSummary) -> str:
-    """What room a place has; its height is kept where others bring the arm nearer to a singular pose."""
-    place, gaps = tray.place, tray.below.gaps_m if tray.below and tray.floor is not None else None
-    height = range_text(place, gaps, placement.task.limit_margin_deg, results.places)
-    room = _room(place, "xy" if height else "xyz")
-    moved = room and tr(
-        "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
-        "this place only.",
-        room=room,
-    )
+def _margins(place: model.PlaceSummary) -> str:
+    """What room a place has."""
+    room = _room(place)
     ratio = fixed(100 * place.manipulability_ratio, 1)
     texts = [
         _nearest_limit(place),
         _nearest_bodies(place),
         tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
-        moved,
-        height,
+        room
+        and tr(
+            "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
+            "this place only.",
+            room=room,
+        ),
     ]
     return joined(texts, " ")
 
@@ -119,14 +115,16 @@ def _nearest_bodies(place: model.PlaceSummary) -> str:
     return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
-def _room(place: model.PlaceSummary, axes: str = "xyz") -> str:
-    """How far the tray can be moved along axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds; empty
-    where it can't."""
-    if not any((*place.room_down_m[: len(axes)], *place.room_up_m[: len(axes)])):
+def _room(place: model.PlaceSummary) -> str:
+    """How far the tray can be moved along its axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds.
+
+    Empty where it can't be moved.
+    """
+    if not any((*place.room_down_m, *place.room_up_m)):
         return ""
     parts = []
     whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
-    for axis, down, up in zip(axes, *whole):
+    for axis, down, up in zip("xyz", *whole):
         if down == up:
             parts.append(f"{axis} {'±' if up else ''}{fixed(up, 0)}")
         elif down or up:
@@ -272,13 +270,6 @@ def across_slide(capability: model.CapabilitySummary) -> Reals:
     """Where bars begin in the plane across the slide, counted from the base's origin, (2,), m; 0 for rings."""
     frame = capability.frame
     return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
-
-
-def clear_percent(cells: model.CapabilityCells) -> Reals:
-    """Of the poses tried in each cell and reached, those held with nothing touched, %; NaN where none was reached."""
-    reached = cells.reached_tries.astype(float)
-    found: Reals = np.divide(100.0 * cells.clear_tries, reached, out=np.full(len(reached), np.nan), where=reached > 0)
-    return found
 
 
 def placement_views(
@@ -429,45 +420,24 @@ def _placement_context(
 
 def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
     cells = results.capability
-    upright, reached, held = (
+    upright, reached = (
         (
             tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability"),
             tr("Slices along the slide of joint 1: reachability"),
-            tr("Slices along the slide of joint 1: reached poses that can be held without collision"),
         )
         if capability.bar_m
         else (
             tr("Slices through axis 1: reachability, IK solutions, manipulability"),
             tr("Slices across axis 1: reachability"),
-            tr("Slices across axis 1: reached poses that can be held without collision"),
         )
     )
-    of_held = level_slices(capability, cells, clear_percent(cells), tr("reached poses held without collision (%)"))
     of_reached = level_slices(
         capability, cells, 100.0 * cells.reachability.astype(float), tr("tool orientations reached (%)")
     )
     return [
         Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
         Picture(of_reached, reached, _level_caption(capability)),
-        Picture(of_held, held, _clear_caption(capability.clear, results.summary.verdict.shapes is not None)),
     ]
-
-
-def _clear_caption(clear: model.ClearSummary, assumed: bool) -> str:
-    touched = tr("“{scene}” or the arm itself", scene=own_title(clear.scene)) if clear.scene else tr("the arm itself")
-    return tr(
-        "An estimate by volume: {share} % of the poses reached can be held without touching {touched}. {tries} random "
-        "poses were tried in each cell and sector: {reached} are reached, {clear} of them {held}; in {without} cells "
-        "and sectors none was found. Outer cells hold more volume, so the share is not the quotient of these counts. "
-        "Shares of so few tries distinguish good regions from bad ones, not single cells.",
-        share=number(100 * clear.share, 2),
-        touched=touched,
-        tries=clear.tries,
-        reached=number(clear.reached),
-        clear=number(clear.clear),
-        without=number(clear.without),
-        held=tr("clear of the assumed shapes") if assumed else tr("proven collision-free"),
-    )
 
 
 def _level_caption(capability: model.CapabilitySummary) -> str:
