@@ -301,7 +301,7 @@ def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
     names = np.array(["can"] * 3 + ["missed"] * 3)
     ways = PathRows(names, names, np.arange(6), np.tile([0.0, 2, 3], 2), np.vstack([q, q]))
     objects = [SimpleNamespace(name=name, outcome=outcome) for name, outcome in GRASPED.items()]
-    empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 4)
+    empty = VisionResults(SimpleNamespace(objects=objects), *(None,) * 3)
     vision = SimpleNamespace(results=replace(empty, ways=ways))
     sound = {"vision": ["can"]}
     found = placing({"workspace": placed(), "vision": vision}, robot, {}, sound)
