@@ -8,14 +8,14 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.lexing import MisreadError, Words
+from er3a.programs.lexing import MisreadError, ProgramText, Words
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -516,6 +516,9 @@ def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs:
     words.finish()
     if isinstance(step, syntax.Constant) and step.value == 0:
         raise MisreadError(f"{by} 0")
+    if words.lexicon.counts_down and isinstance(first, syntax.Constant) and isinstance(last, syntax.Constant):
+        ends = syntax.numbers((first.value, last.value))
+        step = syntax.Constant(-1) if step is None and ends and ends[0] > ends[1] else step
     builder.open_for(place, name, first, last, step, text)
 
 
@@ -541,6 +544,74 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
     error : names the place's file, line and element
     """
     return InputError(place.file, place.where, problem, remedy)
+
+
+COMMENT_SIGNS = re.compile(r"^(?:[!;#]|//|\(\*)|\*\)$")
+
+
+def statements(
+    source: ProgramText, breaks: re.Pattern[str], is_over: Callable[[str, str], bool]
+) -> Iterator[tuple[Place, str, bool]]:
+    """Divide a program's text into statements and comments.
+
+    Parameters
+    ----------
+    breaks : what matters for that, by groups: ``comment``; ``text`` in quotes; ``bad``, what begins one of these
+        without its end; ``alone``, a word that is a statement; ``begin``, a word with which one begins; ``mark``, with
+        which one may end; ``line``, the end of a line that ends none
+    is_over : whether a statement ends, by its text so far and the mark after it, which is empty at the end of the file
+
+    Returns
+    -------
+    statements : each with its first line, its text without comments, and whether it is a comment. Comments within a
+        statement are left out.
+
+    Raises
+    ------
+    InputError
+        for texts, comments and statements without an end
+    """
+    text, line, first = "", 1, 1
+    for kind, part in _parts(source.text, breaks):
+        place = Place(source.path, line)
+        if not text:
+            first = line
+        if kind == "bad":
+            what, close = ("text", part) if part in "\"'" else ("comment", "*)")
+            raise fault(place, f"a {what} has no end", f"Close it with {close}")
+        over = kind in ("alone", "begin") or (kind == "mark" and is_over(text, part))
+        if over:
+            whole = _in_one_line(text + part if kind == "mark" and part not in ";\n" else text)
+            if whole:
+                yield Place(source.path, first), whole, False
+            text, first = part if kind == "begin" else "", line
+        if kind == "alone":
+            yield place, part, False
+        elif kind == "comment" and not text:
+            yield place, COMMENT_SIGNS.sub("", part).strip(), True
+        elif kind != "comment" and not over and (text or part.strip()):
+            text += part
+        line += part.count("\n")
+    if text.strip() and not is_over(text, ""):
+        problem = f"'{_in_one_line(text)[:40]}' has no end"
+        raise fault(Place(source.path, first), problem, "End each statement with ; and close each bracket")
+    if text.strip():
+        yield Place(source.path, first), _in_one_line(text), False
+
+
+def _parts(text: str, breaks: re.Pattern[str]) -> Iterator[tuple[str, str]]:
+    """What is found in a text, by its group, and what stands between."""
+    at = 0
+    for match in breaks.finditer(text):
+        if match.start() > at:
+            yield "", text[at : match.start()]
+        yield match.lastgroup or "", match.group()
+        at = match.end()
+    yield "", text[at:]
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split()) if "\n" in text.strip() else text.strip()
 
 
 Each = Callable[[syntax.Expression], syntax.Expression]

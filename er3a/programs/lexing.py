@@ -45,6 +45,8 @@ class Lexicon:
     right : operators that stand before one operand, with the rank of what they take
     constants : names that are values, in capital letters
     folds : whether ``a`` and ``A`` are one name
+    fields : names that are never a module's own, such as those of coordinates
+    counts_down : whether a loop counts down by itself where its first value is the greater one
     """
 
     pattern: re.Pattern[str]
@@ -52,13 +54,25 @@ class Lexicon:
     right: Mapping[str, int]
     constants: Mapping[str, bool]
     folds: bool = False
+    fields: frozenset[str] = frozenset()
+    counts_down: bool = False
+
+
+Names = Mapping[str, str]
+"""Names of a module that others do not see, with those under which the program has them."""
+NO_NAMES: Names = {}
 
 
 class Words:
-    """The words of a statement, read one after another."""
+    """The words of a statement, read one after another.
 
-    def __init__(self, lexicon: Lexicon, text: str):
-        self.lexicon = lexicon
+    Parameters
+    ----------
+    names : other names that the program has for some
+    """
+
+    def __init__(self, lexicon: Lexicon, text: str, names: Names = NO_NAMES):
+        self.lexicon, self.text = lexicon, text
         self.kinds: list[str] = []
         self.texts: list[str] = []
         self.at, self._depth, self._length = 0, 0, 0
@@ -69,6 +83,15 @@ class Words:
             self.texts.append(match.group().upper() if folds and kind == "name" else match.group())
         self.kinds.append("end")
         self.texts.append("")
+        if names:
+            self.texts = [
+                word if before in (".", "\\") or word in lexicon.fields else names.get(word, word)
+                for before, word in zip(("", *self.texts), self.texts)
+            ]
+
+    def offset(self) -> int:
+        """Where in the text the next word begins."""
+        return [match.start() for match in self.lexicon.pattern.finditer(self.text)][self.at]
 
     @property
     def kind(self) -> str:
