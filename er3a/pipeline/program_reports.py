@@ -428,12 +428,18 @@ def finite(value: Any) -> Any:
 
     Parameters
     ----------
-    value : dicts, lists and plain values; a NaN or infinite number is replaced
+    value : dicts, lists and plain values; a NaN or infinite number is replaced, and a long text cut
+
+    Returns
+    -------
+    value : a copy
     """
     if isinstance(value, dict):
         return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list):
         return [finite(part) for part in value]
+    if isinstance(value, str):
+        return excerpt(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -442,7 +448,7 @@ def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
     record = plain(verdict)
     record.pop("place")
     line = record.pop("line")
-    return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **record}
+    return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **finite(record)}
 
 
 FINGERPRINT = "primaryLocationLineHash"

@@ -27,6 +27,7 @@ STEP_M, STEP_RAD = 0.02, 0.1
 MAX_STEPS = 10_000  # on a way that no arm can take
 
 Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
+AT_A_CHANGE = math.radians(1.0)
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
@@ -207,12 +208,18 @@ class Resolver:
 
 
 def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Reals) -> Flags:
-    """Which of joint vectors (k, n) in rad are meant: (k,).
+    """Which of joint vectors (k, n) in rad, solutions of one target, are meant: (k,).
 
-    The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
-    sides at all, as an arm without a spherical wrist, is not checked.
+    Where none is exactly, joints within ``AT_A_CHANGE`` of where their sign or quarter changes belong to both sides:
+    the program rounds its numbers, and no arm is exactly as its table. The wrist centre's sides are compared with those
+    in the arm's zero pose; what has no side there, or has no such sides at all, as an arm without a spherical wrist, is
+    not checked.
     """
-    met: Flags = np.asarray(((rows >= branch.ranges[:, 0]) & (rows <= branch.ranges[:, 1])).all(axis=1), np.bool_)
+    for beside in (0.0, AT_A_CHANGE):
+        within = (rows >= branch.ranges[:, 0] - beside) & (rows <= branch.ranges[:, 1] + beside)
+        met: Flags = np.asarray(within.all(axis=1), np.bool_)
+        if met.any():
+            break
     if branch.behind_axis_1 is None and branch.behind_lower_arm is None:
         return met
     zero = factors_where_defined(robot, np.zeros((1, robot.joints)))
