@@ -31,7 +31,8 @@ from er3a.programs.machine import execute
 from er3a.programs.program_findings import ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.rapid.reader import MOTIONS
-from er3a.programs.writing import WriteOptions, solutions_meant
+from er3a.programs.solving import solutions_meant
+from er3a.programs.writing import WriteOptions
 
 ROBOT = load_robot("er3a_c60")
 NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
