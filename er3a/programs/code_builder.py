@@ -614,9 +614,6 @@ def _in_one_line(text: str) -> str:
     return " ".join(text.split()) if "\n" in text.strip() else text.strip()
 
 
-Each = Callable[[syntax.Expression], syntax.Expression]
-
-
 def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
     """The routines by name, with calls of each other taken out of expressions.
 
@@ -650,7 +647,7 @@ def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple
             code.append(operation)
             continue
         calls = _Calls(known, operation)
-        last = mapped(operation, calls.out)
+        last = syntax.mapped(operation, calls.out)
         if isinstance(last, syntax.Doing) and last.what.function in known:
             call = last.what
             last = syntax.Call(last.place, call.function, call.arguments, call.keywords, last.text)
@@ -684,7 +681,7 @@ class _Calls:
         """
         if isinstance(expression, syntax.Constant | syntax.Variable):
             return expression
-        expression = within(expression, self.out)
+        expression = syntax.within(expression, self.out)
         if not isinstance(expression, syntax.Invocation):
             return expression
         name = expression.function
@@ -695,65 +692,3 @@ class _Calls:
         if name[0] != "%":
             self.found.append(syntax.Doing(self.place, expression, f"{name}(...)", within=True))
         return expression
-
-
-def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
-    """An expression with those right below it replaced.
-
-    Parameters
-    ----------
-    each : makes the replacement of one expression
-
-    Returns
-    -------
-    expression : a copy; one that has none below it is returned as it is
-    """
-    match expression:
-        case syntax.Member(of=of):
-            return replace(expression, of=each(of))
-        case syntax.Unary(of=of):
-            return replace(expression, of=each(of))
-        case syntax.Element(of=of, indices=indices):
-            return replace(expression, of=each(of), indices=tuple(map(each, indices)))
-        case syntax.Invocation(arguments=arguments, keywords=keywords):
-            placed = tuple(None if one is None else each(one) for one in arguments)
-            return replace(expression, arguments=placed, keywords=tuple((name, each(one)) for name, one in keywords))
-        case syntax.Binary(left=left, right=right):
-            return replace(expression, left=each(left), right=each(right))
-        case syntax.Aggregate(items=items):
-            return replace(expression, items=tuple((name, each(one)) for name, one in items))
-        case syntax.Listed(items=listed):
-            return replace(expression, items=tuple(map(each, listed)))
-        case _:
-            return expression
-
-
-def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
-    """An operation with its expressions replaced.
-
-    Parameters
-    ----------
-    each : makes the replacement of one expression; of a target that is assigned to, only of its parts such as indices
-
-    Returns
-    -------
-    operation : a copy; one without expressions is returned as it is
-    """
-    match operation:
-        case syntax.Assign(target=target, value=value):
-            return replace(operation, target=within(target, each), value=None if value is None else each(value))
-        case syntax.Branch(condition=condition):
-            return replace(operation, condition=each(condition))
-        case syntax.Return(value=value):
-            return replace(operation, value=None if value is None else each(value))
-        case syntax.Move(arguments=arguments, settings=settings):
-            placed = tuple(None if one is None else each(one) for one in arguments)
-            return replace(operation, arguments=placed, settings=tuple((name, each(one)) for name, one in settings))
-        case syntax.Waiting(of=of):
-            return replace(operation, of=None if of is None else each(of))
-        case syntax.Doing(what=what):
-            found = within(what, each)
-            assert isinstance(found, syntax.Invocation)
-            return replace(operation, what=found)
-        case _:
-            return operation

@@ -464,21 +464,14 @@ def _labels(routine: syntax.Routine) -> frozenset[int]:
     return frozenset((*jumps, *branches))
 
 
-def _names(expression: syntax.Expression | None) -> Iterator[str]:
-    """All variables in an expression."""
-    if isinstance(expression, syntax.Variable):
-        yield root(expression.name)
-    for each in syntax.inner(expression):
-        yield from _names(each)
-
-
 def _counts(program: syntax.Program) -> set[str]:
     """Variables that are computed from themselves, and on which nothing else depends, such as counts of parts."""
     found: set[str] = set()
     read = {parameter.name for routine in program.routines.values() for parameter in routine.parameters}
     for operation in program.operations():
         own = variable_of(operation.target) if isinstance(operation, syntax.Assign) else ""
-        names = {name for each in syntax.expressions_of(operation)[bool(own) :] for name in _names(each)}
+        inside = syntax.parts(operation.value if isinstance(operation, syntax.Assign) and own else operation)
+        names = {root(each.name) for each in inside if isinstance(each, syntax.Variable)}
         found |= names & {own}
         read |= names - {own}
     return found - read

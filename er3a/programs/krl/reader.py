@@ -291,7 +291,6 @@ HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(("RESUME", "SPL", "SPL_REL", "SPLINE", "PTP_SPLINE", "ENDSPLINE"), _not_followed),
 }
 
-GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 DECLARED = re.compile(r"(?im)^[ \t]*DECL[ \t]+(GLOBAL[ \t]+)?\w+[ \t]+([\w$]+)")
 ROUTINE = re.compile(r"(?im)^[ \t]*(GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+(?:\s*\[[^\]]*\])?)?[ \t]+(\w+)")

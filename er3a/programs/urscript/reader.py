@@ -35,8 +35,6 @@ UR = Lexicon(
 )
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
-CHANGED = "%changed"
-"""What a list is after a method changed it, as a function of itself, the method's name and its arguments."""
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
@@ -300,24 +298,10 @@ def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: s
     name, _, method = call.function.partition(".")
     if method not in LIST_METHODS:
         return False
-    builder.add(
-        syntax.Assign(
-            place,
-            syntax.Variable(name),
-            syntax.Invocation(CHANGED, (syntax.Variable(name), syntax.Constant(method), *call.arguments)),
-            text,
-        )
-    )
+    builder.unclear(place, syntax.Variable(name), text)
     return True
 
 
 def _called(operation: syntax.Operation) -> Iterator[str]:
     """Functions that an operation calls."""
-    waiting = [*syntax.expressions_of(operation)]
-    if isinstance(operation, syntax.Doing):
-        waiting = [operation.what]
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, syntax.Invocation):
-            yield each.function
-        waiting += syntax.inner(each)
+    return (each.function for each in syntax.parts(operation) if isinstance(each, syntax.Invocation))
