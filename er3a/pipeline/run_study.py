@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from functools import partial
 from html import escape
 from io import StringIO
+from itertools import chain
 from logging import WARNING, LogRecord
 from pathlib import Path
 from types import ModuleType
@@ -139,7 +140,7 @@ class RunLog(LogHandlerBase):
         elif event == LogEvent.ERROR:
             if ended := _JOB_ENDED.search(record.getMessage()):
                 self._killed[ended[1]] = int(ended[2] or max(int(ended[3]) - 128, 0))
-            else:
+            elif "At least one job did not complete" not in record.getMessage():  # each has its own line
                 self._print(_error_line(record.getMessage()))
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
@@ -167,7 +168,11 @@ class RunLog(LogHandlerBase):
 
 
 def _concerns_a_person(record: LogRecord) -> bool:
-    return record.levelno >= WARNING or record.getMessage().startswith("Nothing to be done")
+    """Whether a plain message of Snakemake is shown: what it warns of, unless a job's own line has said it."""
+    text = record.getMessage()
+    if text.startswith("Exiting because a job execution failed"):
+        return False
+    return record.levelno >= WARNING or text.startswith("Nothing to be done")
 
 
 def _error_line(text: str) -> str:
@@ -187,6 +192,7 @@ def _verdict(robot: str, stage: str) -> str:
 
 
 _STATE = Path(".snakemake")
+_LOGS = Path("logs")
 
 
 class RunError(Er3aError):
@@ -218,6 +224,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         if asked.dryrun:
             return _dry_run(study_file, results, reports, words, asked)
         until_done.callback(os.close, _taken_lock())
+        refuse_links_outside(results, reports, _LOGS)
         try:
             done = _run(study_file, results, reports, words, asked)
         except Er3aError as error:
@@ -226,6 +233,26 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
     if not done:
         _report_error(reports, "The run did not end well: its output on standard error, and logs/, say why.")
     return done
+
+
+def refuse_links_outside(*written: Path) -> None:
+    """Refuse links that would have a run write or delete files in folders that a study merely points to.
+
+    Parameters
+    ----------
+    written : folders that a run writes into, below the working folder
+
+    Raises
+    ------
+    RunError
+        for the first link that leads out of the working folder
+    """
+    here = Path.cwd().resolve()
+    for folder in written:
+        inside = (Path(place, name) for place, folders, files in os.walk(folder) for name in (*folders, *files))
+        for path in chain([folder], inside):
+            if path.is_symlink() and not path.resolve().is_relative_to(here):
+                raise RunError(f"{path}: a run writes here, and it links to {path.resolve()}. Remove the link")
 
 
 def _report_error(reports: Path, problem: str) -> None:

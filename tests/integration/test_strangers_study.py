@@ -143,16 +143,17 @@ def test_a_folder_in_the_path_of_python_is_taken_out_of_it(stranger, path):
     call("python", "-m", "er3a", "check", "config/study.yaml", PYTHONPATH=path)
 
 
-def test_a_state_folder_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path):
+@pytest.mark.parametrize("place", [".snakemake", "results", "reports/er3_600", "logs"])
+def test_a_folder_written_into_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path, place):
     foreign = tmp_path / "foreign"
     (foreign / "locks").mkdir(parents=True)
     (foreign / "locks/precious").touch()
     study = tmp_path / "study"
-    study.mkdir()
-    (study / ".snakemake").symlink_to(foreign)
+    (study / place).parent.mkdir(parents=True)
+    (study / place).symlink_to(foreign)
     done = run([sys.executable, "-P", "-m", "er3a", "run"], cwd=study)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
-    assert done.stderr.startswith("error: .snakemake: ")
+    assert done.stderr.startswith(f"error: {place}: ")
     assert (foreign / "locks/precious").exists()
 
 
