@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 
 from er3a.kinematics.chain import arm_length
+from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
 from er3a.program_check.program_check_findings import SuspectNumber
 from er3a.programs.execution import Execution, Step
@@ -49,27 +49,29 @@ def _other_units(
     motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool
 ) -> Iterator[tuple[Step, SuspectNumber]]:
     """Targets that are none of the arm's as they are written, and would be in the other unit."""
-    reach, unit = arm_length(robot), "mm" if in_mm else "m"
-    scale = MM if in_mm else 1.0
+    reach = arm_length(robot)
+    unit, meant, scale = ("mm", "m", MM) if in_mm else ("m", "mm", 1.0)
     for step, motion in motions:
         target, other = motion.target, MM if in_mm else 1 / MM
         if isinstance(target, PoseTarget):
             xyz = target.pose[:3, 3]
             small = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
             if (small or not in_mm) and 0.1 * reach < other * np.linalg.norm(xyz) < 1.5 * reach:
-                shown = (f"({', '.join(f'{scale * factor * v:g}' for v in xyz)}) {unit}" for factor in (1.0, other))
-                yield step, SuspectNumber("metres" if in_mm else "millimetres", *shown)
+                yield step, SuspectNumber("unit", _listed(xyz * scale, unit), _listed(xyz * scale * other, unit), meant)
         elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
             q = target.joints
             degrees = np.degrees(q)
             if in_mm and may_be_radians(degrees.tolist()):
-                shown = (
-                    f"({', '.join(f'{v:g}' for v in each)}) deg" for each in (degrees, np.degrees(degrees).round())
+                yield (
+                    step,
+                    SuspectNumber("unit", _listed(degrees, "deg"), _listed(np.degrees(degrees).round(), "deg"), "rad"),
                 )
-                yield step, SuspectNumber("radians", *shown)
             elif not in_mm and MOST_TURNED < np.abs(q).max() <= 360:
-                shown = (f"({', '.join(f'{v:g}' for v in each)}) rad" for each in (q, np.radians(q).round(3)))
-                yield step, SuspectNumber("degrees", *shown)
+                yield step, SuspectNumber("unit", _listed(q, "rad"), _listed(np.radians(q).round(3), "rad"), "deg")
+
+
+def _listed(values: Reals, unit: str) -> str:
+    return f"({', '.join(f'{value:g}' for value in values)}) {unit}"
 
 
 def _value(rate: Rate | None, unit: str) -> float | None:
@@ -90,13 +92,12 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
             yield step, SuspectNumber("share", motion.speed.text, "100 %")
         along, turning = _value(motion.speed, "m/s"), _value(motion.speed, "rad/s")
         if along is not None and along > fastest:
-            kind: Literal["millimetres", "impossible_speed"] = "impossible_speed"
-            texts = f"{MM * along:g} mm/s", f"{MM * fastest:.0f} mm/s"
             if along / MM < fastest:
-                kind, texts = "millimetres", (f"{along:g} m/s", f"{along / MM:g} m/s")
-            yield step, SuspectNumber(kind, *texts)
+                yield step, SuspectNumber("unit", f"{along:g} m/s", f"{along / MM:g} m/s", "mm/s")
+            else:
+                yield step, SuspectNumber("impossible_speed", f"{MM * along:g} mm/s", f"{MM * fastest:.0f} mm/s")
         if turning is not None and turning > quickest > np.radians(turning):
-            yield step, SuspectNumber("degrees", f"{turning:g} rad/s", f"{np.radians(turning):.2f} rad/s")
+            yield step, SuspectNumber("unit", f"{turning:g} rad/s", f"{np.radians(turning):.2f} rad/s", "deg/s")
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
     values = [value for _, value in given if value > 0]
     if len(values) > USUAL:
