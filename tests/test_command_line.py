@@ -159,7 +159,8 @@ def test_a_program_reads_verdicts_and_continuous_integration_an_exit_code(call, 
 
     found = json.loads(verdicts("--json").stdout)
     assert {each["robot"] for each in found} == set(small_study.robots)
-    told = {"robot", "stage", "status", "code", "text", "expected", "demonstrations", "not_examined", "outdated"}
+    told = {"robot", "stage", "status", "code", "text", "expected", "demonstrations", "outdated"}
+    told |= {"checked", "not_checked", "assumed"}
     assert set(found[0]) == told
     statuses = {each["status"] for each in found}
     assert verdicts("--fail-on", "fail").returncode == int("fail" in statuses)
@@ -178,7 +179,7 @@ def test_a_second_run_does_nothing_and_ends_with_1_for_findings_and_with_2_for_a
     cases = list(ElementTree.parse(small_study.folder / "reports/junit.xml").iter("testcase"))
     stages = load_study(small_study.folder / STUDY).stages
     assert len(cases) == sum(len(stages(robot)) for robot in small_study.robots)
-    found = [case for case in cases if "not examined: " in case.findtext("system-out", "")]
+    found = [case for case in cases if "checked: " in case.findtext("system-out", "")]
     assert found, "the small study should have something to tell"
     command = [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--fail-on", "caution"]
     done = processes.run(command, cwd=small_study.folder, env=small_study.environment() | {"NO_COLOR": "1"})

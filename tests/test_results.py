@@ -56,7 +56,7 @@ def leftovers(folder):
 
 def test_shape_of_a_summary(tmp_path, study):
     summary = json.loads(write(tmp_path, study).read_text())
-    shared = ["format_version", "robot", "stage", "verdict", "figures", "not_examined"]
+    shared = ["format_version", "robot", "stage", "verdict", "figures", "checked", "assumed"]
     assert list(summary) == [*shared, "reach_m", "provenance"]
     assert summary["format_version"] == FORMAT_VERSION
     assert summary["verdict"] == {

@@ -111,7 +111,7 @@ BAD = {
     "short quaternion": ([PLACE | {"quaternion_wxyz": [0.999998, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is"),
     "zero quaternion": ([PLACE | {"quaternion_wxyz": [0, 0, 0, 0]}], "targets[0].quaternion_wxyz", "length is 0"),
     "skew matrix": ([PLACE | {"matrix": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}], "targets[0].matrix", "not a rotation"),
-    "mirror": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}], "targets[0].matrix", "reflection"),
+    "mirror": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}], "targets[0].matrix", "left-handed"),
     "two rows": ([PLACE | {"matrix": [[1, 0, 0], [0, 1, 0]]}], "targets[0].matrix", "2 items where at least 3"),
     "unknown Euler order": ([PLACE | {"xyz_deg": [0, 90, 0]}], "targets[0].xyz_deg", "this order of Euler angles"),
     "words for an Euler order": ([PLACE | {"euler_order": "XZX"}], "targets[0].euler_order", "this order of Euler"),

@@ -25,7 +25,7 @@ from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 ROOT = Path(__file__).resolve().parents[1]
 
 SCHEMA = Path(__file__).with_name("junit.xsd")
-GOOD = StageVerdict("arm", "validation", "pass", "v.good", "All checks agree.", not_examined=("steel: \x1b[1m arm",))
+GOOD = StageVerdict("arm", "validation", "pass", "v.good", "All checks agree.", not_checked=("steel: \x1b[1m arm",))
 CAUTION = StageVerdict("arm", "workspace", "caution", "w.void", "Usable; 2 voids.")
 BAD = StageVerdict("arm", "trajectory", "fail", "t.none_safe", "No path is safe: <line> & arc.")
 UNKNOWN = StageVerdict("other", "validation", "no_reference", "v.none", "There is nothing to check against.")
@@ -65,7 +65,7 @@ def test_texts_and_counts(report):
     assert report.find(".//failure").get("message") == BAD.text
     assert report.find(".//failure").get("type") == BAD.code
     said = [each.text for each in report.iter("system-out")]
-    assert said == ["pass: All checks agree.\nnot examined: steel: ?[1m arm", "caution: Usable; 2 voids."]
+    assert said == ["pass: All checks agree.\nnot checked: steel: ?[1m arm", "caution: Usable; 2 voids."]
     assert report.find(".//error").get("message") == "ValueError: ?[31m odd"
     assert dict(report.getroot().attrib) == {"name": "er3a", "tests": "7", "failures": "1", "errors": "1"}
     assert report.find("testsuite[@name='other']").get("skipped") == "3"
@@ -89,7 +89,7 @@ def test_demonstrations_are_counted_apart_and_expectations_that_are_not_met_fail
     assert report.getroot().get("failures") == "1"
     said = {case.get("name"): case.findtext("system-out") for case in report.iter("testcase")}
     assert said == {
-        "validation": "pass: All checks agree.\nnot examined: steel: ?[1m arm",
+        "validation": "pass: All checks agree.\nnot checked: steel: ?[1m arm",
         "dynamics": "demonstration, fail as expected: Masses can't be right.",
         "inverse": "pass: All reached; 2 fail as expected.\ndemonstrations, which fail as expected: 2",
         "collision": "pass: Free.\nexpected: fail",
@@ -325,11 +325,11 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
         assert found[name].status == status, name
         (own_case,) = report.iterfind(f"testsuite[@name='{name}']/testcase[@name='programs']")
         assert [each.tag for each in own_case][:1] == [case], name
-        shown = [line for line in own_case.findtext("system-out", "").splitlines() if line.startswith("not examined: ")]
-        left_out = found[name].not_examined
-        assert shown == [f"not examined: {each}" for each in left_out], name
+        shown = [line for line in own_case.findtext("system-out", "").splitlines() if line.startswith("assumed: ")]
+        assumed = found[name].assumed
+        assert shown == [f"assumed: {each}" for each in assumed], name
         read = status not in ("not_computed", "not_examined")
-        assert any("collisions of a tool" in each for each in left_out) == read, name
+        assert ("nothing is carried" in assumed) == read, name
         (tmp_path / "study.yaml").write_text(yaml.safe_dump(content | {"robots": {name: robots[name]}}))
         for level, code in zip(("caution", "fail"), codes):
             if name != "not_run":

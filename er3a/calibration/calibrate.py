@@ -34,7 +34,6 @@ from er3a.calibration.fit import (
     OUTLIER_ROUNDS,
     PLAUSIBLE,
     ROUNDING,
-    SCALE,
     Fit,
     Subspace,
     covariance_by_poses,
@@ -48,7 +47,7 @@ from er3a.calibration.fit import (
     subspace,
     without_scale,
 )
-from er3a.calibration.observations import Measurement, PointObservations, Touched, observed, spread
+from er3a.calibration.observations import Measurement, PointObservations, Touched, observed
 from er3a.calibration.outcomes import (
     CalibrationError,
     FixedName,
@@ -68,7 +67,7 @@ from er3a.calibration.parameters import (
     settles,
     whole_length_mm,
 )
-from er3a.calibration.plan import d_optimal, touches
+from er3a.calibration.plan import touches
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
@@ -82,11 +81,9 @@ from er3a.comparison.entries import TOOL_COLUMNS, Entry
 from er3a.diagnosis.faults import Faults, SwappedLimits, WrongLimits, repairs_of
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.references.quantities import Pose
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
-SHOWN_POSES = 3
 CLOSE = 0.9  # correlation of two estimates that are named together
 MAX_SCATTER = 3.0  # standard deviations, beyond which the model does not fit
 SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
@@ -173,7 +170,7 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
             every = every or [parameters[k] for k in best.kept]
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
-                more.append(_what_more(robot, name, parameters, (here, best), observations))
+                more.append(_what_more(name, parameters, (here, best), observations))
             if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept) > 0:
                 what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
                 left_out_of_it = tuple(each for each in every if each not in parameters)
@@ -198,7 +195,6 @@ def _with_rough_tool(robot: Robot, observations: PointObservations) -> tuple[Rob
 
 
 def _what_more(
-    robot: Robot,
     level: LevelName,
     parameters: tuple[Entry, ...],
     subspaces: tuple[Subspace, Subspace],
@@ -216,7 +212,6 @@ def _what_more(
         level=level,
         missing=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
-        examples_deg=_examples(robot, [parameters[k] for k in best.kept], observations),
     )
 
 
@@ -235,15 +230,6 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> M
 def _rich(robot: Robot, observations: PointObservations) -> PointObservations:
     """The same points all over the joint range, or more touches of the same things."""
     return touches(robot, observations) if observations.all_touched else observations.rich(robot)
-
-
-def _examples(robot: Robot, kept: list[Entry], observations: PointObservations) -> tuple[Pose, ...]:
-    """Poses that add most information, chosen greedily by the gain in ln det of the information matrix."""
-    poses = spread(robot)
-    candidates = observations.flange_at(robot, poses)
-    blocks = SCALE * jacobian(robot, kept, candidates).reshape(len(poses), 3, len(kept))
-    known = SCALE * jacobian(robot, kept, observations)
-    return tuple(poses[k] for k in d_optimal(known.T @ known, list(blocks), SHOWN_POSES))
 
 
 @dataclass(frozen=True)

@@ -501,8 +501,10 @@ def _fit(
 ) -> Fit:
     """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
-    start = places_at(robot, kept, observations)
     prior = np.full(sum(term.count for term in terms), 1 / TAKEN)
+    unknowns = np.r_[places_at(robot, kept, observations), np.zeros(len(prior))]
+    n, k = len(observations), len(kept)
+    held = holding * np.eye(k if holding else 0, len(unknowns))
 
     def with_errors(coefficients: Reals) -> PointObservations:
         if not terms:
@@ -510,34 +512,27 @@ def _fit(
         errors = JointErrors(robot, terms, coefficients)
         return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
 
-    def weighted(amounts: Reals, coefficients: Reals) -> Reals:
-        values = with_errors(coefficients).predict(robot, kept, amounts[None])[0]
-        return np.concatenate([(values - observations.values_mm) / deviation, prior * coefficients])
+    def weighted(unknowns: Reals) -> Reals:
+        values = with_errors(unknowns[k:]).predict(robot, kept, unknowns[None, :k])[0]
+        return np.concatenate([(values - observations.values_mm) / deviation, prior * unknowns[k:], held @ unknowns])
 
-    def held(rest: Reals, amounts: Reals) -> Reals:
-        return np.concatenate([rest, holding * amounts]) if holding else rest
+    def slopes(unknowns: Reals) -> Reals:
+        seen = with_errors(unknowns[k:])
+        J = jacobian(robot, kept, seen, unknowns[:k]) / deviation[:, None]
+        if terms:
+            here = corrected(robot, kept, unknowns[:k])
+            by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
+            J = np.block([[J, by_terms], [np.zeros((len(prior), k)), np.diag(prior)]])
+        return np.vstack([J, held])
 
-    def slopes(here: Robot, amounts: Reals, coefficients: Reals) -> Reals:
-        seen = with_errors(coefficients)
-        J = jacobian(robot, kept, seen, amounts) / deviation[:, None]
-        if not terms:
-            return J
-        by_terms = term_jacobian(here, robot, terms, observations, seen) / deviation[:, None]
-        return np.block([[J, by_terms], [np.zeros((len(prior), len(kept))), np.diag(prior)]])
-
-    n, k = len(observations), len(kept)
-    unknowns = np.r_[start, np.zeros(len(prior))]
-    before = weighted(np.zeros(k), unknowns[k:])[:n]
-    rest = held(weighted(unknowns[:k], unknowns[k:]), unknowns[:k])
+    before, rest = weighted(np.zeros(len(unknowns)))[:n], weighted(unknowns)
     for number in range(most_steps):
-        here = corrected(robot, kept, unknowns[:k])
-        J = slopes(here, unknowns[:k], unknowns[k:])
-        J = np.vstack([J, holding * np.eye(k, len(unknowns))]) if holding else J
+        J = slopes(unknowns)
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
         for _ in range(HALVINGS):
             trial = unknowns + step
-            new = held(weighted(trial[:k], trial[k:]), trial[:k])
+            new = weighted(trial)
             if new @ new <= rest @ rest * (1 + 1e-9):
                 break
             step = step / 2

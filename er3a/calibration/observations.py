@@ -446,19 +446,6 @@ class PointObservations:
         seen = np.broadcast_to(self.seen[self.touched < 0].any(axis=0), every.seen.shape)
         return replace(every, seen=seen, values_mm=np.zeros(seen.sum()), deviation_mm=every.deviation_mm[: seen.sum()])
 
-    def flange_at(self, robot: Robot, poses: Sequence[Pose]) -> PointObservations:
-        """The flange's point at poses, all coordinates observed.
-
-        Parameters
-        ----------
-        poses : joint values, deg, or mm of those that slide
-
-        Returns
-        -------
-        observations : one point for each pose
-        """
-        return self._at(robot, np.array(poses), np.zeros(len(poses), dtype=bool))
-
     def as_coordinates(self) -> PointObservations:
         """The same points as if their coordinates were measured.
 

@@ -7,7 +7,6 @@ from typing import Literal
 from er3a.by_value import Finding
 from er3a.diagnosis.faults import Faults
 from er3a.errors import Er3aError
-from er3a.references.quantities import Pose
 
 LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
 """Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
@@ -59,7 +58,6 @@ class MorePositions(Finding):
     level : the level that is out of reach
     missing : how many more positions it takes
     entries : those that aren't determined
-    examples_deg : poses that add most
     """
 
     coordinates: int
@@ -69,7 +67,6 @@ class MorePositions(Finding):
     level: LevelName
     missing: int
     entries: tuple[str, ...]
-    examples_deg: tuple[Pose, ...]
 
 
 class MoreTouches(Finding):

@@ -1,17 +1,7 @@
-"""Poses beyond those that were measured: those that add most, and those that touch what was touched.
-
-A pose adds as much as it raises ln det of the information matrix [1]_.
-
-References
-----------
-.. [1] J.-H. Borm, C.-H. Menq, "Determination of optimal measurement configurations for robot calibration based on
-   observability measure", Int. J. of Robotics Research 10(1), 1991.
-"""
+"""Touches that could be added, by the table: more of the same things, all over the joint range."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -26,38 +16,9 @@ from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
 FEW = 6
-RIDGE, RELATIVE_RIDGE = 1e-9, 1e-13
 NEWTON_STEPS = 40
 LONGEST_STEP = 0.2  # rad, m
 TOUCHES_M = 1e-6  # m, within which a planned pose touches
-
-
-def d_optimal(information: Reals, blocks: Sequence[Reals], count: int) -> list[int]:
-    """Greedy choice of the measurements that add most to ln det of the information matrix [1]_.
-
-    Parameters
-    ----------
-    information : (p, p), of what was measured
-    blocks : rows (k, p) of the scaled Jacobian, of each candidate
-    count : how many to choose at most
-
-    Returns
-    -------
-    places : of the chosen candidates, the best first
-    """
-    information = information + max(RIDGE, RELATIVE_RIDGE * np.trace(information)) * np.eye(len(information))
-    chosen: list[int] = []
-    for _ in range(min(count, len(blocks))):
-        half = np.linalg.solve(np.linalg.cholesky(information), np.concatenate(blocks).T).T
-        ends = np.cumsum([0, *(len(block) for block in blocks)])
-        parts = [half[start:end] for start, end in itertools.pairwise(ends)]
-        gain = [np.linalg.slogdet(np.eye(len(part)) + part @ part.T)[1] for part in parts]
-        for at in chosen:
-            gain[at] = -1.0
-        best = int(np.argmax(gain))
-        information = information + blocks[best].T @ blocks[best]
-        chosen.append(best)
-    return chosen
 
 
 def touches(robot: Robot, seen: PointObservations) -> PointObservations:

@@ -51,18 +51,15 @@ SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 ROUNDED = 4  # decimals of mm and deg in a corrected table
-UNITS = {
-    own / read: f"{read_as} → {name}"
-    for (name, own), (read_as, read) in itertools.permutations(
-        {"mm": 1.0, "cm": 10.0, "inch": 25.4, "m": 1000.0}.items(), 2
-    )
-}
-"""What takes lengths from the unit they were read in to their own."""
-ANGLE_UNITS = {
-    math.degrees(1.0): "deg → rad",
-    math.radians(1.0): "180/π deg → deg",
-    math.degrees(math.degrees(1.0)): "deg → π/180 rad",
-}
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # mm
+RAD = math.degrees(1.0)
+ANGLE_UNITS = {"deg": 1.0, "rad": RAD, "gon": 0.9, "π/180 deg": 1 / RAD, "180/π rad": RAD**2}
+"""In deg; the last two are those of angles that were converted once too often."""
+LENGTH_FACTORS = {own / read for own, read in itertools.permutations(LENGTH_UNITS.values(), 2)}
+GON = ANGLE_UNITS["gon"]
+ANGLE_FACTORS = RAD, 1 / RAD, RAD**2, GON, GON / RAD
+"""What takes values from the unit they were read in to their own."""
+NEAR_FACTOR = math.log(1.35)  # of a ratio, as one wrong entry may change it
 USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an arm's table, and of one of both
 LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
 NEAR_UNITS = math.log(20.0)
@@ -75,6 +72,8 @@ USUAL_ANGLES = {
     "speed": (20.0, 1500.0),
 }
 """Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
+NEAR_GON = 0.02  # of the sum of all angles of a column
+SAME_FACTOR = 1e-6
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
 SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
@@ -301,17 +300,16 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
     base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
     joint_zeros = _joint_zeros(robot_a, found)
-    ranges: dict[Uncompared, RangeLayer] = {}
     layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
         "limits": lambda one, other: _limits(one, other, reverses, joint_zeros, tolerances),
         "speeds": _speeds,
     }
-    for name, layer_of in layers_of.items():
-        ranges[name] = layer_of(robot_a, robot_b)
-        for slip in _range_slips(robot_a, robot_b, RANGES[name]) if ranges[name].same is False else ():
+    ranges = {name: layer_of(robot_a, robot_b) for name, layer_of in layers_of.items()}
+    for name in (name for name, layer in ranges.items() if layer.same is False):
+        for slip in _range_slips(robot_a, robot_b, RANGES[name]):
             arms = in_units(robot_a, [slip], "a"), in_units(robot_b, [slip], "b")
-            if layer_of(*arms).same is not False:
-                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer_of(*arms)
+            if (layer := layers_of[name](*arms)).same is not False:
+                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer
                 break
     limits, speeds = ranges["limits"], ranges["speeds"]
     units = UnitLayer(not slips, slips)
@@ -605,7 +603,7 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
     leaves the fewest conventions different, then the smallest. If geometry agrees with none, and it is to be explained,
     one that leaves less than half of the entries different."""
     twists, offsets = (_angle_slips(robot_a, robot_b, columns) for columns in (("alpha",), ("offset",)))
-    options = list(itertools.product(_length_slips(robot_a, robot_b), twists))
+    sets = [(*lengths, *angles) for lengths, angles in itertools.product(_length_slips(robot_a, robot_b), twists)]
 
     def arms(slips: tuple[Cause, ...]) -> tuple[Robot, Robot]:
         return in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
@@ -620,10 +618,10 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
         found = mechanism.match(one, other, tolerances)
         return found.rank[0], found.layers, sum(len(each.entries) for each in slips)
 
-    sets = [(*lengths, *angles) for lengths, angles in options]
     fits = [slips for slips in sets if same(slips)] if len(sets) * len(offsets) > 1 else [()]
     if not fits and explain and len(sets) > 1:
-        nearest = min(sets, key=rank)
+        likely = _length_slips(robot_a, robot_b, only_nearest=True)
+        nearest = min(((*lengths, *angles) for lengths, angles in itertools.product(likely, twists)), key=rank)
         fits = [nearest] if 2 * rank(nearest)[0] < rank(())[0] else []
     every = [(*slips, *more) for slips in fits for more in offsets]
     return _merged(min(every, key=rank) if len(every) > 1 else every[0] if every else ())
@@ -638,15 +636,16 @@ def _merged(slips: tuple[Cause, ...]) -> tuple[Cause, ...]:
     return tuple(found.values())
 
 
-def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
-    """Ways in which a and d of two tables can be in different units: none, both, or one of them."""
+def _length_slips(robot_a: Robot, robot_b: Robot, only_nearest: bool = False) -> list[tuple[Cause, ...]]:
+    """Ways in which a and d of two tables can be in different units: none, both, or one of them; of about equally near
+    factors all, or the nearest alone."""
     pair = [mechanism.mechanism_of(each, ends=False) for each in (robot_a, robot_b)]
     factors: set[float] = set()
     used = [column for column in ("a", "d") if getattr(robot_a, column).any() and getattr(robot_b, column).any()]
     for column, (one, other) in itertools.product(used, (pair, (robot_a, robot_b))):
         sums = [float(np.abs(getattr(each, column)).sum()) for each in (one, other)]
         if min(sums) > 0:
-            factors |= _likely_factor(sums[1] / sums[0])
+            factors |= _likely_factor(sums[1] / sums[0], only_nearest)
     alone = [_length_cause(robot_a, robot_b, (column,), factor) for column in used for factor in sorted(factors)]
     both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
     mixed = [
@@ -657,10 +656,13 @@ def _length_slips(robot_a: Robot, robot_b: Robot) -> list[tuple[Cause, ...]]:
     return [(), *((each,) for each in both), *((each,) for each in alone), *mixed]
 
 
-def _likely_factor(ratio: float) -> set[float]:
-    """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer."""
-    near = min((1.0, *UNITS), key=lambda factor: abs(math.log(ratio / factor)))
-    return {near} - {1.0} if abs(math.log(ratio / near)) < math.log(2) else set()
+def _likely_factor(ratio: float, only_nearest: bool = False) -> set[float]:
+    """The factor between two units that is nearest a ratio, within 2, if 1 is not nearer; and those about as near."""
+    off = {factor: abs(math.log(ratio / factor)) for factor in (1.0, *LENGTH_FACTORS)}
+    near = min(off, key=off.__getitem__)
+    if near == 1.0 or off[near] > math.log(2):
+        return set()
+    return {near, *(factor for factor in LENGTH_FACTORS if off[factor] < NEAR_FACTOR and not only_nearest)}
 
 
 def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], factor: float) -> Cause:
@@ -677,22 +679,68 @@ def _length_cause(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...], fact
 
     stranger = strange(robot_b) - strange(robot_a)
     if stranger > STRANGER:
-        factor = min(UNITS, key=lambda each: abs(math.log(each * factor)))
-        return Cause("unit", "b", columns, factor, UNITS[factor])
-    return Cause("unit", "a" if stranger < -STRANGER else None, columns, factor, UNITS[factor])
+        return _of_unit("unit", "b", columns, 1 / factor)
+    return _of_unit("unit", "a" if stranger < -STRANGER else None, columns, factor)
+
+
+def _of_unit(
+    code: CauseCode, side: Literal["a", "b"] | None, columns: tuple[str, ...], factor: float, heading: str = ""
+) -> Cause:
+    """Columns in another unit than their heading's (mm or deg, if it is not given), and what takes them to it."""
+    units, heading = (ANGLE_UNITS, heading or "deg") if code == "angle_unit" else (LENGTH_UNITS, heading or "mm")
+    own = units[heading] * factor
+    name = min(units, key=lambda each: abs(math.log(units[each] / own)))
+    if abs(math.log(units[name] / own)) > SAME_FACTOR:
+        name = f"{factor:.6g} {heading}"
+    return Cause(code, side, columns, factor, f"{heading} → {name}")
+
+
+def by_headings(found: Comparison, a: Mapping[str, str], b: Mapping[str, str]) -> Comparison:
+    """A comparison whose causes name units as the tables' headings do.
+
+    Parameters
+    ----------
+    found : read in the headings' units
+    a, b : unit of each column of the two tables, such as ``{"alpha": "rad"}``; mm and deg of those that are not named
+
+    Returns
+    -------
+    found : each column's unit as "heading's → the one that its numbers are in"
+    """
+    if found.units is None:
+        return found
+
+    def named(slip: Cause) -> Cause:
+        factor, columns = slip.amount or 1.0, slip.entries
+        own = _of_unit(slip.code, slip.side, columns, factor, (b if slip.side == "b" else a).get(columns[0], ""))
+        other = _of_unit(slip.code, None, columns, 1 / factor, b.get(columns[0], ""))
+        return other if slip.side is None and _is_named(other) and not _is_named(own) else own
+
+    return replace(found, units=replace(found.units, causes=tuple(map(named, found.units.causes))))
+
+
+def _is_named(slip: Cause) -> bool:
+    """Whether what a slip's columns are in is a unit, and no multiple of their heading's."""
+    return slip.unit.rpartition("→ ")[2] in (*LENGTH_UNITS, *ANGLE_UNITS)
 
 
 def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> list[tuple[Cause, ...]]:
-    """Ways in which angles of two tables can be in another unit: none, and for either the one that makes them usual."""
+    """Ways in which angles of two tables can be in another unit: none, and for either those that make them usual, or
+    gon that make them the other's."""
     found: list[tuple[Cause, ...]] = [()]
-    sides: dict[Literal["a", "b"], Robot] = {"a": robot_a, "b": robot_b}
-    for side, robot in sides.items():
-        turning = ~robot.slides if columns in RANGES.values() else slice(None)
-        values = np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns]))
+    turning = ~robot_a.slides if columns in RANGES.values() else slice(None)
+    every = [
+        np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns])) for robot in (robot_a, robot_b)
+    ]
+    sums = [float(values[np.isfinite(values)].sum()) for values in every]
+    sides: tuple[Literal["a", "b"], ...] = ("a", "b")
+    for side, values, ratio in zip(sides, every, (sums, sums[::-1])):
         widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
-        for factor, unit in () if least < widest < most else ANGLE_UNITS.items():
-            if least < widest * factor < most:
-                found.append((Cause("angle_unit", side, columns, factor, unit),))
+        usual = least < widest < most
+        for factor in ANGLE_FACTORS:
+            gon = abs(ratio[1] - GON * ratio[0]) < NEAR_GON * ratio[0]
+            if (factor == GON and gon) if usual else least < widest * factor < most:
+                found.append((_of_unit("angle_unit", side, columns, factor),))
     return found
 
 
@@ -703,7 +751,7 @@ def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> It
             yield from slips
     sums = [sum(float(np.abs(getattr(each, key)[each.slides]).sum()) for key in columns) for each in (robot_a, robot_b)]
     for factor in _likely_factor(sums[1] / sums[0]) if min(sums) > 0 else ():
-        yield Cause("unit", None, columns, factor, UNITS[factor])
+        yield _of_unit("unit", None, columns, factor)
 
 
 # Causes ---------------------------------------------------------------------------------------------------------------
@@ -840,22 +888,7 @@ def _corrected(
     for k in np.flatnonzero(moved).tolist():
         column = "d" if robot_a.sliding[k] else "offset"
         columns[column][k] = _rounded(columns[column][k] + found.zeros[k], column == "offset")
-    first, last = 0, robot_a.rows - 1
-    base, flange = robot_a.base, robot_a.flange
-    if not mechanism.is_identity(found.base, tolerances):
-        before = np.linalg.inv(robot_a.base) @ np.linalg.inv(found.base) @ robot_a.base
-        if robot_a.convention == "standard" and _about_z(before):
-            _put_on_axis(columns, first, before)
-        else:
-            base = _rounded_pose(np.linalg.inv(found.base) @ robot_a.base)
-    if not mechanism.is_identity(found.flange, tolerances):
-        behind = robot_a.flange @ found.flange @ np.linalg.inv(robot_a.flange)
-        folded = robot_a.convention == "standard" and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
-        if not folded and _about_z(behind) and last > 0:
-            turned_over = robot_a.convention == "standard" and np.cos(columns["alpha"][last]) < 0
-            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
-        else:
-            flange = _rounded_pose(robot_a.flange @ found.flange)
+    base, flange = _ends_corrected(robot_a, found, tolerances, columns)
     # Corrected zeros and directions make A's joint values those of B.
     ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
@@ -882,6 +915,29 @@ def _corrected(
         sources=sources,
         **columns,
     )
+
+
+def _ends_corrected(
+    robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances, columns: dict[str, Any]
+) -> tuple[Reals, Reals]:
+    """Base and flange as the other arm has them; where the first or last row can hold the difference, that is changed
+    in ``columns`` instead."""
+    base, flange, standard, last = robot.base, robot.flange, robot.convention == "standard", robot.rows - 1
+    if not mechanism.is_identity(found.base, tolerances):
+        before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
+        if standard and _about_z(before):
+            _put_on_axis(columns, 0, before)
+        else:
+            base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)
+    if not mechanism.is_identity(found.flange, tolerances):
+        behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
+        folded = standard and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
+        if not folded and _about_z(behind) and last > 0:
+            turned_over = standard and np.cos(columns["alpha"][last]) < 0
+            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
+        else:
+            flange = _rounded_pose(robot.flange @ found.flange)
+    return base, flange
 
 
 def _sources_of_both(robot_a: Robot, robot_b: Robot, changed: Sequence[str]) -> dict[str, Source]:

@@ -391,7 +391,6 @@ class Match:
     ----------
     differences : of geometry, the fewest that explain the other arm; worst_length, worst_angle : m and rad
     invariants : how many numbers were compared; unexplained : m, what no entries explain
-    senses : (m,), -1 where an axis of the other table has the other sense
     reverses : (m,) bool, rows that the other arm moves in the other direction
     zeros : (m,), rad or m, other's ``offset`` less the first's once the other is brought there; 0 of the ends
     base : (4, 4), the other's base in the first's base; flange : (4, 4), other's flange in the first's flange
@@ -402,7 +401,6 @@ class Match:
     worst_angle: float
     invariants: int
     unexplained: float
-    senses: Reals
     reverses: Flags
     zeros: Reals
     base: Reals
@@ -476,7 +474,7 @@ def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_
         found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
         for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
         if (senses * other.direction == one.direction).all()
-        for found in _settled(one, with_senses(other, senses, normals), senses, tolerances, may_differ=False)
+        for found in _settled(one, with_senses(other, senses, normals), tolerances, may_differ=False)
     )
 
 
@@ -506,7 +504,7 @@ def _best_match(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may
             pairs.append(_measured_alike(local[0], turned))
             pairs.append((one, with_senses(other, senses, _normals_of_near((one, other), near, normals))))
         for first, second in pairs:
-            for found in _settled(first, second, senses, tolerances, may_differ=may_differ):
+            for found in _settled(first, second, tolerances, may_differ=may_differ):
                 entries, layers, *sizes = found.rank
                 rank = entries, layers, float(first is not one), *sizes  # of equals in the entries that are printed
                 if best is None or rank < best_rank:
@@ -532,9 +530,7 @@ def _measured_alike(one: Mechanism, other: Mechanism) -> tuple[Mechanism, Mechan
     return one, other
 
 
-def _settled(
-    one: Mechanism, other: Mechanism, senses: Reals, tolerances: Tolerances, *, may_differ: bool = True
-) -> Iterator[Match]:
+def _settled(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True) -> Iterator[Match]:
     """The match for chosen senses; where axes beside a slide are parallel to it, also the one with its own theta; those
     alone in which geometry agrees if it may not differ."""
     least = NEARLY_PARALLEL if one.beta.any() or other.beta.any() else EXACTLY_PARALLEL
@@ -544,7 +540,7 @@ def _settled(
     if (np.abs(wrap_to_pi(other.offset - one.offset))[1:-1][beside[1:-1]] > tolerances.angle).any():
         ways.append(_with_free_turns(one, other, parallel, tolerances, of_slides=False))
     for placed in ways:
-        found = _settled_at(one, other, senses, parallel, placed, tolerances, may_differ=may_differ)
+        found = _settled_at(one, other, parallel, placed, tolerances, may_differ=may_differ)
         if found is not None:
             yield found
 
@@ -552,7 +548,6 @@ def _settled(
 def _settled_at(
     one: Mechanism,
     other: Mechanism,
-    senses: Reals,
     parallel: Flags,
     placed: tuple[Reals, Reals],
     tolerances: Tolerances,
@@ -564,19 +559,8 @@ def _settled_at(
     m, links = len(one.d), len(one.a)
     offset, steps = placed
     turned = wrap_to_pi(offset - one.offset)
-    differences = []
-    off = wrap_to_pi(other.alpha - one.alpha), wrap_to_pi(other.beta - one.beta)
-    for column, gaps, values in (("alpha", off[0], one.alpha), ("beta", off[1], one.beta)):
-        for k in np.flatnonzero(np.abs(gaps) > tolerances.angle).tolist():
-            differences.append(_other_angle(column, k, float(values[k]), float(gaps[k])))
-    inner_slides = [k for k in range(1, m - 1) if one.sliding[k]]
-    for k in inner_slides:
-        if abs(turned[k]) > tolerances.angle:
-            differences.append(_other_angle("theta", k, float(one.offset[k]), float(turned[k])))
-    worst_angle = max(
-        [0.0, *np.abs(off[0]).tolist(), *np.abs(off[1]).tolist(), *(abs(turned[k]) for k in inner_slides)]
-    )
-
+    slides = [k for k in range(1, m - 1) if one.sliding[k]]
+    differences, worst_angle = _angles_differ(one, other, turned, slides, tolerances)
     if differences and not may_differ:
         return None
     gaps = steps - np.stack([one.a, np.zeros(links), one.d[:links]], axis=1)
@@ -596,12 +580,7 @@ def _settled_at(
         left = max(left, abs(float(shift[k + 1][0][2])) * off_axis)
     zeros = np.where(one.sliding, [shift[k][1][2] - shift[k][0][2] for k in range(m)], turned)
     zeros[np.array([k in (0, m - 1) and not one.sliding[k] for k in range(m)])] = 0.0
-    left_end, right_end = shift[0][0], shift[m - 1][1]
-    base = other.base @ rot_z(turned[0]) @ rot_z(one.offset[0] * one.sliding[0]) @ translation(*left_end)
-    base = base @ rot_z(-one.offset[0] * one.sliding[0])
-    last_turn = turned[m - 1] if m > 1 else 0.0
-    flange = translation(*(-right_end)) @ rot_z(last_turn) @ other.flange
-    placed = one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
+    placed = _ends_placed(one, other, turned, (shift[0][0], shift[m - 1][1]))
     reverses = one.direction * other.direction < 0
     moved = tolerances.exceeded(zeros, one.sliding)
     ends = sum(
@@ -613,14 +592,37 @@ def _settled_at(
         tuple(differences),
         max([0.0, left, *lengths, *counted[1]]),
         worst_angle,
-        links + len(inner_slides) + counted[0],
+        links + len(slides) + counted[0],
         left if left > tolerances.length else 0.0,
-        senses,
         reverses,
         zeros,
         *placed,
         layers,
     )
+
+
+def _angles_differ(
+    one: Mechanism, other: Mechanism, turned: Reals, slides: list[int], tolerances: Tolerances
+) -> tuple[list[EntryDifference], float]:
+    """Twists, betas, and the theta of joints that slide between others, that differ; the largest gap of all, rad."""
+    places = np.array(slides, dtype=int)
+    gaps = wrap_to_pi(other.alpha - one.alpha), wrap_to_pi(other.beta - one.beta), turned[places]
+    differences, values = [], (one.alpha, one.beta, one.offset[places])
+    for column, off, own in zip(("alpha", "beta", "theta"), gaps, values):
+        for k in np.flatnonzero(np.abs(off) > tolerances.angle).tolist():
+            link = slides[k] if column == "theta" else k
+            differences.append(_other_angle(column, link, float(own[k]), float(off[k])))
+    return differences, float(np.abs(np.concatenate(gaps)).max(initial=0.0))
+
+
+def _ends_placed(one: Mechanism, other: Mechanism, turned: Reals, shifts: tuple[Reals, Reals]) -> tuple[Reals, Reals]:
+    """The other's base in the first's base, and its flange in the first's flange (4, 4), by turns (m,) of zeros and
+    shifts (3,) of the first joint and the last."""
+    base = other.base @ rot_z(turned[0]) @ rot_z(one.offset[0] * one.sliding[0]) @ translation(*shifts[0])
+    base = base @ rot_z(-one.offset[0] * one.sliding[0])
+    last_turn = turned[-1] if len(turned) > 1 else 0.0
+    flange = translation(*(-shifts[1])) @ rot_z(last_turn) @ other.flange
+    return one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
 
 
 def is_identity(T: Reals, tolerances: Tolerances) -> bool:
@@ -847,61 +849,3 @@ def _shifts_chosen(
             best = apart, y + free @ step
     assert best is not None
     return sides(best[1])
-
-
-# From axes ------------------------------------------------------------------------------------------------------------
-
-
-def mechanism_from_axes(directions: Reals, points: Reals, flange: Reals, angle: float) -> Mechanism:
-    """The arm that turns about given lines, all joints at 0 where they are given.
-
-    Parameters
-    ----------
-    directions, points : (m, 3), of positive rotation, and on each line, m, in the base's frame
-    flange : (4, 4) at these joint values
-    angle : rad, below which neighbouring axes are parallel
-
-    Returns
-    -------
-    mechanism : of m rows that turn, its links along common normals
-    """
-    m = len(directions)
-    z = directions / np.linalg.norm(directions, axis=1)[:, None]
-    a, alpha, offset, d = np.zeros(m - 1), np.zeros(m - 1), np.zeros(m), np.zeros(m)
-    x, foot = _any_across(z[0]), points[0]
-    base = np.eye(4)
-    for k in range(m - 1):
-        cross, gap = np.cross(z[k], z[k + 1]), points[k + 1] - points[k]
-        sine, cosine = float(np.linalg.norm(cross)), float(z[k] @ z[k + 1])
-        if math.atan2(sine, abs(cosine)) < angle:
-            start, across = foot, points[k + 1] - foot
-            normal = across - z[k] * (z[k] @ across)
-            end, alpha[k] = start + normal, 0.0 if cosine > 0 else math.pi
-        else:
-            start = points[k] + z[k] * float(np.cross(gap, z[k + 1]) @ cross) / sine**2
-            end = points[k + 1] + z[k + 1] * float(np.cross(gap, z[k]) @ cross) / sine**2
-            normal, alpha[k] = end - start, math.nan
-        a[k] = float(np.linalg.norm(normal))
-        beside = normal / a[k] if a[k] > ON_AXIS else (x if math.isfinite(alpha[k]) else cross / sine)
-        beside = beside - z[k] * (z[k] @ beside)
-        beside = beside / np.linalg.norm(beside)
-        if math.isnan(alpha[k]):
-            alpha[k] = math.atan2(float(cross @ beside), cosine)
-        if k == 0:
-            base[:3, :3], base[:3, 3] = np.stack([beside, np.cross(z[0], beside), z[0]], axis=1), start
-        else:
-            offset[k], d[k] = math.atan2(float(np.cross(x, beside) @ z[k]), float(x @ beside)), (start - foot) @ z[k]
-        x, foot = beside, end
-    if m == 1:
-        base[:3, :3], base[:3, 3] = np.stack([x, np.cross(z[0], x), z[0]], axis=1), foot
-    last = np.eye(4)
-    x = x - z[-1] * (z[-1] @ x)
-    x = x / np.linalg.norm(x)
-    last[:3, :3], last[:3, 3] = np.stack([x, np.cross(z[-1], x), z[-1]], axis=1), foot
-    ends = base, np.linalg.inv(last) @ flange
-    return Mechanism(a, alpha, np.zeros(m - 1), d, offset, np.ones(m), np.zeros(m, dtype=bool), *ends)
-
-
-def _any_across(z: Reals) -> Reals:
-    across = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    return np.asarray(across / np.linalg.norm(across))

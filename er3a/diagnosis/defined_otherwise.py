@@ -17,13 +17,13 @@ from typing import Literal
 
 import numpy as np
 
+from er3a.comparison.axis_table import table_from_axes
 from er3a.comparison.entries import Entry, shifted
 from er3a.comparison.mechanism import (
     EntryDifference,
     Match,
     Tolerances,
     match,
-    mechanism_from_axes,
     mechanism_of,
     turn_of,
 )
@@ -191,8 +191,8 @@ def _matched(
     robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
 ) -> tuple[Match, Robot, list[Entry]]:
     """The match with the arm that lines describe, the table with it, and the entries that differ."""
-    other = mechanism_from_axes(lines[0], lines[1], _zero_flange(stated), lines[-1].angle)
-    found = match(mechanism_of(robot.without_tool()), other, tolerances)
+    other = _arm_of(lines, _zero_flange(stated))
+    found = match(mechanism_of(robot.without_tool()), mechanism_of(other), tolerances)
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
     own = [each for each in found.differences if each.column in LINKS]
     wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in own]
@@ -275,6 +275,18 @@ def _lines(stated: Sequence[Reference], joints: int) -> Lines | None:
     directions = np.array([toward[joint].toward for joint in every], float)
     places = np.array([points[joint] for joint in every], float) / MM
     return directions, places, [toward[joint].signed for joint in every], Tolerances(length + LEVER * angle, angle)
+
+
+def _arm_of(lines: Lines, flange: Reals) -> Robot:
+    """The arm that turns about lines, all joints at 0 where they are given; neighbours that are parallel to within
+    their tolerance are taken for parallel."""
+    directions, points, _, tolerances = lines
+    z = directions / np.linalg.norm(directions, axis=1)[:, None]
+    for k in range(1, len(z)):
+        if np.linalg.norm(np.cross(z[k - 1], z[k])) < math.sin(tolerances.angle):
+            z[k] = z[k - 1] * np.sign(z[k] @ z[k - 1])
+    table, turn = table_from_axes(z, points, flange), np.full(len(z), math.pi)
+    return Robot("stated", "stated", "standard", lower=-turn, upper=turn, **vars(table))
 
 
 def _zero_flange(stated: Sequence[Reference]) -> Reals:

@@ -233,23 +233,23 @@ def _two_repairs(case: Case) -> Pool:
     other_way = [last.apply(join(singles[:j])) for j, last in enumerate(repairs) if j]
     turned = [(j, i) for j in range(len(repairs)) for i in range(j)]
     tables = join([*one_way, *other_way])
-    kept = np.flatnonzero((_first_alike(tables) >= len(places)) | (np.arange(len(tables)) < len(places)))
+    first, group = _alike(tables)
+    kept = np.flatnonzero((first[group] >= len(places)) | (np.arange(len(tables)) < len(places)))
     pairs = [(*places, *turned)[k] for k in kept.tolist()]
     return case.pool(tables[kept], *_named([(repairs[i], repairs[j]) for i, j in pairs]))
 
 
-def _first_alike(tables: Tables) -> NDArray[np.int64]:
-    """For each table the place of the first that is the same, (H,)."""
-    columns = [getattr(tables, field.name) for field in fields(tables) if field.name != "modified"]
+def _alike(tables: Tables, without: Sequence[str] = ()) -> tuple[Integers, Integers]:
+    """Tables that are the same but for some columns: the first of each group, and each table's group, (H,)."""
+    columns = [getattr(tables, each.name) for each in fields(tables) if each.name not in ("modified", *without)]
     rows = np.hstack([tables.modified[:, None].astype(float), *columns]).round(DECIMALS) + 0.0
-    _, first, alike = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    found: NDArray[np.int64] = first[alike.reshape(-1)]
-    return found
+    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
 
 
 def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
     starts = join([repair.apply(case.given) for repair in case.repairs])
-    first, group = _same_shape(starts)
+    first, group = _alike(starts, ("lower", "upper"))
     search = case.search(starts[first])
     fits = fitting.scanned(
         search, [(place,) for place in range(len(case.numbers))], fitting.FINE if thorough else fitting.COARSE
@@ -277,15 +277,6 @@ def _refined(search: fitting.Search, fits: fitting.Fits, thorough: bool) -> fitt
     fits = fitting.descend(search, fits, FEW_PASSES)
     best = np.sort(np.argsort(fits.squares, kind="stable")[:MAX_PROMISING])
     return fitting.meet(search, fits.with_rows(best, fitting.descend(search, fits[best], MANY_PASSES)))
-
-
-def _same_shape(tables: Tables) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Tables that differ in more than limits: the first of each group, and each table's group, (H,)."""
-    names = [field.name for field in fields(tables) if field.name not in ("lower", "upper", "modified")]
-    shape = [getattr(tables, name) for name in names]
-    rows = np.hstack([tables.modified[:, None].astype(float), *shape])
-    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return first, group.reshape(-1)
 
 
 def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.errors import InputError
-from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.kept_files import write_atomically
 from er3a.files.reference_sets import FILE, load_references
 from er3a.files.robot_library import load_robot, robot_of
@@ -30,12 +30,13 @@ READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
 @dataclass(frozen=True)
 class ReadArm:
     """``printed``: whether the table was given, not derived; ``notes``: assumptions; ``beside``: what the file gives
-    that a comparison doesn't look at."""
+    that a comparison doesn't look at; ``units``: of columns, as their headings say them."""
 
     robot: Robot
     printed: bool
     notes: tuple[str, ...] = ()
     beside: frozenset[Uncompared] = frozenset()
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_arm(
@@ -70,12 +71,14 @@ def read_arm(
             path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=as_printed
         )
         robot = robot_of(content)
-        return ReadArm(robot, True, notes, beside_the_table(robot))
+        units = headed_units(path, length_unit, angle_unit)
+        return ReadArm(robot, True, notes, beside_the_table(robot), units)
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:
             robot, assumed = urdf_table(plain, base=base, tip=tip)
             beside = urdf_groups(plain, base=base, tip=tip)
-        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside)
+        units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
+        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
     if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
         robot = load_robot(source)
         return ReadArm(robot, True, beside=beside_the_table(robot))

@@ -25,7 +25,7 @@ from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import JOINT_COLUMN, MIN_SPAN_MM, WIDEST_IN_RADIANS
+from er3a.files.units import JOINT_COLUMN, MIN_SPAN_MM, refuse_radians
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
@@ -64,7 +64,6 @@ def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
 
 
 COLUMNS = measurement_columns(["deg"] * 6)
-POSES_TO_JUDGE_UNITS = 3
 POSES_TO_JUDGE_SCALE = 4
 OTHER_UNITS_MM = {"metres": 1000.0, "feet": 304.8, "inches": 25.4, "cm": 10.0, "micrometres": 1e-3}
 MUCH, LEFT_BY_SCALE = 1.25, 0.05
@@ -149,11 +148,9 @@ def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> N
     if whole and span < MIN_SPAN_MM:
         problem = f"all points are within {span:g} mm of the frame's origin, which can only be metres"
         raise InputError(path, f"row {whole[0].row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
-    angles = [abs(value) for row in rows for value, unit in zip(row.pose, units) if unit == "deg"]
-    widest = max(angles, default=0.0)
-    if len({row.pose for row in rows}) >= POSES_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
-        problem = f"the widest angle is {widest:g} deg, which can only be radians"
-        raise InputError(path, f"columns q1_deg to q{len(units)}_deg", problem, "Convert to degrees")
+    turning = np.array([unit == "deg" for unit in units])
+    poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(units))
+    refuse_radians(path, f"columns q1_deg to q{len(units)}_deg", poses[:, turning])
 
 
 def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:

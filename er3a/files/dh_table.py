@@ -334,6 +334,25 @@ def _converted(column: str, value: float, scale: float) -> float:
     return value * scale
 
 
+def headed_units(
+    path: Path, length_unit: LengthUnit | None = None, angle_unit: AngleUnit | None = None
+) -> dict[str, str]:
+    """The unit of each column of a D-H table, as its heading says it.
+
+    Parameters
+    ----------
+    length_unit, angle_unit : as of :func:`read_dh_table`, of headings that say mm and deg, or nothing
+
+    Returns
+    -------
+    units : such as ``{"a": "in", "alpha": "rad", "lower": "deg"}``
+    """
+    lines = as_columns(path, read_lines(path)).lines
+    meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
+    units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
+    return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*MILLIMETRES, *DEGREES)}
+
+
 def _scale_of(column: str, length_unit: LengthUnit) -> float:
     return MILLIMETRES[length_unit] if _unit_of(column) == "mm" else 1.0
 

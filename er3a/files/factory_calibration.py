@@ -16,11 +16,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import InputError
 from er3a.files.robot_library import with_near_rows
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_text
-from er3a.formats.urdf import table_from_axes
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Masses

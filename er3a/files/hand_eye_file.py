@@ -12,57 +12,41 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from PIL import Image
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
 from er3a.files.robot_file import Text
-from er3a.files.target_file import FORMS as TARGET_FORMS
-from er3a.files.units import JOINT_COLUMN, METRES_BELOW_MM, WIDEST_IN_RADIANS, doubt
+from er3a.files.units import (
+    JOINT_COLUMN,
+    METRES_BELOW_MM,
+    ROWS_TO_JUDGE_UNITS,
+    WIDEST_IN_RADIANS,
+    doubt,
+    refuse_radians,
+)
 from er3a.files.yaml_file import InputFile, StrictModel, load
-from er3a.geometry.transforms import exp_rotation, posed, transform
+from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
-from er3a.vision.calibration_set import SPAN_S, CalibrationSet, OffsetOpenError, Stream, TimeOffset, paired, time_offset
+from er3a.vision.calibration_set import CalibrationSet
 
-FORMS: dict[str, tuple[str, ...]] = {
-    **{name: TARGET_FORMS[name] for name in ("quaternion_wxyz", "rpy_deg", "matrix")},
-    "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
-}
-LONGEST_VECTOR = 2 * np.pi * 1.01
 POSITION = ("x_mm", "y_mm", "z_mm")
-UNIT_LENGTH_TOLERANCE = 1e-3  # quaternions are written with as few as four digits
-ORTHONORMAL_TOLERANCE = 1e-3
+TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 MIXED_UNITS = 200.0
-ROWS_TO_JUDGE_UNITS = 3
-
-
-def pose_form(path: Path, header: list[str], stream: str) -> str | None:
-    """The form in which a table gives the orientations of a stream; None if it has none of its columns.
-
-    Raises
-    ------
-    InputError
-        for two forms
-    """
-    forms = [form for form, names in FORMS.items() if {f"{stream}_{name}" for name in names} & set(header)]
-    if len(forms) > 1:
-        problem = f"{stream} has two forms of orientation, {forms[0]} and {forms[1]}"
-        raise InputError(path, "header", problem, "Keep the columns of one")
-    return forms[0] if forms else None
 
 
 def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
@@ -77,43 +61,13 @@ def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> 
     position = np.array([[row[f"{stream}_{name}"] for name in POSITION] for row in rows], dtype=float)
     _check_millimetres(path, rows, stream, position)
     values = np.array([[row[f"{stream}_{name}"] for name in FORMS[form]] for row in rows], dtype=float)
-    if form == "rpy_deg":
-        widest = float(np.abs(values).max())
-        if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS / 2:
-            problem = f"the widest angle is {widest:g} deg, which can only be radians"
-            raise InputError(path, f"columns {stream}_roll_deg to {stream}_yaw_deg", problem, "Convert to degrees")
-        return transform(position / 1000, np.radians(values))
-    if form == "rotation_vector_rad":
-        for row, v in zip(rows, values):
-            if (length := float(np.linalg.norm(v))) > LONGEST_VECTOR:
-                where = f"row {row['row']}, columns {stream}_rx_rad to {stream}_rz_rad"
-                problem = f"the rotation vector's length is {length:.4g}, more than a turn, which can only be degrees"
-                raise InputError(path, where, problem, "Convert to radians; roll, pitch and yaw have other columns")
-        return posed(exp_rotation(values), position / 1000)
-    if form == "quaternion_wxyz":
-        for row, q in zip(rows, values):
-            length = float(np.linalg.norm(q))
-            if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
-                where = f"row {row['row']}, columns {stream}_qw to {stream}_qz"
-                problem = f"the quaternion's length is {length:.6g}, not 1"
-                raise InputError(path, where, problem, "Correct the sample, or remove its row")
-        return posed(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix(), position / 1000)
-    return posed(_rotations(path, rows, stream, values.reshape(-1, 3, 3)), position / 1000)
-
-
-def _rotations(path: Path, rows: list[dict[str, Any]], stream: str, R: Reals) -> Reals:
-    for row, M in zip(rows, R):
-        where = f"row {row['row']}, columns {stream}_r11 to {stream}_r33"
-        worst = float(np.abs(M @ M.T - np.eye(3)).max())
-        if worst > ORTHONORMAL_TOLERANCE:
-            problem = f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g}"
-            raise InputError(path, where, problem, "Correct the sample, or write more digits")
-        if np.linalg.det(M) < 0:
-            problem = "the matrix is left-handed (its determinant is -1)"
-            raise InputError(path, where, problem, "Change the sign of one axis in every sample")
-    U, _, Vt = np.linalg.svd(R)
-    rotations: Reals = U @ Vt
-    return rotations
+    where = f"columns {stream}_{FORMS[form][0]} to {stream}_{FORMS[form][-1]}"
+    if form in ("rpy_deg", "zyz_deg"):
+        refuse_radians(path, where, values, WIDEST_IN_RADIANS / 2)
+    try:
+        return posed(rotations(form, values, TOLERANCE), position / 1000)
+    except NoRotationError as error:
+        raise InputError(path, f"row {rows[error.row]['row']}, {where}", error.problem, error.remedy) from None
 
 
 def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, position: Reals) -> None:
@@ -131,14 +85,13 @@ def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, posi
             raise InputError(path, f"row {row['row']}, {where}", problem, "Write every position in mm")
 
 
-STREAM_SAMPLES = 60
 SHOWN_HEADER = 60
 EXAMPLE = "flange_x_mm, .., flange_qw, .., flange_qz, target_x_mm, .., target_qz (lengths in mm)"
 MIN_SQUARE_MM = 0.5
 MIN_DEVIATION_MM = 5e-3
 """Of a camera or an arm; less is in metres."""
-PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "PPM")  # of others, some are drawn by programs that are called for it
 EPOCH_DIGITS = 10  # of the seconds since 1970, which recorders write
+PICTURES = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "PPM")  # of others, some are drawn by programs that are called for it
 POINTS = {f"{part}_{c}_mm": CsvColumn() for part in ("seen", "touched") for c in "xyz"}
 
 Positive = Annotated[float, Field(gt=0, le=1e5)]
@@ -210,14 +163,6 @@ class ImageEntry(StrictModel):
     pixel_standard_deviation: Annotated[float, Field(gt=0, le=100)] = 0.3
 
 
-class StreamsEntry(StrictModel):
-    """Two tables with separate clocks (``t_s``); the offset between the clocks is estimated within +-``widest_s``."""
-
-    flange: Text
-    target: Text
-    widest_s: Annotated[float, Field(gt=0, le=3600)] = 2.0
-
-
 @dataclass(frozen=True, eq=False)
 class SeenImages:
     """Image files that show the board, as the table names them, what was found in each, and those without it."""
@@ -242,8 +187,7 @@ class HandEyeFile(InputFile):
     source: Text
     simulated: bool = False
     setup: Literal["eye_in_hand", "eye_to_hand"]
-    samples: Text | None = None
-    streams: StreamsEntry | None = None
+    samples: Text
     images: ImageEntry | None = None
     camera_standard_deviation: StandardDeviations | None = None
     flange_standard_deviation: StandardDeviations | None = None
@@ -252,11 +196,7 @@ class HandEyeFile(InputFile):
     touch_standard_deviation_mm: Positive = 0.1
 
     @model_validator(mode="after")
-    def _one_source_of_samples(self) -> Self:
-        if (self.samples is None) == (self.streams is None):
-            raise ValueError("samples and streams: only one of the two is allowed, and one is needed | Give one")
-        if self.streams and self.images:
-            raise ValueError("images: streams hold board poses, no images | Give samples with images, or remove it")
+    def _one_source_of_noise(self) -> Self:
         if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
             raise ValueError(
                 "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "
@@ -281,9 +221,7 @@ def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
     return read_calibration(path, arm)[0]
 
 
-def read_calibration(
-    path: str | Path, robot: Robot | None
-) -> tuple[CalibrationSet, TimeOffset | None, SeenImages | None]:
+def read_calibration(path: str | Path, robot: Robot | None) -> tuple[CalibrationSet, SeenImages | None]:
     """Read a calibration set of a camera, with all files that it names.
 
     Parameters
@@ -294,7 +232,6 @@ def read_calibration(
     Returns
     -------
     samples : poses T_world_flange and T_camera_board in m, and joint values in rad or m where they were recorded
-    offset : between the clocks of the two streams, s; None for a table of samples
     images : what was found in the pictures; None without pictures. Samples whose picture shows no board are left out.
 
     Raises
@@ -304,34 +241,23 @@ def read_calibration(
     """
     path = Path(path)
     head = load(HandEyeFile, path)
-    offset: TimeOffset | None = None
     images: SeenImages | None = None
     covariance = head.camera_standard_deviation
     per_sample: Reals | None = None
     shared: Reals | None = None
-    if head.streams is not None:
-        flange_table = path.parent / head.streams.flange
-        hand = _stream(flange_table, "flange", robot)
-        eye = _stream(path.parent / head.streams.target, "target", robot)
-        offset = _offset(path, hand, eye, head.streams.widest_s)
-        flange, target, times = paired(hand, eye, offset.offset, STREAM_SAMPLES)
-        offset = replace(offset, unused=len(eye.t) - len(times))
-        names, q = tuple(f"{t:.3f} s" for t in times), None
-        of_joints = bool(_joint_columns(read_header(flange_table)))
+    table = path.parent / head.samples
+    rows, header = sample_rows(table)
+    flange, q = _flange(table, rows, header, robot)
+    of_joints = q is not None
+    names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
+    if head.images is not None:
+        images = _targets_of_images(table, rows, names, head.images)
+        target, per_sample, shared = images.views.target, images.views.covariance, images.views.shared
+        kept = list(images.views.numbers)
+        flange, names = flange[kept], tuple(names[number] for number in kept)
+        q = None if q is None else q[kept]
     else:
-        table = path.parent / str(head.samples)
-        rows, header = sample_rows(table)
-        flange, q = _flange(table, rows, header, robot)
-        of_joints = q is not None
-        names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
-        if head.images is not None:
-            images = _targets_of_images(table, rows, names, head.images)
-            target, per_sample, shared = images.views.target, images.views.covariance, images.views.shared
-            kept = list(images.views.numbers)
-            flange, names = flange[kept], tuple(names[number] for number in kept)
-            q = None if q is None else q[kept]
-        else:
-            target = poses_of(table, rows, "target", _form(table, header, "target"))
+        target = poses_of(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
         per_sample = np.broadcast_to(covariance.covariance(), (len(flange), 6, 6))
     samples = CalibrationSet(
@@ -347,7 +273,7 @@ def read_calibration(
         shared=shared,
         of_joints=of_joints,
     )
-    return samples, offset, images
+    return samples, images
 
 
 def check_samples(table: Path) -> str:
@@ -363,7 +289,7 @@ def check_samples(table: Path) -> str:
         return "touched points"
     rows, header = sample_rows(table)
     for stream in ("flange", "target"):
-        if form := pose_form(table, header, stream):
+        if form := form_in(table, header, f"{stream}_"):
             poses_of(table, rows, stream, form)
     return "samples of a hand-eye calibration"
 
@@ -390,11 +316,11 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     for name in ("name", "image"):
         if name in header:
             columns[name] = CsvColumn(str, optional=name == "name")
-    if "t_s" in header:
+    if "t_s" in header:  # of recordings; not used
         columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
     columns |= {name: CsvColumn() for name in _joint_columns(header)}
     for stream in ("flange", "target"):
-        if form := pose_form(table, header, stream):
+        if form := form_in(table, header, f"{stream}_"):
             columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
     if not columns:
         first = ", ".join(header)[:SHOWN_HEADER]
@@ -413,7 +339,7 @@ def _joint_columns(header: list[str]) -> list[str]:
 
 
 def _form(table: Path, header: list[str], stream: str) -> str:
-    form = pose_form(table, header, stream)
+    form = form_in(table, header, f"{stream}_")
     if form is None:
         remedy = f"Add {stream}_x_mm, {stream}_y_mm, {stream}_z_mm and {stream}_qw to {stream}_qz, or another form"
         raise InputError(table, "header", f"nothing says where the {stream} was", remedy)
@@ -429,7 +355,7 @@ def _flange(
     if not given:
         poses = poses_of(table, rows, "flange", _form(table, header, "flange"))
         return poses if robot is None else robot.base @ poses, None
-    if pose_form(table, header, "flange"):
+    if form_in(table, header, "flange_"):
         raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
     if robot is None:
         raise InputError(table, "columns q1_deg ...", "joint angles need a robot's table", "Name the robot")
@@ -442,47 +368,9 @@ def _flange(
         problem = f"joint {wrong[0][1:].partition('_')[0]} of {robot.name} {kind}"
         raise InputError(table, f"column {wrong[0]}", problem, f"Give {', '.join(wanted)}")
     values = np.array([[row[name] for name in given] for row in rows], dtype=float)
-    widest = float(np.abs(values[:, ~robot.slides]).max(initial=0.0))
-    if len(rows) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= WIDEST_IN_RADIANS:
-        problem = f"the widest angle is {widest:g} deg, which can only be radians"
-        raise InputError(table, f"columns {given[0]} to {given[-1]}", problem, "Convert to degrees")
+    refuse_radians(table, f"columns {given[0]} to {given[-1]}", values[:, ~robot.slides])
     q = meant(robot, values)
     return forward(robot.without_tool(), q), q
-
-
-def _stream(table: Path, name: str, robot: Robot | None) -> Stream:
-    rows, header = sample_rows(table)
-    if "t_s" not in header:
-        raise InputError(table, "header", "the column t_s is missing", "Add the time of each row in seconds")
-    t = np.array([row["t_s"] for row in rows], dtype=float)
-    falls = np.flatnonzero(np.diff(t) <= 0)
-    if falls.size:
-        where = f"row {rows[int(falls[0]) + 1]['row']}, column t_s"
-        raise InputError(
-            table, where, "time does not rise from the row before", "Sort the rows; keep one of equal ones"
-        )
-    flange = name == "flange"
-    T = _flange(table, rows, header, robot)[0] if flange else poses_of(table, rows, name, _form(table, header, name))
-    return Stream(t, T)
-
-
-def _offset(path: Path, hand: Stream, eye: Stream, widest: float) -> TimeOffset:
-    try:
-        return time_offset(hand, eye, widest)
-    except OffsetOpenError as error:
-        if error.end is not None:
-            problem = f"turns of arm and camera agree best at {error.end:.3g} s, an end of the range searched"
-            remedy = "Write a larger value, or check that both tables are of one recording"
-            raise InputError(path, "streams.widest_s", problem, remedy) from None
-    times = "; ".join(
-        f"{name}: {stream.t[0]:.10g} to {stream.t[-1]:.10g} s, {len(stream.t)} rows"
-        for name, stream in (("flange", hand), ("target", eye))
-    )
-    problem = (
-        f"the clocks can't be compared ({times}): it takes camera poses {SPAN_S:g} to {2 * SPAN_S:g} s apart while the "
-        f"arm was recorded for {widest:g} s (widest_s) before and after"
-    )
-    raise InputError(path, "streams", problem, "Record both for longer or more often, or make both t_s start together")
 
 
 def _touched(table: Path, robot: Robot | None = None) -> Reals:

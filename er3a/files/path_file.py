@@ -21,7 +21,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeGuard, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 import scipy
@@ -30,8 +30,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
+from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import FORMS, KNOWN_FORMS, POSITION, Orientation
+from er3a.files.target_file import KNOWN_FORMS, POSITION, PoseEntry
 from er3a.files.units import (
     JOINT_COLUMN,
     JointsDeg,
@@ -43,8 +44,8 @@ from er3a.files.units import (
     joint_rates,
     joint_values,
 )
-from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, read_yaml
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, transform
+from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse, read_yaml
+from er3a.geometry.transforms import posed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning import commands
@@ -54,17 +55,12 @@ from er3a.planning.stated_rates import StatedRates
 from er3a.robots.joint_limits import joint_columns
 from er3a.robots.robot import MAX_JOINTS, Robot
 
-UNIT_LENGTH_TOLERANCE = 1e-6
 LONGEST_S = 3600.0
 MAX_ROWS = 200_000
 SAME_POINT = 1e-9  # m or rad
 MAX_RAD = 10 * 2 * math.pi
 TRAJECTORIES = (".yaml", ".yml", ".json")  # endings of joint trajectories of ROS and MoveIt
 UR_JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
-RATES = ("velocities", "accelerations")
-IN_POINT = frozenset(("positions", "time_from_start", *RATES, "effort"))
-IN_TRAJECTORY = frozenset(("header", "joint_names", "points"))
-IN_ROBOT_TRAJECTORY = frozenset(("joint_trajectory", "multi_dof_joint_trajectory"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +107,16 @@ def read_path_table(path: str | Path) -> PathTable:
     of_pose = {*POSITION, *(name for columns in FORMS.values() for name in columns)}
     beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
     header -= beside
-    forms = [form for form, columns in FORMS.items() if header & set(columns)]
+    form = form_in(path, header)
     own = _joint_columns(path, header)
     of_joints = bool(own)
-    if of_joints and (forms or header & set(POSITION)):
+    if of_joints and (form or header & set(POSITION)):
         raise InputError(path, "header", "the table has both joint angles and poses", "Keep one of the two")
-    if len(forms) > 1:
-        raise InputError(
-            path, "header", f"two forms of orientation, {forms[0]} and {forms[1]}", "Keep the columns of one"
-        )
-    if not of_joints and not forms:
+    if not of_joints and not form:
         problem = "no orientation" if header & set(POSITION) else "neither joint angles nor poses"
         remedy = f"Give the columns x_mm, y_mm, z_mm with {KNOWN_FORMS}; or q1_deg .. qn_deg"
         raise InputError(path, "header", f"the table has {problem}", remedy)
-    columns = own if of_joints else (*POSITION, *FORMS[forms[0]])
+    columns = own if of_joints else (*POSITION, *FORMS[str(form)])
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in (*columns, *sorted(beside))} | CHECKED_COLUMN)
     if len(rows) < 2:
@@ -137,7 +129,7 @@ def read_path_table(path: str | Path) -> PathTable:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
-        poses, joints = _poses(path, lines, rows, forms[0]), None
+        poses, joints = _poses(path, lines, rows, str(form)), None
         turn = scipy.spatial.transform.Rotation.from_matrix(
             np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
         ).magnitude()
@@ -165,58 +157,84 @@ def is_ros_trajectory(path: Path) -> bool:
     return "kind" not in content and not content.keys().isdisjoint({"joint_trajectory", "joint_names", "points"})
 
 
+class RosTime(StrictModel):
+    """Seconds and nanoseconds, as ROS 2 names them or as ROS 1 does."""
+
+    sec: float = 0.0
+    nanosec: float = 0.0
+    secs: float = 0.0
+    nsecs: float = 0.0
+
+
+def _as_seconds(value: Any) -> Any:
+    return {"sec": value} if isinstance(value, int | float) else value
+
+
+class RosPoint(StrictModel):
+    """A point of ``trajectory_msgs/JointTrajectory``; its efforts are not used."""
+
+    positions: list[float]
+    velocities: list[float] | None = None
+    accelerations: list[float] | None = None
+    effort: Any = None
+    time_from_start: Annotated[RosTime, BeforeValidator(_as_seconds)]
+
+    @property
+    def seconds(self) -> float:
+        """Time from the start, s."""
+        t = self.time_from_start
+        return t.sec + t.secs + (t.nanosec + t.nsecs) * 1e-9
+
+
+class RosTrajectory(StrictModel):
+    """``trajectory_msgs/JointTrajectory``."""
+
+    header: Any = None
+    joint_names: Annotated[list[str], Field(min_length=1)]
+    points: Annotated[list[RosPoint], Field(min_length=2, max_length=MAX_ROWS)]
+
+
+class RosRobotTrajectory(StrictModel):
+    """``moveit_msgs/RobotTrajectory``: only joints of the arm move."""
+
+    joint_trajectory: RosTrajectory
+    multi_dof_joint_trajectory: dict[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _of_the_arm_alone(self) -> Self:
+        if (self.multi_dof_joint_trajectory or {}).get("points"):
+            problem = "moves more than the arm's joints, which is not followed"
+            raise ValueError(f"multi_dof_joint_trajectory: {problem} | Give a trajectory of the arm alone")
+        return self
+
+
 def _ros_trajectory(path: Path) -> tuple[Reals, Reals, StatedRates]:
     """Times (n,) in s, joint values (n, joints) in rad or m, and their rates, of a joint trajectory of ROS."""
     content = read_yaml(path)
-    body = content.get("joint_trajectory", content)
-    names, points = (body.get("joint_names"), body.get("points")) if isinstance(body, dict) else (None, None)
-    if not isinstance(names, list) or not isinstance(points, list) or not names:
-        remedy = "Give trajectory_msgs/JointTrajectory: joint_names, and points with positions and time_from_start"
-        raise InputError(path, None, "holds no joint trajectory", remedy)
-    if not 2 <= len(points) <= MAX_ROWS:
-        raise InputError(path, "points", f"the path has {_points(len(points))}", f"Give 2 to {MAX_ROWS} points")
-    beside = content.get("multi_dof_joint_trajectory")
-    if isinstance(beside, dict) and beside.get("points"):
-        problem = "moves more than the arm's joints, which is not followed"
-        raise InputError(path, "multi_dof_joint_trajectory", problem, "Give a trajectory of the arm alone")
-    if body is not content:
-        _only(path, "", content, IN_ROBOT_TRAJECTORY)
-    _only(path, "" if body is content else "joint_trajectory.", body, IN_TRAJECTORY)
-    order = _joint_order(path, [str(name) for name in names])
-    times, (joints, velocities, accelerations) = np.empty(len(points)), np.full((3, len(points), len(names)), np.nan)
+    if "joint_trajectory" in content:
+        body = parse(RosRobotTrajectory, content, path).joint_trajectory
+    else:
+        body = parse(RosTrajectory, content, path)
+    order, points = _joint_order(path, body.joint_names), body.points
+    joints, velocities, accelerations = np.full((3, len(points), len(order)), np.nan)
     for k, point in enumerate(points):
-        given = point if isinstance(point, dict) else {}
-        joints[k] = _joint_numbers(path, f"points[{k}].positions", given.get("positions"), len(names))
-        for rates, key in zip((velocities, accelerations), RATES):
-            if given.get(key):
-                rates[k] = _joint_numbers(path, f"points[{k}].{key}", given[key], len(names))
-        if given.get("accelerations") and not given.get("velocities"):
+        for rows, key in ((joints, "positions"), (velocities, "velocities"), (accelerations, "accelerations")):
+            values = getattr(point, key)
+            if key == "positions" or values:
+                if len(values) != len(order):
+                    where, problem = f"points[{k}].{key}", f"not {len(order)} numbers"
+                    raise InputError(path, where, problem, "Give one for each joint")
+                rows[k] = values
+        if point.accelerations and not point.velocities:
             problem = "accelerations without velocities, between which no controller interpolates"
             raise InputError(path, f"points[{k}].accelerations", problem, "Give velocities too, or leave them out")
-        _only(path, f"points[{k}].", given, IN_POINT)
-        times[k] = _seconds(path, k, given.get("time_from_start"))
+    times = np.array([point.seconds for point in points])
     _check_times(path, [f"points[{k}].time_from_start" for k in range(len(points))], times)
     if np.abs(joints).max() > MAX_RAD:
         k = int(np.abs(joints).max(axis=1).argmax())
         problem = f"{np.abs(joints[k]).max():g} rad are more than ten turns"
         raise InputError(path, f"points[{k}].positions", problem, "Write radians, or metres for a prismatic joint")
     return times, joints[:, order], StatedRates(velocities[:, order], accelerations[:, order])
-
-
-def _joint_numbers(path: Path, where: str, values: object, count: int) -> list[float]:
-    """One number for each joint, or :class:`InputError`."""
-    if not isinstance(values, list) or len(values) != count or not all(map(_is_number, values)):
-        raise InputError(path, where, f"not {count} numbers", "Give one for each joint")
-    return values
-
-
-def _only(path: Path, where: str, given: dict[str, Any], known: frozenset[str]) -> None:
-    """Refuse what no message of ROS has there: it would not be followed."""
-    for key in given.keys() - known:
-        problem = f"not followed: joint trajectories of ROS have only {', '.join(sorted(known))} here"
-        raise InputError(
-            path, f"{where}{key}", problem, "Correct the key or remove it; give each motion a file of its own"
-        )
 
 
 def _joint_order(path: Path, names: list[str]) -> list[int]:
@@ -233,22 +251,6 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
         problem = f"joints can't be identified by {', '.join(names)}"
         raise InputError(path, "joint_names", problem, "Name them joint_1, joint_2 ... from the base on")
     return sorted(range(len(names)), key=numbers.__getitem__)
-
-
-def _seconds(path: Path, k: int, value: object) -> float:
-    """Seconds of a point's ``time_from_start``: a number, or those of ROS 1 (secs, nsecs) and ROS 2 (sec, nanosec)."""
-    if _is_number(value):
-        return float(value)
-    if isinstance(value, dict):
-        whole, rest = value.get("sec", value.get("secs", 0)), value.get("nanosec", value.get("nsecs", 0))
-        if {*value} <= {"sec", "secs", "nanosec", "nsecs"} and _is_number(whole) and _is_number(rest):
-            return whole + rest * 1e-9
-    where = f"points[{k}].time_from_start"
-    raise InputError(path, where, "no time", "Write seconds, or sec and nanosec")
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
@@ -289,33 +291,13 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
 
 def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
     position = _block(path, rows, POSITION, check_millimetres)
-    T = transform(position / 1000, np.zeros_like(position))
     names = FORMS[form]
-    if form in ("rpy_deg", "zyz_deg"):
-        angles = _block(path, rows, names)
-        order = "ZYX" if form == "rpy_deg" else "ZYZ"
-        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_euler(
-            order, angles[:, ::-1] if form == "rpy_deg" else angles, degrees=True
-        ).as_matrix()
-        return T
-    values = np.array([[row[name] for name in names] for row in rows])
-    if form == "quaternion_wxyz":
-        length = np.linalg.norm(values, axis=1)
-        for i in np.flatnonzero(np.abs(length - 1) > UNIT_LENGTH_TOLERANCE):
-            problem = f"the quaternion's length is {length[i]:.9g}, not 1"
-            raise InputError(path, _where(lines[i], names), problem, "Divide w, x, y and z by it")
-        T[:, :3, :3] = scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix()
-        return T
-    R = values.reshape(-1, 3, 3)
-    off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
-    for i in np.flatnonzero((off > ORTHONORMAL_TOLERANCE) | (np.linalg.det(R) < 0)):
-        problem = (
-            "the matrix mirrors" if off[i] <= ORTHONORMAL_TOLERANCE else f"the matrix is off a rotation by {off[i]:.3g}"
-        )
-        raise InputError(path, _where(lines[i], names), problem, "Give an orthonormal, right-handed matrix by rows")
-    u, _, vt = np.linalg.svd(R)
-    T[:, :3, :3] = u @ vt
-    return T
+    angles = form in ("rpy_deg", "zyz_deg")
+    values = _block(path, rows, names) if angles else np.array([[row[name] for name in names] for row in rows])
+    try:
+        return posed(rotations(form, values), position / 1000)
+    except NoRotationError as error:
+        raise InputError(path, _where(lines[error.row], names), error.problem, error.remedy) from None
 
 
 def _block(
@@ -361,21 +343,6 @@ Expected = Annotated[
 """One verdict, or several that a path comes to at once."""
 Rates = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=1, max_length=MAX_JOINTS)]
 Blend = Annotated[float, Field(ge=0, le=10_000)]
-
-
-class PoseEntry(Orientation):
-    """A pose of the tool in the base frame: position, and one of the forms of orientation."""
-
-    xyz_mm: PositionMm
-
-    @model_validator(mode="after")
-    def _one_orientation(self) -> Self:
-        self.check_one_form()
-        return self
-
-    def pose(self) -> Reals:
-        """T_base_tool (4, 4), m."""
-        return self.transform_at(np.array(self.xyz_mm) / 1000)
 
 
 class NamedPath(StrictModel):

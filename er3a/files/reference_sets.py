@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy
 
 from er3a.errors import InputError, InputWarning
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, Written, read_csv
 from er3a.files.kept_files import names, own_or_shipped
+from er3a.files.orientations import NoRotationError, rotations
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
@@ -64,7 +64,9 @@ ORIENTATIONS: dict[str, tuple[str, ...]] = {
     "rotation vector": _ROTATION_VECTOR,
     "matrix": _MATRIX,
 }
-"""Columns of the flange's orientation, by how it is written: rpy as in URDF, the matrix column by column."""
+"""Columns of the flange's orientation, by how it is written: rpy as in URDF, the matrix column by column: nx, ny, nz is
+the flange's x axis in the base frame."""
+_FORM_OF = dict(zip(ORIENTATIONS.values(), ("rpy_deg", "quaternion_wxyz", "rotation_vector_rad", "matrix")))
 ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
@@ -158,29 +160,29 @@ def _orientation(fields: Fields) -> Rotation3 | None:
     return tuple(tuple(row) for row in R.tolist())  # type: ignore[return-value]
 
 
-def rotation_of(columns: tuple[str, ...], values: Reals) -> Reals:
+def rotation_of(columns: tuple[str, ...], values: Reals, tolerance: float = math.inf) -> Reals:
     """The rotation matrix nearest to an orientation as a document writes it.
 
     Parameters
     ----------
     columns : one of the forms of ``ORIENTATIONS``
     values : in their order: deg, the four numbers of a quaternion (w first), or a matrix by columns n, o, a
+    tolerance : by which a quaternion or matrix may be off a rotation
 
     Returns
     -------
-    R : (3, 3); roll, pitch and yaw turn about fixed x, y, z one after another, so R = Rz(yaw) Ry(pitch) Rx(roll)
+    R : (3, 3), see :func:`er3a.files.orientations.rotations`
+
+    Raises
+    ------
+    NoRotationError
+        for a quaternion or matrix that is off by more than that, or mirrored
     """
-    turn = scipy.spatial.transform.Rotation
-    if columns == _RPY:
-        found = turn.from_euler("xyz", values, degrees=True)
-    elif columns == _QUATERNION:
-        found = turn.from_quat(values, scalar_first=True)
-    elif columns == _ROTATION_VECTOR:
-        found = turn.from_rotvec(values, degrees=True)
-    else:
-        found = turn.from_matrix(values.reshape(3, 3).T)
-    R: Reals = found.as_matrix()
-    return R
+    if columns == _ROTATION_VECTOR:
+        values = np.radians(values)
+    if columns == _MATRIX:
+        values = values.reshape(3, 3).T.ravel()
+    return rotations(_FORM_OF[columns], values[None], tolerance)[0]
 
 
 def _position_faults(fields: Fields) -> Iterator[Fault]:
@@ -194,14 +196,10 @@ def _position_faults(fields: Fields) -> Iterator[Fault]:
         elif fields["point"] != "flange":
             yield "point", f"an orientation of the {fields['point']}", "Write flange: its orientation alone is checked"
         else:
-            values = np.array([fields[name] for name in columns])
-            if columns == _QUATERNION and abs(np.linalg.norm(values) - 1) > NOT_RIGID:
-                yield columns[0], f"the quaternion has length {np.linalg.norm(values):g}", "Write a unit quaternion"
-            if columns == _MATRIX:
-                M = values.reshape(3, 3).T
-                if np.abs(M.T @ M - np.eye(3)).max() > NOT_RIGID or np.linalg.det(M) < 0:
-                    remedy = "nx, ny, nz is the flange's x axis in the base frame, ox ... its y axis, ax ... its z axis"
-                    yield columns[0], "these columns are not a rotation matrix", remedy
+            try:
+                rotation_of(columns, np.array([fields[name] for name in columns]), NOT_RIGID)
+            except NoRotationError as error:
+                yield columns[0], error.problem, error.remedy
 
 
 def _pose(fields: Fields) -> Pose:
@@ -490,6 +488,7 @@ def _known(names: Iterable[str]) -> str:
 
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
+HALF_DEG, COMMANDED_DEG = 0.5, 2.5
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 _COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
@@ -636,18 +635,24 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
 
 
 def _fill_rounding(table: list[Fields]) -> None:
-    """Half the last digit of a row's joint values, which is that of all rows of its source; none of a commanded pose,
-    whose joint values are whole or half degrees that are written as such, and exact."""
-    most: dict[str, int] = {}
+    """Half the last digit of each joint value, cell by cell; none of commanded poses, which are exact.
+
+    A table of whole and half degrees alone is of commanded poses. Beside typed ones of the same source, a row counts as
+    commanded only if all its values are multiples of 2.5 degrees: six others, rounded to whole degrees, are so once in
+    15 000 rows.
+    """
     typed = [[fields[name] for name in (*_POSE, *_FURTHER) if fields.get(name) is not None] for fields in table]
+    mixed = {fields["source"] for fields, values in zip(table, typed) if not _multiples_of(HALF_DEG, values)}
     for fields, values in zip(table, typed):
-        decimals = max((value.decimals for value in values), default=0)
-        most[fields["source"]] = max(most.get(fields["source"], 0), decimals)
-    for fields, values in zip(table, typed):
-        commanded = all(value.decimals <= 1 and 2 * value == round(2 * value) for value in values)
-        half = 0.5 * 10.0 ** -most[fields["source"]]
-        halves = (0.0 if fields.get(name) is None else half for name in (*_POSE, *_FURTHER))
+        commanded = _multiples_of(COMMANDED_DEG if fields["source"] in mixed else HALF_DEG, values)
+        cells = [fields.get(name) for name in (*_POSE, *_FURTHER)]
+        halves = [0.0 if cell is None else 0.5 * 10.0**-cell.decimals for cell in cells]
         fields["rounding"] = () if commanded else tuple(halves)
+
+
+def _multiples_of(step: float, values: list[Written]) -> bool:
+    """Whether joint values (deg), written with one decimal at most, are whole steps."""
+    return all(value.decimals <= 1 and value % step == 0 for value in values)
 
 
 def _states_none(fields: Fields) -> bool:

@@ -231,14 +231,11 @@ def drive_field(key: str) -> str:
     return next(field.name for field in fields(Drives) if key.startswith(field.name))
 
 
-def check_masses(
-    inertia: Inertia | None, drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]
-) -> None:
+def check_masses(drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]) -> None:
     """Reject drives and wrist loads of joints that the arm does not have, and units of the other type of joint.
 
     Parameters
     ----------
-    inertia : not looked at here
     drives, wrist : groups of the file; None where it has none
     slides : for each joint, whether it slides
 
@@ -766,7 +763,7 @@ class RobotFile(InputFile):
 
     @model_validator(mode="after")
     def _masses_of_this_arm(self):
-        check_masses(self.inertia, self.drives, self.wrist_load, self.slides)
+        check_masses(self.drives, self.wrist_load, self.slides)
         if self.inertia and max(row.link for row in self.inertia.links) > len(self.dh.rows):
             raise ValueError(f"inertia.links: the arm has {len(self.dh.rows)} links | Link 0 is the base")
         if self.inertia and self.inertia.origins and len(self.inertia.origins) != len(self.dh.rows):

@@ -1,6 +1,6 @@
 """Target files (YAML or CSV): the poses that the inverse stage solves.
 
-Targets as a CSV table: one row each, position in mm and the orientation in one of the four named forms.
+Targets as a CSV table: one row each, position in mm and the orientation in one of the named forms.
 
 Columns: ``name``, ``x_mm``, ``y_mm``, ``z_mm``; the columns of one form (``FORMS``); optionally ``note``,
 ``expect`` (may stay empty), ``q1_ref_deg`` .. ``qn_ref_deg`` (of prismatic joints in mm), and ``units_checked``, with
@@ -9,33 +9,26 @@ yes in each row where small angles are degrees although they look like radians.
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
+from er3a.files.orientations import FORMS, form_in, rotations
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, posed, rot_y, rot_z, transform
+from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
 from er3a.robots.robot import MAX_JOINTS, Robot
 
 POSITION = ("x_mm", "y_mm", "z_mm")
-FORMS: dict[str, tuple[str, ...]] = {
-    "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
-    "zyz_deg": ("z1_deg", "y_deg", "z2_deg"),
-    "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
-    "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
-}
 KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))
@@ -53,10 +46,9 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     path = Path(path)
     header = read_header(path)
     present = set(header)
-    forms = [form for form, columns in FORMS.items() if present & set(columns)]
-    if len(forms) != 1:
-        raise InputError(path, "header", _without_one_form(header, forms), f"Give the columns {KNOWN_FORMS}")
-    form = forms[0]
+    form = form_in(path, header)
+    if form is None:
+        raise InputError(path, "header", _without_form(header), f"Give the columns {KNOWN_FORMS}")
     columns = {"name": CsvColumn(str)} | {name: CsvColumn() for name in (*POSITION, *FORMS[form])}
     columns |= {name: CsvColumn(str, optional=True) for name in TEXTS if name in present}
     last = max((number for number, name in enumerate(REFERENCE, 1) if name in present), default=0)
@@ -64,11 +56,9 @@ def read_target_table(path: str | Path) -> list[dict[str, Any]]:
     return [_target(row, form, REFERENCE[:last]) for row in read_csv(path, columns)]
 
 
-def _without_one_form(header: list[str], forms: list[str]) -> str:
+def _without_form(header: list[str]) -> str:
     if not header:
         return "the file is empty"
-    if forms:
-        return f"the table has two forms of orientation, {forms[0]} and {forms[1]}"
     strange = [name for name in header if name.strip() not in ("name", *TEXTS, *POSITION, *REFERENCE, UNITS_CHECKED)]
     return "the table has no orientation" + (f" that is known, but {', '.join(strange)}" if strange else "")
 
@@ -85,14 +75,13 @@ def _target(row: dict[str, Any], form: str, reference: tuple[str, ...]) -> dict[
 
 
 MAX_TARGETS = 20_000
-UNIT_LENGTH_TOLERANCE = 1e-6
 EULER_KEY = re.compile(r"euler\w*|[xyz]{3}(_(deg|rad))?", re.IGNORECASE)
 
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\r\n]*$")]
 
 
 class Orientation(StrictModel):
-    """The orientation of a pose, in one of four forms.
+    """The orientation of a pose, in one of five forms.
 
     Attributes
     ----------
@@ -100,6 +89,7 @@ class Orientation(StrictModel):
     zyz_deg : R = Rz(a) Ry(b) Rz(c)
     quaternion_wxyz : of unit length to 1e-6
     matrix : rotation matrix by rows, orthonormal to 1e-6; the nearest exact rotation is used
+    rotation_vector_rad : axis times angle, a turn at most
     """
 
     rpy_deg: RpyDeg | None = None
@@ -118,30 +108,14 @@ class Orientation(StrictModel):
                 )
         return content
 
-    @field_validator("quaternion_wxyz")
-    @classmethod
-    def _unit_length(cls, values):
-        length = 1.0 if values is None else math.hypot(*values)
-        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
-            raise ValueError(f"the quaternion's length is {length:.9g}, not 1 | Divide w, x, y and z by it")
-        return values
+    rotation_vector_rad: Triple | None = None
 
-    @field_validator("matrix")
+    @field_validator("quaternion_wxyz", "matrix", "rotation_vector_rad")
     @classmethod
-    def _rotation(cls, rows):
-        if rows is None:
-            return rows
-        R = np.array(rows)
-        with np.errstate(over="ignore", invalid="ignore"):
-            worst = np.abs(R @ R.T - np.eye(3)).max()
-        if not worst <= ORTHONORMAL_TOLERANCE:
-            raise ValueError(
-                f"the matrix is not a rotation: R R^T differs from 1 by {worst:.3g} | "
-                f"Its rows must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; write more digits"
-            )
-        if np.linalg.det(R) < 0:
-            raise ValueError("the matrix is a reflection (its determinant is -1) | Change the sign of one axis")
-        return rows
+    def _rotation(cls, values, info):
+        if values is not None:
+            rotations(info.field_name, [np.ravel(values)])
+        return values
 
     def forms(self) -> list[str]:
         """The forms that are given."""
@@ -164,23 +138,25 @@ class Orientation(StrictModel):
 
         Returns
         -------
-        T : (4, 4); the rotation of a matrix is the nearest orthogonal one, by its singular values
-
-        Notes
-        -----
-        ``rpy_deg`` is R = Rz(yaw) Ry(pitch) Rx(roll), ``zyz_deg`` is R = Rz(a) Ry(b) Rz(c), a quaternion has w first.
+        T : (4, 4), see :func:`er3a.files.orientations.rotations`
         """
-        if self.rpy_deg is not None:
-            return transform(position, np.radians(self.rpy_deg))
-        if self.zyz_deg is not None:
-            a, b, c = np.radians(self.zyz_deg)
-            R = rot_z(a)[:3, :3] @ rot_y(b)[:3, :3] @ rot_z(c)[:3, :3]
-        elif self.quaternion_wxyz is not None:
-            R = scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
-        else:
-            u, _, vt = np.linalg.svd(np.array(self.matrix))
-            R = u @ vt
-        return posed(R, position)
+        (form,) = self.forms()
+        return posed(rotations(form, [np.ravel(getattr(self, form))])[0], position)
+
+
+class PoseEntry(Orientation):
+    """A pose: position, and one of the forms of orientation."""
+
+    xyz_mm: PositionMm
+
+    @model_validator(mode="after")
+    def _one_orientation(self):
+        self.check_one_form()
+        return self
+
+    def pose(self) -> NDArray[np.float64]:
+        """The transform (4, 4), m."""
+        return self.transform_at(np.array(self.xyz_mm) / 1000)
 
 
 class TargetEntry(Orientation):

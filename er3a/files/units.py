@@ -32,6 +32,7 @@ MIN_SPAN_MM = 10.0
 """A table whose lengths are all below is in metres."""
 WIDEST_IN_RADIANS = 2.01 * math.pi
 """A table whose angles (deg) are all below is in radians."""
+ROWS_TO_JUDGE_UNITS = 3
 RESIDUE_MM = 1e-3
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 """Lengths between both, of which none is longer, look like metres."""
@@ -69,6 +70,27 @@ def check_degrees(values: Sequence[float], slides: bool = False) -> None:
     if largest > (MAX_DISTANCE_MM if slides else MAX_DEG):
         much = "more than ten turns, or than 100 m" if slides else "more than ten turns"
         raise ValueError(f"{shown} deg is {much} | Write degrees within +-{MAX_DEG:g}")
+
+
+def refuse_radians(path: Path, where: str, angles: Reals, least: float = WIDEST_IN_RADIANS) -> None:
+    """Reject a table's angles that can only be radians.
+
+    Parameters
+    ----------
+    where : the columns, for the message
+    angles : (N, k), deg, of at least ``ROWS_TO_JUDGE_UNITS`` different rows; of fewer, and of none but 0, nothing is
+        said
+    least : deg, as which the widest is wider in degrees
+
+    Raises
+    ------
+    InputError
+        naming the widest
+    """
+    widest = float(np.abs(angles).max(initial=0.0))
+    if len(np.unique(angles, axis=0)) >= ROWS_TO_JUDGE_UNITS and 0 < widest <= least:
+        problem = f"the widest angle is {widest:g} deg, which can only be radians"
+        raise InputError(path, where, problem, "Convert to degrees")
 
 
 def doubt_degrees(values: Sequence[float], part: object = None, key: str = "", file: Path | None = None) -> None:

@@ -6,16 +6,14 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-import scipy
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import Positive, StandardDeviations
 from er3a.files.robot_file import Name, Placement, Text
-from er3a.files.target_file import UNIT_LENGTH_TOLERANCE, Line
-from er3a.files.units import CentreMm, JointsDeg, PositionMm, RpyDeg, doubt
+from er3a.files.target_file import Line, PoseEntry
+from er3a.files.units import CentreMm, JointsDeg, RpyDeg, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load
-from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.robot import Robot
 from er3a.vision.field_of_view import FieldOfView
@@ -100,7 +98,7 @@ class GraspEntry(Placement):
         return Grasp(self.name, self.transform())
 
 
-class ObjectEntry(StrictModel):
+class ObjectEntry(PoseEntry):
     """A detected object: its pose in the camera's frame, and the detector's standard deviations in the camera's axes.
 
     ``symmetry_turns``: number of turns about its z axis in which it looks the same; 0 for any angle.
@@ -109,28 +107,12 @@ class ObjectEntry(StrictModel):
     name: Name
     note: Line | None = None
     note_zh: Line | None = None
-    xyz_mm: PositionMm
-    quaternion_wxyz: Annotated[list[float], Field(min_length=4, max_length=4)]
     standard_deviation: StandardDeviations
     symmetry_turns: Annotated[int, Field(ge=0, le=12)] = 1
     grasps: Annotated[list[GraspEntry], Field(min_length=1, max_length=20)]
     approach_mm: Annotated[float, Field(ge=1, le=1000)]
     retreat_mm: Annotated[float, Field(ge=1, le=1000)]
     expect: GraspOutcome | None = None
-
-    @model_validator(mode="after")
-    def _unit_length(self) -> Self:
-        length = float(np.linalg.norm(self.quaternion_wxyz))
-        if abs(length - 1) > UNIT_LENGTH_TOLERANCE:
-            raise ValueError(f"quaternion_wxyz: its length is {length:.9g}, not 1 | Divide w, x, y and z by it")
-        return self
-
-    def pose(self) -> Reals:
-        """T_camera_object (4, 4), m."""
-        T = np.eye(4)
-        T[:3, :3] = scipy.spatial.transform.Rotation.from_quat(self.quaternion_wxyz, scalar_first=True).as_matrix()
-        T[:3, 3] = np.array(self.xyz_mm) / 1000
-        return T
 
     def detected(self) -> DetectedObject:
         """In the units of the library."""

@@ -920,22 +920,16 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
         return
     if robot.hulls or robot.meshes or robot.visuals:
         meshes.mkdir(parents=True, exist_ok=True)
-    for visual in robot.visuals:
-        file = meshes / f"{names[visual.link]}_visual.obj"
-        file.write_text(_obj(_in_link(robot, visual.link, visual.points), visual.faces), encoding="utf-8")
-        _geometry(elements[names[visual.link]], "visual", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
-    for mesh in robot.meshes:
-        file = meshes / f"{names[mesh.link]}_surface.obj"
-        file.write_text(_obj(_in_link(robot, mesh.link, mesh.points), mesh.faces), encoding="utf-8")
-        _geometry(elements[names[mesh.link]], "collision", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
-    for number, piece in enumerate(robot.hulls, start=1):
-        file = meshes / f"{names[piece.link]}_{number}.obj"
-        points = _in_link(robot, piece.link, piece.points)
-        file.write_text(_obj(points, _hull_faces(points)), encoding="utf-8")
-        link = elements[names[piece.link]]
-        collision = _geometry(link, "collision", np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
-        if piece.margin:
-            collision.set("margin", repr(piece.margin))
+    shapes: list[tuple[LinkMesh | ConvexPiece, str, str]] = [(each, "visual", "visual") for each in robot.visuals]
+    shapes += [(each, "collision", "surface") for each in robot.meshes]
+    shapes += [(each, "collision", str(number)) for number, each in enumerate(robot.hulls, start=1)]
+    for each, tag, name in shapes:
+        file, points = meshes / f"{names[each.link]}_{name}.obj", _in_link(robot, each.link, each.points)
+        faces = each.faces if isinstance(each, LinkMesh) else _hull_faces(points)
+        file.write_text(_obj(points, faces), encoding="utf-8")
+        made = _geometry(elements[names[each.link]], tag, np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
+        if isinstance(each, ConvexPiece) and each.margin:
+            made.set("margin", repr(each.margin))
 
 
 def _in_link(robot: Robot, link: int, points: Reals | Sequence[tuple[float, float, float]]) -> Reals:

@@ -94,11 +94,8 @@ def _check_hand_eye(path: Path) -> None:
     file = load(HandEyeFile, path)
     for table in filter(None, (file.samples, file.touched)):
         check_samples(path.parent / table)
-    if file.streams is not None:
-        for table in (file.streams.flange, file.streams.target):
-            read_header(path.parent / table)
-    elif file.images is not None:
-        samples = path.parent / str(file.samples)
+    if file.images is not None:
+        samples = path.parent / file.samples
         for row in sample_rows(samples)[0]:
             if not (samples.parent / str(row.get("image"))).is_file():
                 where = f"row {row['row']}, column image"

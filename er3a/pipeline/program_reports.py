@@ -29,12 +29,14 @@ from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.language import as_text
-from er3a.pipeline.messages.left_out import left_out_text
 from er3a.pipeline.messages.programs import remedy, say
 from er3a.pipeline.messages.say import excerpt
+from er3a.pipeline.messages.scope import gap_text
 from er3a.pipeline.progress import TimeOverError, time_limit
-from er3a.pipeline.results import LeftOut, NoPass, plain
-from er3a.pipeline.stages.left_out import left_out_of_units, missed_of_program
+from er3a.pipeline.results import NotChecked, plain
+from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
+from er3a.pipeline.scope import Check as Checked
+from er3a.pipeline.stages.covered import covered_units, gaps_of_program
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
@@ -83,7 +85,7 @@ class CheckedFile:
     file: Path
     check: ProgramCheck | None
     error: InputError | None = None
-    missed: tuple[LeftOut, ...] = ()
+    missed: tuple[Open, ...] = ()
 
     @property
     def level(self) -> Level:
@@ -129,9 +131,9 @@ def checked_file(
         return CheckedFile(file, None, InputError(file, None, f"is not read after {seconds:.0f} s", remedy))
     except InputError as error:
         return CheckedFile(file, None, error)
-    missed = missed_of_program(robot, options.scene)
-    found = tuple(each for each in missed if each.subject in ("uncovered_links", "own_limits"))
-    return CheckedFile(file, check, missed=(*found, *left_out_of_units([*doubts, *own])))
+    missed = gaps_of_program(robot, options.scene)
+    found = tuple(each for each in missed if each.reason in ("uncovered_links", "limits_assumed"))
+    return CheckedFile(file, check, missed=(*found, *covered_units(1, [*doubts, *own]).gaps))
 
 
 def accepted(baseline: Path) -> frozenset[str]:
@@ -335,7 +337,7 @@ def shapes_line(robot: Robot) -> str:
     return "" if found is None else say(found)
 
 
-def missed_line(missed: tuple[LeftOut, ...]) -> str:
+def missed_line(missed: tuple[Open, ...]) -> str:
     """What was not examined of all motions.
 
     Parameters
@@ -346,7 +348,22 @@ def missed_line(missed: tuple[LeftOut, ...]) -> str:
     -------
     line : one sentence; empty where nothing is missing
     """
-    return say(NoPass(missed)) if missed else ""
+    return say(NotChecked(missed_checks(missed))) if missed else ""
+
+
+def missed_checks(missed: tuple[Open, ...]) -> tuple[Coverage, ...]:
+    """The checks that reasons are of, as of all motions.
+
+    Parameters
+    ----------
+    missed : why checks do not cover all
+
+    Returns
+    -------
+    checked : each check once
+    """
+    asked: dict[Checked, int] = {GAPS[each.reason]: 1 for each in missed}
+    return coverages(asked, missed)
 
 
 def _line_ranges(lines: Iterable[int]) -> str:
@@ -390,7 +407,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "complete": check.execution.complete,
                 "checked": list(check.checked),
                 "not_checked": each.lacks((*CHECKS, *NEEDED)),
-                "not_examined": [{"what": one.subject, "names": one.names} for one in each.missed],
+                "gaps": [{"check": GAPS[one.reason], "reason": one.reason, "names": one.names} for one in each.missed],
                 "shapes_assumed": check.shapes is not None,
                 "cycle": plain(check.cycle),
                 "findings": [_finding_record(one) for one in check.findings],
@@ -497,7 +514,7 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     found = []
     for each in checked:
         top = Place(each.file)
-        found += [("not_examined", left_out_text(one), top) for one in each.missed]
+        found += [(one.reason, gap_text(one), top) for one in each.missed]
         found += [("not_checked", NEEDED[one], top) for one in NEEDED if each.lacks([one])]
         if each.check and each.check.shapes:
             found.append((each.check.shapes.code, say(each.check.shapes), top))
@@ -577,7 +594,7 @@ class PathProgram:
     verdict: PathVerdict
     files: Mapping[str, str] | None
     findings: tuple[WriteFinding, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
+    open: tuple[Open, ...] = ()
 
 
 def programs_of(
@@ -610,10 +627,10 @@ def programs_of(
         along = measured(surroundings, each.motion)
         if collisions(along):
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-        rest = tuple(left for left in each.left_out if left.subject not in CHOSEN)
-        elsewhere = language != "csv" and any(left.subject == "missed_rows" for left in rest)
+        rest = tuple(left for left in each.open if left.reason not in CHOSEN)
+        elsewhere = language != "csv" and any(left.reason == "points_missed" for left in rest)
         if ((verdict != "safe" or elsewhere) and not unsafe) or not np.isfinite(each.motion.q[0]).all():
-            yield PathProgram(each.name, verdict, None, left_out=rest)
+            yield PathProgram(each.name, verdict, None, open=rest)
             continue
         near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
         files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)

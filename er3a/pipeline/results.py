@@ -28,21 +28,22 @@ import numpy as np
 from pydantic import ValidationError
 
 from er3a.by_value import ByValue, Finding
-from er3a.collision.pairs import Pair, PairsUnexamined, ShapesAssumed
+from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.language import N_
+from er3a.pipeline.scope import Check, Coverage, Open
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 8
+FORMAT_VERSION = 9
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
-BESIDE = ("unexamined", "shapes", "missed")
+BESIDE = ("shapes", "missed")
 """What a verdict can have beside its finding."""
 THE_SETTINGS = N_("the study's settings")
 THE_CODE = N_("er3a itself")
@@ -58,48 +59,33 @@ FindingT = TypeVar("FindingT", bound=Finding)
 class Verdict(Generic[FindingT]):
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
-    ``unexamined``: pairs of bodies whose collisions were not looked at because their shapes can't be right. ``shapes``:
-    on what assumed shapes of the arm it rests. ``missed``: what was not examined and may turn it.
+    ``shapes``: on what assumed shapes of the arm it rests. ``missed``: the checks that do not cover all that was asked.
     """
 
     status: Status
     finding: FindingT
-    unexamined: tuple[Pair, ...] = ()
     shapes: ShapesAssumed | None = None
-    missed: tuple[LeftOut, ...] = ()
+    missed: tuple[Coverage, ...] = ()
 
     @property
-    def findings(self) -> tuple[FindingT | PairsUnexamined | NoPass | ShapesAssumed, ...]:
-        """What it found, then what was not looked at and what was assumed, each a sentence."""
-        unexamined = (PairsUnexamined(self.unexamined),) if self.unexamined else ()
-        missed = (NoPass(self.missed),) if self.missed else ()
-        return (self.finding, *unexamined, *missed, *((self.shapes,) if self.shapes else ()))
+    def findings(self) -> tuple[FindingT | NotChecked | ShapesAssumed, ...]:
+        """What it found, then what was not checked and what was assumed, each a sentence."""
+        named = tuple(each for each in self.missed if each.gaps)
+        missed = (NotChecked(named),) if named and self.status == "caution" else ()
+        return (self.finding, *missed, *((self.shapes,) if self.shapes else ()))
 
-    def short_of(self, missed: tuple[LeftOut, ...]) -> Verdict[FindingT]:
-        """The verdict where something that may turn it was not examined.
-
-        Parameters
-        ----------
-        missed : what was not examined
-
-        Returns
-        -------
-        verdict : a caution in place of a pass, if there is anything
-        """
-        return self._lowered(bool(missed), missed=missed)
-
-    def without(self, unexamined: tuple[Pair, ...]) -> Verdict[FindingT]:
-        """The verdict where collisions of some pairs were not looked at.
+    def covering_less(self, missed: tuple[Coverage, ...]) -> Verdict[FindingT]:
+        """The verdict where checks do not cover all that was asked.
 
         Parameters
         ----------
-        unexamined : pairs of bodies
+        missed : these checks
 
         Returns
         -------
         verdict : a caution in place of a pass, if there are any
         """
-        return self._lowered(bool(unexamined), unexamined=unexamined)
+        return self._lowered(bool(missed), missed=missed)
 
     def resting_on(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
         """The verdict where shapes of the arm are assumed.
@@ -136,158 +122,10 @@ class Figure:
     of: int | None = None
 
 
-LeftOutSubject = Literal[
-    "obstacles",
-    "bare_links",
-    "unexamined_pairs",
-    "guessed_pairs",
-    "allowed_pairs",
-    "joined_pairs",
-    "scene_shapes",
-    "shallow_overlaps",
-    "own_speeds",
-    "own_accelerations",
-    "jerk",
-    "torques",
-    "paths",
-    "path_stretches",
-    "strategies",
-    "program_lines",
-    "program_starts",
-    "program_again",
-    "program_rest",
-    "program_findings",
-    "given_rates",
-    "missed_rows",
-    "outer_axes",
-    "controller_language",
-    "controller_ramps",
-    "joint_vectors",
-    "lost_cells",
-    "link_masses",
-    "peak_torques",
-    "rated_torques",
-    "rotor_inertias",
-    "friction",
-    "wrist_limits",
-    "load",
-    "paths_not_run",
-    "torque_peaks",
-    "program_torques",
-    "program_loads",
-    "drive_behaviour",
-    "other_gravity",
-    "mounting",
-    "real_camera",
-    "boardless_images",
-    "left_out_samples",
-    "copied_samples",
-    "stream_poses",
-    "joint_zeros",
-    "small_joint_zeros",
-    "touched_points",
-    "detections",
-    "gripped_parts",
-    "grasps",
-    "unjoined_cells",
-    "within_cells",
-    "targets",
-    "turns",
-    "carried",
-    "carried_shapes",
-    "tool",
-    "plans",
-    "references",
-    "loose_references",
-    "conflicting_references",
-    "tool_and_base",
-    "table_entries",
-    "diagnosis",
-    "more_faults",
-    "round_trips",
-    "near_singular_poses",
-    "all_solutions",
-    "reach_starts",
-    "the_arm_itself",
-    "uncertain_solutions",
-    "advice",
-    "rules",
-    "ways_between",
-    "colliding_reach",
-    "undecided_volume",
-    "tool_directions",
-    "capability",
-    "places",
-    "sampled_places",
-    "between_places",
-    "tray_nowhere",
-    "placed_box",
-    "uncovered_links",
-    "partial_links",
-    "allowed_contacts",
-    "bare_tool",
-    "arm_errors",
-    "objects_out_of_view",
-    "hidden_voids",
-    "orientations",
-    "box_directions",
-    "base_contacts",
-    "base_inside",
-    "places_in_solids",
-    "units",
-    "own_limits",
-    "own_values",
-    "half_turns",
-    "arm_angles",
-    "start_branches",
-    "flange_poses",
-    "base_poses",
-    "given_intrinsics",
-    "pose_intrinsics",
-    "open_intrinsics",
-]
+class NotChecked(Finding):
+    """What was to be checked and was not, or not all of it: no verdict passes without it."""
 
-NEVER_A_PASS: frozenset[LeftOutSubject] = frozenset(
-    (
-        *(
-            "obstacles",
-            "uncovered_links",
-            "partial_links",
-            "bare_tool",
-            "allowed_contacts",
-            "program_rest",
-            "program_findings",
-            "given_rates",
-            "missed_rows",
-            "half_turns",
-            "other_gravity",
-        ),
-        *("arm_errors", "objects_out_of_view", "hidden_voids", "orientations", "base_inside", "places_in_solids"),
-        *("units", "own_limits", "flange_poses", "base_poses", "open_intrinsics"),
-    )
-)
-"""What no verdict passes without; the rest bounds what a verdict is about, and stands in the table alone."""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Something that a stage did not examine.
-
-    Attributes
-    ----------
-    names : of what; empty for all
-    amount : a setting, limit or count that it depends on
-    """
-
-    subject: LeftOutSubject
-    names: tuple[str, ...] = ()
-    amount: int | float | None = None
-
-
-class NoPass(Finding):
-    """What was not examined and may turn a verdict, which therefore is no pass."""
-
-    missed: tuple[LeftOut, ...]
+    checks: tuple[Coverage, ...]
 
 
 @dataclass_transform(frozen_default=True)
@@ -295,22 +133,28 @@ class NoPass(Finding):
 class Summary:
     """What all summaries begin with; a stage's own, a frozen dataclass like this one, says what its verdict can be.
 
-    ``not_examined``: what settings, inputs and limits leave out of the verdict. ``decisive``: subjects of these without
-    which the stage's verdict is no pass.
+    Attributes
+    ----------
+    needs : checks that the stage's question needs; one that is not made is not covered
+    checked : what each check covers; a verdict passes only if all of them are complete
+    assumed : what these rest on without a document
     """
 
-    decisive: ClassVar[frozenset[LeftOutSubject]] = NEVER_A_PASS
+    needs: ClassVar[tuple[Check, ...]] = ()
 
     verdict: Verdict[Any]
     figures: tuple[Figure, ...]
-    not_examined: tuple[LeftOut, ...] = field(default=(), kw_only=True)
+    checked: tuple[Coverage, ...] = field(default=(), kw_only=True)
+    assumed: tuple[Open, ...] = field(default=(), kw_only=True)
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
 
     def __post_init__(self) -> None:
-        missed = tuple(each for each in self.not_examined if each.subject in self.decisive)
-        object.__setattr__(self, "verdict", self.verdict.short_of(missed))
+        made = {each.check for each in self.checked}
+        absent = (Coverage(check, 0, 1, (Open("not_run"),)) for check in self.needs if check not in made)
+        missed = tuple(each for each in (*self.checked, *absent) if not each.complete)
+        object.__setattr__(self, "verdict", self.verdict.covering_less(missed))
 
 
 SummaryT = TypeVar("SummaryT", bound=Summary)
@@ -500,6 +344,8 @@ def _record(folder: Path) -> dict[str, Any]:
     for key in ("robot", "stage", "verdict", "figures", "provenance"):
         if key not in stored:
             raise ResultError(path, f"damaged (no '{key}' in it)")
+    if not isinstance(stored["verdict"], dict) or "status" not in stored["verdict"]:
+        raise ResultError(path, "damaged (verdict without status)")
     _compare(path, content, checksums(folder))
     return stored
 
@@ -516,7 +362,8 @@ def read_status(folder: Path) -> Status:
     ResultError
         as :func:`read_stage`
     """
-    return _status(folder, _record(folder))
+    status: Status = _record(folder)["verdict"]["status"]
+    return status
 
 
 def read_foundation(folder: Path) -> Foundation:
@@ -538,20 +385,12 @@ def read_foundation(folder: Path) -> Foundation:
     record = _record(folder)
     parts = record["verdict"].get("params", {}).get("parts", ())
     unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
-    status = _status(folder, record)
+    status: Status = record["verdict"]["status"]
     return "unsettled" if status == "caution" and unsettled else status
 
 
-def _status(folder: Path, record: dict[str, Any]) -> Status:
-    try:
-        status: Status = record["verdict"]["status"]
-    except (KeyError, TypeError):
-        raise ResultError(folder / SUMMARY, "damaged (verdict without status)") from None
-    return status
-
-
-def read_verdict(folder: Path, stage: Stage) -> tuple[Verdict[Any], tuple[LeftOut, ...]]:
-    """A stage's verdict, and what it leaves out.
+def read_scope(folder: Path, stage: Stage) -> Summary:
+    """A stage's verdict, what it checked and what it assumed, without its tables.
 
     Parameters
     ----------
@@ -559,8 +398,7 @@ def read_verdict(folder: Path, stage: Stage) -> tuple[Verdict[Any], tuple[LeftOu
 
     Returns
     -------
-    verdict : ``not_computed`` with the reason, if the stage could not be computed
-    left_out : what settings, inputs and limits leave out of it
+    summary : with the verdict ``not_computed`` and the reason, if the stage could not be computed
 
     Raises
     ------
@@ -568,10 +406,10 @@ def read_verdict(folder: Path, stage: Stage) -> tuple[Verdict[Any], tuple[LeftOu
         as :func:`read_stage`
     """
     record = _record(folder)
-    if _status(folder, record) == "not_computed":
-        return Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()
-    summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
-    return summary.verdict, summary.not_examined
+    if record["verdict"]["status"] == "not_computed":
+        return Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ())
+    summary: Summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
+    return summary
 
 
 def check_results(folder: Path) -> None:

@@ -16,9 +16,10 @@ from typing import Literal
 
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
-from er3a.pipeline.messages.say import bracketed, joined, say_all, sentence
-from er3a.pipeline.results import NotComputed, Status, changed_since, is_computed, read_status, read_verdict
+from er3a.pipeline.messages.say import joined, say_all, sentence
+from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text, say_reserved
+from er3a.pipeline.results import NotComputed, Status, changed_since, is_computed, read_scope, read_status
+from er3a.pipeline.scope import Coverage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 
@@ -37,7 +38,7 @@ class StageVerdict:
     code : of the finding; text : in English
     demonstrations : how many targets, paths, programs or objects in it fail as they are meant to
     expected : what the study says that the status is to be, if it does
-    not_examined : what the verdict leaves out, in English
+    checked : what each check covers; not_checked : why not all, in English; assumed : what they rest on, in English
     outdated : files that have changed since, "the study's settings" or "er3a itself": the verdict is none on what they
         are now
     """
@@ -49,7 +50,9 @@ class StageVerdict:
     text: str
     demonstrations: int = 0
     expected: str | None = None
-    not_examined: tuple[str, ...] = ()
+    checked: tuple[Coverage, ...] = ()
+    not_checked: tuple[str, ...] = ()
+    assumed: tuple[str, ...] = ()
     outdated: tuple[str, ...] = ()
 
     @property
@@ -106,15 +109,20 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageV
         unknown = sentence("stage.not_examined")
         return StageVerdict(robot, name, NOT_EXAMINED, "stage.not_examined", unknown, expected=expected)
     import_module(stage.messages)
-    verdict, left_out = read_verdict(folder, stage)
+    summary = read_scope(folder, stage)
+    verdict = summary.verdict
     shown = len(getattr(verdict.finding, "demonstrations", ()))
-    missed = tuple(bracketed(left_out_text(each), left_out_names(each)) for each in left_out)
     first, *others = verdict.findings
-    text = joined([say_reserved(first, left_out), say_all(others)], " ")
+    text = joined([say_reserved(first, summary.assumed), say_all(others)], " ")
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)
-    return StageVerdict(robot, name, verdict.status, verdict.finding.code, text, shown, expected, missed, outdated)
+    missed = tuple(missed_text(each) for each in summary.checked if not each.complete)
+    return StageVerdict(
+        *(robot, name, verdict.status, verdict.finding.code, text, shown, expected, summary.checked, missed),
+        tuple(map(assumed_text, summary.assumed)),
+        outdated,
+    )
 
 
 _NO_XML = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -126,7 +134,7 @@ def write_junit(verdicts: Sequence[StageVerdict], output: Path) -> None:
     A verdict of ``fail`` is a failure, a stage that broke an error; ``no_reference``, and a stage that does not apply
     to the robot or has not been computed yet, are skipped; a caution passes. What fails as it is meant to is no
     failure, and counts as a demonstration; what the study expects otherwise is a failure. What passes says its verdict,
-    and each case lists what was not examined.
+    and each case lists what was checked, and what not.
     """
     root = ElementTree.Element("testsuites", {"name": "er3a"} | _counts(verdicts))
     for robot in dict.fromkeys(verdict.robot for verdict in verdicts):
@@ -174,7 +182,9 @@ def _add_case(suite: ElementTree.Element, verdict: StageVerdict) -> None:
         lines.append(f"demonstrations, which fail as expected: {verdict.demonstrations}")
     if verdict.is_otherwise:
         lines.append(f"expected: {verdict.expected}")
-    lines += [f"not examined: {_NO_XML.sub('?', each)}" for each in verdict.not_examined]
+    lines += [f"checked: {each.check}, {covered_text(each)}" for each in verdict.checked if each.complete]
+    lines += [f"not checked: {_NO_XML.sub('?', each)}" for each in verdict.not_checked]
+    lines += [f"assumed: {_NO_XML.sub('?', each)}" for each in verdict.assumed]
     if lines:
         ElementTree.SubElement(case, "system-out").text = "\n".join(lines)
 

@@ -10,9 +10,10 @@ import codecs
 import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from er3a.errors import InputError
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
@@ -444,13 +445,28 @@ def data_file_of(path: Path, suffix: str) -> Path | None:
     -------
     path : None if there is none
     """
-    for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
-        beside = path.with_name(name)
-        if beside.is_file():
-            return beside
-    meant = (path.stem + suffix).lower()
-    like = sorted(name for name in os.listdir(path.parent) if name.lower() == meant) if path.parent.is_dir() else []
-    return next((path.with_name(name) for name in like if path.with_name(name).is_file()), None)
+    wanted = path.stem + suffix
+    found = named_in(path.parent, wanted, lambda name: (not name.startswith(path.stem), name != wanted, name))
+    return found if found is not None and found.is_file() else None
+
+
+def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Path | None:
+    """What a folder holds under a name, however its letters are written.
+
+    Parameters
+    ----------
+    wanted : with the suffix
+    order : by which the first of several is taken
+
+    Returns
+    -------
+    path : None if there is none, and for a folder that may not be read
+    """
+    try:
+        held = sorted(os.listdir(folder), key=order)
+    except OSError:
+        return None
+    return next((folder / each for each in held if each.lower() == wanted.lower()), None)
 
 
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:

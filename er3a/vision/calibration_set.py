@@ -1,10 +1,4 @@
-"""What was recorded for a hand-eye calibration, as arrays.
-
-Two streams of poses may have clocks of their own. :func:`time_offset` estimates the offset between them, and
-:func:`paired` interpolates poses at equal times. Hand and eye turn by equal angles over equal times, so the offset is
-the one at which the board's rotation angles over short times agree best with the arm's. It is searched on a grid and
-refined.
-"""
+"""What was recorded for a hand-eye calibration, as arrays."""
 
 from __future__ import annotations
 
@@ -16,13 +10,13 @@ import numpy as np
 import scipy
 
 from er3a.by_value import ByValue, Displayed, Sheet
-from er3a.errors import Er3aError, ShapeError
-from er3a.geometry.transforms import check_poses, inverted, posed, step_between
+from er3a.errors import ShapeError
+from er3a.geometry.transforms import check_poses, inverted, step_between
 from er3a.numerics.arrays import Flags, Integers, Reals
 
 PLACE_M, PLACE_RAD = 1e-3, np.radians(0.2)  # within which the flange stands at one place
 Setup = Literal["eye_in_hand", "eye_to_hand"]
-OpenFrame = Literal["flange_poses", "base_poses"]
+OpenFrame = Literal["flange_frame", "base_frame"]
 """What recorded poses may not be: the flange's, and in the robot's own base."""
 
 
@@ -120,7 +114,7 @@ class CalibrationSet(ByValue, Displayed):
         """
         if simulated or self.states_joints:
             return ()
-        return ("flange_poses", "base_poses") if self.touched is None else ("flange_poses",)
+        return ("flange_frame", "base_frame") if self.touched is None else ("flange_frame",)
 
     @property
     def states_joints(self) -> bool:
@@ -149,129 +143,3 @@ class CalibrationSet(ByValue, Displayed):
             q=None if self.q is None else self.q[rows],
             shared=None if self.shared is None else self.shared[rows],
         )
-
-
-GRID_S = 0.02  # s, between offsets tried before the best is refined
-SPAN_S = 0.4  # over which turns are compared
-INLIER = 3.0  # standard deviations, beyond which a rotation counts as wrong
-MAX_PAIRS = 2000  # of rotations, that are compared at most
-MIN_PAIRS = 10  # of rotations, without which an offset is left open
-
-
-@dataclass(frozen=True, eq=False)
-class Stream:
-    """Poses T (N, 4, 4), m, at rising times t (N,), s."""
-
-    t: Reals
-    T: Reals
-
-
-@dataclass(frozen=True)
-class TimeOffset:
-    """The camera's time plus ``offset`` is the arm's, s, with half its 95 % interval; angles differ by ``rms``, rad.
-
-    ``unused``: poses of the camera that no sample was made of.
-    """
-
-    offset: float
-    half_width: float
-    rms: float
-    pairs: int
-    unused: int = 0
-
-
-class OffsetOpenError(Er3aError):
-    """Two streams leave their offset open: ``pairs`` of the camera's poses can be compared with the arm's, which are
-    too few, or the best offset is the ``end`` of the range that was searched, s."""
-
-    def __init__(self, pairs: int, end: float | None = None):
-        self.pairs, self.end = pairs, end
-        too_few = f"only {pairs} pairs of poses can be compared, and it takes {MIN_PAIRS}"
-        super().__init__(too_few if end is None else f"the best offset, {end:.3g} s, is an end of the range searched")
-
-
-def time_offset(hand: Stream, eye: Stream, widest: float) -> TimeOffset:
-    """Estimate the offset between the clocks of two streams, by rotation angles over short times.
-
-    Robust: up to half of the compared rotations may be wrong.
-
-    Parameters
-    ----------
-    hand, eye : streams of poses with times in s
-    widest : s, the offset is sought within this to either side
-
-    Returns
-    -------
-    offset : to be added to the eye's times, s
-
-    Raises
-    ------
-    OffsetOpenError
-        if the streams have too little time in common, or the offset is not within the range
-    """
-    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
-    later = np.searchsorted(eye.t, eye.t + SPAN_S)
-    first = np.flatnonzero(later < len(eye.t))
-    first = first[eye.t[later[first]] - eye.t[first] < 2 * SPAN_S]
-    first = first[:: max(1, len(first) // MAX_PAIRS)]
-    last = later[first]
-    R = scipy.spatial.transform.Rotation.from_matrix(eye.T[:, :3, :3])
-    turned = (R[last] * R[first].inv()).magnitude()
-    low, high = eye.t[first] - widest > hand.t[0], eye.t[last] + widest < hand.t[-1]
-    kept = low & high
-    first, last, turned = first[kept], last[kept], turned[kept]
-    if len(first) < MIN_PAIRS:
-        raise OffsetOpenError(len(first))
-
-    def off(offset: float) -> Reals:
-        there = arm(eye.t[last] + offset) * arm(eye.t[first] + offset).inv()
-        difference: Reals = there.magnitude() - turned
-        return difference
-
-    grid = np.arange(-widest, widest + GRID_S / 2, GRID_S)
-    best = float(grid[int(np.argmin([np.median(np.abs(off(offset))) for offset in grid]))])
-    scale = max(float(np.median(np.abs(off(best)))) / 0.674, 1e-9)
-
-    def cost(offset: float) -> float:
-        return float(np.sum(np.minimum((off(offset) / scale) ** 2, INLIER**2)))
-
-    found = float(scipy.optimize.minimize_scalar(cost, bounds=(best - GRID_S, best + GRID_S), method="bounded").x)
-    if abs(found) > widest - min(GRID_S, widest / 10):
-        raise OffsetOpenError(len(first), float(np.copysign(widest, found)))
-    rest, slope = off(found), (off(found + 1e-3) - off(found - 1e-3)) / 2e-3
-    inlier = np.abs(rest) < INLIER * scale
-    deviation = np.sqrt((rest[inlier] ** 2).mean() / max((slope[inlier] ** 2).sum(), 1e-300))
-    return TimeOffset(found, float(1.96 * deviation), float(np.sqrt((rest[inlier] ** 2).mean())), int(inlier.sum()))
-
-
-def paired(hand: Stream, eye: Stream, offset: float, count: int) -> tuple[Reals, Reals, Reals]:
-    """Poses of hand and eye at equal times, spread over rotations.
-
-    The arm's poses are interpolated. Poses are chosen one after another, each the farthest in angle from those before.
-    Only the half of all times counts at which the arm is slowest: there an error of the offset matters least.
-
-    Parameters
-    ----------
-    offset : s, to be added to the eye's times
-    count : how many poses; fewer if the streams have fewer in common
-
-    Returns
-    -------
-    hand, eye, t : (count, 4, 4), m, twice, and (count,), s by the hand's clock
-    """
-    inside = np.flatnonzero((eye.t + offset > hand.t[0]) & (eye.t + offset < hand.t[-1]))
-    t = eye.t[inside] + offset
-    arm = scipy.spatial.transform.Slerp(hand.t, scipy.spatial.transform.Rotation.from_matrix(hand.T[:, :3, :3]))
-    near = np.clip(t, hand.t[0] + 0.05, hand.t[-1] - 0.05)
-    speed = (arm(near + 0.05) * arm(near - 0.05).inv()).magnitude()
-    slow = np.argsort(speed, kind="stable")[: max(count, len(t) // 2)]
-    inside, t = inside[np.sort(slow)], t[np.sort(slow)]
-    R = arm(t)
-    chosen = [0]
-    distance = (R * R[0].inv()).magnitude()
-    while len(chosen) < min(count, len(t)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, (R * R[chosen[-1]].inv()).magnitude())
-    rows = np.sort(chosen)
-    position = np.stack([np.interp(t[rows], hand.t, hand.T[:, k, 3]) for k in range(3)], axis=1)
-    return posed(R[rows].as_matrix(), position), eye.T[inside[rows]], t[rows]

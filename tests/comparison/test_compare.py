@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import er3a
-from er3a.comparison.compare import best_of
+from er3a.comparison.compare import ANGLE_UNITS, LENGTH_UNITS, best_of
 from er3a.errors import InputError
 from er3a.files.arm_file import read_arm
 from er3a.files.robot_writer import write_robot
@@ -249,6 +249,39 @@ def test_a_unit_that_makes_two_tables_equal_is_named_with_its_table(columns, fac
     layers = (found.geometry, found.zero, found.directions, found.base, found.flange, found.limits, found.speeds)
     assert all(layer.same for layer in layers)
     assert er3a.compare(found.corrected, right).verdict == "equal"
+
+
+@pytest.mark.parametrize(
+    ("heading", "own", "told"),
+    [
+        ("alpha_rad", "180/π rad", "rad → 180/π rad 57.2958"),
+        ("alpha_deg", "rad", "deg → rad 57.2958"),
+        ("alpha_deg", "gon", "deg → gon 0.9"),
+        ("a_mm", "dm", "mm → dm 100"),
+        ("a_cm", "dm", "cm → dm 10"),
+        ("a_m", "ft", "m → ft 0.3048"),
+        ("a_in", "ft", "in → ft 12"),
+        ("a_cm", "mm", "cm → mm 0.1"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
+def test_the_unit_that_is_named_is_the_one_of_the_heading(tmp_path, heading, own, told):
+    """A column of a table in units of its own, under a heading that says another."""
+    right, unit = er3a.to_standard(er3a.load_robot("er3_600")), heading.partition("_")[2]
+    size = (LENGTH_UNITS | ANGLE_UNITS)[own]
+    lengths, angles = (unit, "deg") if heading[:2] == "a_" else ("mm", unit)
+    a, d = (1000 * column / (size if lengths != "mm" or own == "dm" else 1) for column in (right.a, right.d))
+    alpha = np.degrees(right.alpha) / (size if own in ANGLE_UNITS else 1)
+    rows = [f"joint,a_{lengths},alpha_{angles},d_{lengths},offset_deg"]
+    rows += [
+        f"{k + 1},{','.join(f'{v:.9g}' for v in row)}"
+        for k, row in enumerate(zip(a, alpha, d, np.degrees(right.offset)))
+    ]
+    table = tmp_path / "table.csv"
+    table.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for pair in ((str(table), "er3_600"), ("er3_600", str(table))):
+        done = CliRunner().invoke(app, ["compare", *pair])
+        assert (done.exit_code, f"({told})" in done.stdout) == (1, True), done.output
 
 
 def test_a_unit_is_named_beside_an_entry_that_is_wrong_too():

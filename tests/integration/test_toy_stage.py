@@ -58,7 +58,8 @@ class ToyResults(Results[ToySummary]):
 RESULTS = ToyResults
 ''',
     "pipeline/stages/toy/compute.py": '''"""Adds lengths."""
-from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import Coverage
 from er3a.pipeline.stages.toy.entry import ToySettings
 from er3a.pipeline.stages.toy.model import Lengths, Long, ToyResults, ToySummary
 
@@ -67,8 +68,8 @@ def compute(study, name):
     whole = float(a.sum())
     if not whole:
         raise ZeroDivisionError("no such arm")
-    missed = (LeftOut("torques"),)
-    summary = ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),), not_examined=missed)
+    made = (Coverage("torque", 1, 1),)
+    summary = ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),), checked=made)
     return ToyResults(summary, Lengths(a))
 ''',
     "pipeline/stages/toy/page/__init__.py": '"""Its page."""\n',

@@ -16,7 +16,7 @@ from er3a.pipeline import (
 )
 from er3a.pipeline.commands.options import app
 from er3a.pipeline.program_reports import PathProgram
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.scope import Open
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import TargetsLeftOut
@@ -99,7 +99,7 @@ def test_limits_and_links_that_nothing_is_known_of_are_no_pass(tmp_path):
     words = ("check-program", "data/programs/weld_seam.src", "--robot", str(tmp_path / "er3a_c60.yaml"))
     done = run(*words, "--start", HOME, "--fail-on", "caution")
     assert "would pass" in done.stdout
-    assert "therefore no pass" in done.stderr
+    assert "Not checked: " in done.stderr
     assert done.exit_code == 1
 
 
@@ -153,7 +153,7 @@ def test_no_motion_passes_by_numbers_that_look_like_another_unit(tmp_path):
     ):
         words = ("check-program", file, "--robot", "er3a_c60", "--start", start, "--scene", scene_file)
         found = json.loads(run(*words, "--json").stdout)[0]
-        named = [each["names"] for each in found["not_examined"] if each["what"] == "units"]
+        named = [each["names"] for each in found["gaps"] if each["reason"] == "units"]
         assert [name.rpartition("/")[2] for names in named for name in names] == ([expected] if expected else [])
         assert not expected or found["level"] != "pass"
         assert not any(each["code"] == "not_understood" for each in found["findings"])
@@ -258,7 +258,7 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
 
 @pytest.mark.parametrize(
     ("findings", "missed", "reason"),
-    [((TargetsLeftOut(1),), (), "left out"), ((), (LeftOut("program_rest", ("line: 3",)),), "checked (line: 3)")],
+    [((TargetsLeftOut(1),), (), "left out"), ((), (Open("program_rest", ("line: 3",)),), "(line: 3)")],
 )
 def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, reason):
     made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)

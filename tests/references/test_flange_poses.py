@@ -75,9 +75,9 @@ def test_poses_of_ten_joints_are_compared_however_they_are_written(tmp_path, col
 @pytest.mark.parametrize(
     ("columns", "values", "point", "text"),
     [
-        ("qw,qx,qy,qz", "1,1,0,0", "flange", "column qw: the quaternion has length 1.41421"),
+        ("qw,qx,qy,qz", "1,1,0,0", "flange", "column qw: the quaternion's length is 1.41421"),
         ("qw,qx,qy,qz", "1,,0,0", "flange", "column qx: empty"),
-        ("nx,ny,nz,ox,oy,oz,ax,ay,az", "1,0,0,0,1,0,0,0,-1", "flange", "column nx: these columns are not a rotation"),
+        ("nx,ny,nz,ox,oy,oz,ax,ay,az", "1,0,0,0,1,0,0,0,-1", "flange", "column nx: the matrix is "),
         ("roll_deg,pitch_deg,yaw_deg", "10,20,30", "wrist_centre", "column point: an orientation of the wrist_centre"),
         ("roll_deg,pitch_deg,yaw_deg,qw,qx,qy,qz", "10,20,30,1,0,0,0", "flange", "written in two ways"),
     ],

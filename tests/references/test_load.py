@@ -262,3 +262,22 @@ def test_last_digits_of_joint_values_count_through_the_jacobian(tmp_path):
     assert (off <= uncertainty).all()
     assert er3a.diagnose(robot, load_references(tmp_path)) == []
     assert len(er3a.diagnose(robot.replace(d=robot.d + np.eye(6)[3] / 2000), load_references(tmp_path))) > 0
+
+
+@pytest.mark.parametrize("by_cell", [False, True])
+@pytest.mark.parametrize("name", ["ur5e", "lbr_iiwa_14"])
+def test_joint_values_of_other_digits_in_each_row_or_cell_fail_no_right_arm(tmp_path, name, by_cell):
+    robot, random, lines = load_robot(name).without_tool(), np.random.default_rng(20261127), []
+    for k in range(48):
+        q = random.uniform(robot.lower, robot.upper)
+        digits = random.integers(0, 3, robot.joints if by_cell else 1) * np.ones(robot.joints, int)
+        typed = [f"{value:.{count}f}" for value, count in zip(np.degrees(q), digits)]
+        point = [f"{value:.3f}" for value in 1000 * forward(robot, q)[:3, 3]]
+        lines.append(",".join([f"p{k},flange", *typed, *point, ",m,cad"]))
+    further = "q6_deg,q7_deg" if robot.joints == 7 else "q6_deg"
+    written(tmp_path, "positions.csv", POSITIONS.replace("q6_deg", further) + "\n".join(lines) + "\n")
+    stated = load_references(tmp_path, robot).checkable
+    expected, uncertainty = expected_of(stated)
+    assert (np.abs(predict(robot, stated) - expected) <= uncertainty).all()
+    longer = robot.replace(d=robot.d + 0.003 * (np.arange(robot.rows) == 3))
+    assert (np.abs(predict(longer, stated) - expected) > uncertainty).sum() > 20

@@ -11,10 +11,11 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.shapes import arm_shapes
+from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
-from er3a.formats.urdf import export_urdf, import_urdf, table_from_axes
+from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.kinematics.forward import forward, frames
 from er3a.robots.masses import Masses
 from er3a.robots.robot import Robot

@@ -6,10 +6,11 @@ import numpy as np
 import pinocchio
 import pytest
 
+from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import Er3aError, InputError, InputWarning
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
-from er3a.formats.urdf import export_urdf, import_urdf, table_from_axes
+from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, frames
 from testing.arms import make_arm

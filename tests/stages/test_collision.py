@@ -16,7 +16,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.results import read_results, read_verdict
+from er3a.pipeline.results import read_results, read_scope
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute
 from er3a.pipeline.stages.collision.model import RESULTS
@@ -236,15 +236,13 @@ def test_shapes_in_error_end_no_other_stage_and_are_never_a_pass(stage, tmp_path
     """Each stage that looks for collisions says which pairs it did not look at."""
     study = with_a_base_too_large(tmp_path)
     run.compute(stage, study, "arm", tmp_path / stage)
-    verdict, _ = read_verdict(tmp_path / stage, STAGES[stage])
+    verdict = read_scope(tmp_path / stage, STAGES[stage]).verdict
     assert verdict.status == "caution"
-    assert [pair.second for pair in verdict.unexamined] == [3, 4, 6]
-    assert say(verdict.findings[1]) == (
-        "Collisions not examined, because the shapes overlap where no arm's can: "
-        "base and link 3, base and link 4, base and link 6."
-    )
+    (wrong,) = (gap for each in verdict.missed for gap in each.gaps if gap.reason == "wrong_shapes")
+    assert wrong.names == ("base/link_3", "base/link_4", "base/link_6")
+    assert "shapes that overlap where no arm's can" in say(verdict.findings[1])
     run.show("report", stage, study, "arm", tmp_path / stage, tmp_path / "page.html")
-    assert "Collisions not examined" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "overlap where no arm&#39;s can" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.long

@@ -118,9 +118,9 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
     assert found.status == "no_reference"
     verdict = found.results.summary.verdict.finding
     assert isinstance(verdict, NoData)
-    left = {each.subject: each.names for each in found.results.summary.not_examined}
+    left = {each.reason: each.names for each in found.results.summary.assumed}
     assert left["link_masses"] == tuple("123456")
-    assert {"peak_torques", "load", "torque_peaks", "drive_behaviour"} <= left.keys()
+    assert {"peak_torques", "load"} <= left.keys()
     assert say(verdict).startswith("No data")
     assert "payload" not in {each.what for each in found.results.summary.unknown}  # the manual has it
     assert len(found.results.torques) == 0
@@ -232,7 +232,7 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
     found = computed(tmp_path, a_study(tmp_path, guessed, entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE))
     summary = found.results.summary
     assert (full[1].status, found.status, summary.verdict.finding.unknown) == ("pass", "caution", (need,))
-    left = {each.subject: each.names for each in summary.not_examined}
+    left = {each.reason: each.names for each in summary.assumed}
     if group == "drives":
         assert len(left["peak_torques"]) == len(left["rated_torques"]) == 6
         assert "rests on guesses: the drives' limits" in dynamics.payload_text(summary, full[0].robot("er3a_c60"))[0]
@@ -265,19 +265,16 @@ def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     own = page[page.index("why it may not be run") :]
     assert own.index("line_shoulder") < own.index("line_out") < own.index("Path playback")
-    known = {each.subject for each in summary.not_examined}.isdisjoint(("link_masses", "load", "friction"))
+    known = {each.reason for each in summary.assumed}.isdisjoint(("link_masses", "load", "friction"))
     assert ("; for sizing motors and gears" in page, "not for sizing motors and gears" in page) == (known, not known)
 
 
 def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
-    left = {each.subject: each for each in bare.results.summary.not_examined}
+    left = {each.reason: each for each in bare.results.summary.assumed}
     assert left["link_masses"].names == ("6",)
     assert left["friction"].names == left["peak_torques"].names == tuple(f"J{j}" for j in range(1, 7))
     assert left["load"].names == ()
-    assert left["paths_not_run"].names == ("line_shoulder", "line_out")
-    assert left["torque_peaks"].amount == 101
-    named = {each.subject for each in full[1].results.summary.not_examined}
-    assert named == {"paths_not_run", "torque_peaks", "program_torques", "drive_behaviour", "mounting"}
+    assert {each.reason for each in full[1].results.summary.assumed} == {"mounting"}
 
     def change(content: dict[str, Any]) -> None:
         limited(1.0)(content)
@@ -441,16 +438,15 @@ def test_no_verdict_passes_by_a_gravity_that_is_not_earths(tmp_path, gravity, na
         tmp_path, limited(20.0), entry={"payload": CLAIM | {"body": LOAD}}, settings={"gravity_m_s2": gravity}, kept=ONE
     )
     summary = computed(tmp_path, study).results.summary
-    left = {each.subject: each.amount for each in summary.not_examined}
-    assert left.get("other_gravity") == (gravity if named else None)
-    assert ("other_gravity" in {each.subject for each in summary.verdict.missed}) == named
+    found = [gap.amount for each in summary.verdict.missed for gap in each.gaps if gap.reason == "gravity"]
+    assert found == ([gravity] if named else [])
 
 
 @pytest.mark.parametrize("rpy_deg", [None, [0, 0, 0], [90, 0, 0]])
 def test_a_mounting_that_nothing_states_is_named(tmp_path, rpy_deg):
     placed = {"base": {"xyz_mm": [0, 0, 0], "rpy_deg": rpy_deg}} if rpy_deg else {}
     summary = computed(tmp_path, a_study(tmp_path, entry=placed, kept=ONE)).results.summary
-    assert ("mounting" in {each.subject for each in summary.not_examined}) == (rpy_deg is None)
+    assert ("mounting" in {each.reason for each in summary.assumed}) == (rpy_deg is None)
 
 
 def test_a_load_concerns_this_stage_alone(full):
@@ -574,7 +570,7 @@ def test_moments_about_a_joint_that_slides_are_refused():
         {"source": "a sheet", "grade": "claim", "rows": [{"joint": 3, "moment_n_m": 4.0}]}
     )
     with pytest.raises(ValueError, match="joint 3 is prismatic"):
-        check_masses(None, None, wrist_group, [False, False, True, False])
+        check_masses(None, wrist_group, [False, False, True, False])
 
 
 def test_the_load_that_a_program_names_is_no_part_of_the_torques(tmp_path):
@@ -592,6 +588,5 @@ def test_the_load_that_a_program_names_is_no_part_of_the_torques(tmp_path):
     rows = torques.take(torques.path == "moves_2")
     gravity = er3a.gravity(study.robot("er3a_c60"), np.radians(rows.q), load=own)
     np.testing.assert_allclose(rows.gravity, gravity, atol=1e-9)
-    left = {each.subject: each.names for each in summary.not_examined}
-    assert left["program_loads"] == ("moves_2",)
-    assert "program_loads" in [each.subject for each in summary.verdict.missed]
+    gaps = {gap.reason: gap.names for each in summary.verdict.missed for gap in each.gaps}
+    assert gaps["program_loads"] == ("moves_2",)

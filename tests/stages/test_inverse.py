@@ -22,8 +22,8 @@ from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.left_out import pair_words
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute

@@ -229,7 +229,7 @@ def test_accelerations_that_the_study_gives_bind_programs_too(study, tmp_path):
         given = study.section(TrajectorySettings).model_copy(update={"acceleration_deg_s2": [limit] * 6})
         own = with_entry(study, programs=str(tmp_path / "programs.yaml")).model_copy(update={"trajectory": given})
         summary = compute_programs(own, "er3a_c60").summary
-        assert "own_accelerations" not in {each.subject for each in summary.not_examined}
+        assert "own_accelerations" not in {each.reason for each in summary.assumed}
         found[limit] = [each.finding for each in summary.programs[0].findings if each.level == "fail"]
     assert found[300.0] == []
     assert found[100.0] == [AccelerationTooGreat(1, pytest.approx(np.degrees(4.0)), pytest.approx(100.0))]

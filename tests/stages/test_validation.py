@@ -174,9 +174,6 @@ def test_the_manufacturers_600_mm_is_a_conflict_counted_against_no_model(summari
     found = summary.verdict.finding
     assert (found.contradiction.stated, found.contradiction.more) == ((592.8, 600.0), 0)
     assert "592.8 mm or 600.0 mm" in say(found)
-    (left,) = (each for each in summary.not_examined if each.subject == "conflicting_references")
-    assert left.names == (conflict.group,)
-    assert "conflicting_references" not in {each.subject for each in summaries["er3a_c60"].not_examined}
 
 
 def test_the_article_table_is_told_apart_with_numbers(summaries):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import re
 import shutil
 from dataclasses import replace
 
@@ -47,15 +45,14 @@ def folders(study, small_results):
 def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     assert summary.verdict.status == "caution"  # no gripper has a shape
-    assert [each.subject for each in summary.verdict.missed] == ["carried"]
+    assert [gap.reason for each in summary.verdict.missed for gap in each.gaps] == ["gripper"]
     assert summary.verdict.finding.left_out == ("pose_12",)
     assert summary.verdict.finding.simulated
     assert "samples are simulated" in say(summary.verdict.finding)
     assert summary.verdict.shapes.near == ()
-    left = {each.subject: each.names for each in summary.not_examined}
-    assert left["left_out_samples"] == ("pose_12",)
-    assert {"real_camera", "detections", "gripped_parts", "shallow_overlaps", "tool"} <= left.keys()
-    assert "touched_points" not in left
+    assumed = {each.reason for each in summary.assumed}
+    assert {"real_camera", "tool"} <= assumed
+    assert "touched_points" not in assumed
     assert {each.name: each.outcome for each in summary.objects} == {
         "can": "grasped",
         "box": "grasped",
@@ -141,11 +138,6 @@ def test_the_page_is_written(study, folders, tmp_path, name):
     run.show("report", "vision", study, name, folders[name], tmp_path / "report")
     page = (tmp_path / "report").read_text(encoding="utf-8")
     assert "T_flange_board" in page or "T_base_board" in page
-    packed = re.findall(r'href="data:text/plain;base64,([^"]+)" download="grasp_\w+\.(?:src|script|pgm|XPL|csv)"', page)
-    heads = [base64.b64decode(text).decode() for text in packed]
-    assert len(heads) >= 5 * (name == "er3a_c60")
-    assert all("the camera is simulated" in head and "may carry the object was not examined" in head for head in heads)
-    assert all("er3a: Run no path or program on the arm until" in head for head in heads)
 
 
 @pytest.mark.long
@@ -182,8 +174,6 @@ def test_images_come_with_their_reprojected_corners(study, tmp_path):
     calibration = results.summary.calibration
     assert (calibration.samples, calibration.used) == (28, 13)
     assert [each.image for each in calibration.boardless] == blank
-    (left_out,) = (each for each in results.summary.not_examined if each.subject == "boardless_images")
-    assert len(left_out.names) == 14
     assert set(corners.image) == {f"{n}.png" for n in range(1, 28, 2)}
     sound = corners.used
     assert set(corners.image[~sound]) == {"7.png"}
@@ -219,7 +209,6 @@ def test_samples_without_a_calibration_leave_every_object_unexamined(study, tmp_
     summary = STAGE.module("compute").compute(given, "er3a_c60").summary
     assert summary.verdict.status == "fail"
     assert (summary.calibration is not None) == turning
-    left = {each.subject: each.names for each in summary.not_examined}
-    assert left["grasps"] == tuple(each["name"] for each in content["objects"])
-    assert {"real_camera", "joint_zeros", "detections", "gripped_parts", "torques", "shallow_overlaps"} <= left.keys()
-    assert {"carried", "tool"} <= left.keys()
+    missed = {each.check for each in summary.verdict.missed}
+    assert "camera" in missed or turning
+    assert "scene_collision" in missed

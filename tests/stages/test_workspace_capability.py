@@ -19,8 +19,8 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import branch_labels
-from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.stages.workspace.compute import _left_out
+from er3a.pipeline.messages.scope import assumed_text
+from er3a.pipeline.stages.workspace.compute import _assumed
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
@@ -53,7 +53,7 @@ def done() -> ToolCapability:
 def context_of(robot: Robot, found: ToolCapability) -> dict:
     """What the page takes, of results that hold nothing else."""
     verdict = SimpleNamespace(shapes=None)
-    summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict, not_examined=())
+    summary = SimpleNamespace(capability=found.capability, placement=found.placement, verdict=verdict, assumed=())
     results = SimpleNamespace(summary=summary, capability=found.cells, places=found.places)
     placed = placing({"workspace": SimpleNamespace(results=results)}, robot, {}, {})
     return capability_context(robot, results, placing=placed)
@@ -199,12 +199,9 @@ def test_no_place_is_no_error():
     context = context_of(load_robot("er3_600"), done)
     assert context["place_rows"] == []
     assert context["place_picture"] is None
-    proven = SimpleNamespace(proof=SimpleNamespace(bounds=(1.0, 1.0), width=0.1))
-    left_out = {each.subject: each for each in _left_out(SimpleNamespace(samples=1000), proven, done)}
-    assert "between_places" in left_out
-    assert "placed_box" not in left_out  # none was placed
-    assert left_out["tray_nowhere"].names == ("2000 × 2000 × 100 mm",)
-    assert "no place was found" in left_out_text(left_out["tray_nowhere"])
+    (nowhere,) = _assumed(done)
+    assert (nowhere.reason, nowhere.names) == ("tray_nowhere", ("2000 × 2000 × 100 mm",))
+    assert "no place for the tray was found" in assumed_text(nowhere)
 
 
 def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not():

@@ -17,13 +17,14 @@ from er3a.identifiability.proposals import LookAtMotion
 from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.inverse import inverse
-from er3a.pipeline.messages.left_out import say_reserved
 from er3a.pipeline.messages.pages import caveat
+from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.messages.vision import say
 from er3a.pipeline.messages.workspace import range_text
 from er3a.pipeline.overview.index import condition, proposed
-from er3a.pipeline.results import FORMAT_VERSION, LeftOut, plain, read_foundation, write_checksums
+from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
+from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.page.report import rule_rows
@@ -113,8 +114,8 @@ def test_other_entries_are_to_be_checked_only_where_there_are_others():
 
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():
     torque = NoLimits(5, 2, 14.0, 4.1, "N m", "arc", (), 0, None)
-    assert say_reserved(torque, [LeftOut("friction")]).endswith("known masses alone: don't choose motors by them.")
-    assert say_reserved(torque, [LeftOut("jerk")]) == say(torque)
+    assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
+    assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
 
 
 def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
@@ -328,7 +329,7 @@ def test_the_workspace_page_moves_a_box_up_or_down_only_where_no_height_is_to_be
     results = placed().results
     placement = results.summary.placement
     spot = replace(placement.best, room_down_m=(0.075, 0.2, 0.2), room_up_m=(0.075, 0.175, 0.05))
-    results.summary = SimpleNamespace(placement=replace(placement, places=(spot,)), not_examined=[LeftOut("tool")])
+    results.summary = SimpleNamespace(placement=replace(placement, places=(spot,)), assumed=[Open("tool")])
     results.places = None
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
@@ -349,7 +350,7 @@ def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment()
     }
     found = placing(stored, load_robot("er3a_c60"), {}, {"programs": ["through"]})
     results = stored["workspace"].results
-    results.summary.not_examined, results.places = [], None
+    results.summary.assumed, results.places = [], None
     rows = dict(tray_rows(found, results, results.summary.placement, ""))
     assert rows["Motions"].startswith("In the way of 1 of the 1 motions that pass without it. <a href=")
     assert 'href="programs.html?play=through&amp;t=2.75#player">through</a> (tool point).' in rows["Motions"]

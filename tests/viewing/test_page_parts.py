@@ -14,11 +14,11 @@ from er3a.pipeline.messages.pages import Caveat
 from er3a.pipeline.messages.references import STATUS_WORDS
 from er3a.pipeline.overview.index import _tally, _TextOfPage, write_index
 from er3a.pipeline.player.motions import Fault, FaultMoment
-from er3a.pipeline.results import LeftOut, read_stage
+from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.page.evidence_section import rounded_within, table_to_use
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _missed, _tray_edges, linked, page_environment
+from er3a.pipeline.viewing.page import VERDICT_WORDS, Head, Numbering, _tray_edges, linked, page_environment
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -166,26 +166,18 @@ def test_a_stage_has_one_sign_on_all_pages(status, demonstrations, foundation, s
     assert ("7 expected to fail" in badge) == (demonstrations > 0 and sign != "no_verdict")
 
 
-def test_what_another_page_examines_is_named_only_where_that_page_is():
-    torques = LeftOut("torques")
-    assert _missed(torques, ("dynamics",))[1] == '<a href="dynamics.html">dynamics</a>'
-    assert _missed(torques, ("trajectory",))[1] == "not examined in this study"
-    assert _missed(torques, None)[1] == ""
-
-
-def test_the_search_has_all_text_of_a_page_by_heading_and_says_what_was_not_examined():
+def test_the_search_has_all_text_of_a_page_by_heading():
     page = """<nav>All robots</nav><main><p>Cau<b>tio</b>n: 2 of 3.</p>
     <details><summary><h2>Paths</h2></summary><p>One<br>two</p><img alt="A curve">
     <table><thead><tr><th>path</th></tr></thead>
     <tr><td>line</td><td><p>safe</p></td></tr></table></details>
     <h3>More</h3><button>Play</button><ul><li>a</li><li>bc <ul><li>de</li></ul></li></ul>
-    <div id="table-not-examined"><table><tr><td>collisions of a gripper</td><td>-</td></tr></table></div>
     <h2>Last</h2><table><tr><td>line 2</td></tr></table></main><footer>sha256</footer>"""
     parser = _TextOfPage()
     parser.feed(page)
     assert {head: list(texts) for head, texts in parser.texts.items()} == {
         "": ["Caution: 2 of 3."],
         "Paths": ["Paths", "One two", "A curve", "line safe"],
-        "Paths More": ["More", "bc", "de", "not examined: collisions of a gripper -"],
+        "Paths More": ["More", "bc", "de"],
         "Last": ["Last", "line 2"],
     }

@@ -20,11 +20,8 @@ from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.vision import say
-from er3a.pipeline.stages.vision.compute import grasp_programs
 from er3a.planning.timing import joint_limits
 from er3a.planning.way_around import EndOutsideLimits, NoneFound, PlannerMissing
-from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import (
@@ -300,30 +297,6 @@ def test_a_start_outside_the_limits_is_named():
     _, _, plan = chosen_from(BEHIND_THE_POST + np.array([robot.upper[0], 0, 0, 0, 0, 0]))
     assert isinstance(plan.refusal, NoTransfer)
     assert isinstance(plan.refusal.why, EndOutsideLimits)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("language", ["krl", "urscript", "rpl", "xpl", "csv"])
-def test_the_written_program_is_the_proven_motion(round_the_post, tmp_path, language):
-    """Read back and checked motion by motion, in the same scene."""
-    robot, task, plan = round_the_post
-    speed = np.full(6, np.pi)
-    rows = grasp_programs(robot, "can", BEHIND_THE_POST, plan.chosen, [language], speed=speed, simulated=True)
-    assert "the camera is simulated" in rows.text[0]
-    assert "object was not examined" in rows.text[0]
-    assert "assumed 100 deg/s" not in rows.text[0]
-    files = [tmp_path / name for name in rows.file]
-    for file, text in zip(files, rows.text):
-        file.write_text(text, encoding="utf-8")
-    program = read_program(files[0])
-    check = check_program(program, robot, CheckOptions(start=BEHIND_THE_POST, scene=task.scene))
-    assert check.level != "fail", [each.finding for each in check.findings]
-    known = [each.least_clearance_mm for each in check.verdicts if each.least_clearance_mm is not None]
-    assert len(known) >= len(plan.chosen.legs)
-    assert min(known) >= 1000 * plan.chosen.clearance - 1.0
-    if language != "csv":
-        assert "close the gripper here" in rows.text[0]
-        assert len(check.verdicts) == 1 + len(plan.chosen.legs)
 
 
 def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
 from er3a.geometry.transforms import moved, transform
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import park, shah
@@ -373,17 +373,17 @@ def test_poses_read_by_another_convention_are_named(convention, stream):
 @pytest.mark.parametrize("setup", SETUPS)
 def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
     """Of one rule: the command lists all frames, grasps rest on the camera's alone."""
-    own = "flange_poses" if setup == "eye_in_hand" else "base_poses"
+    own = "flange_frame" if setup == "eye_in_hand" else "base_frame"
     for joints, touched, simulated, frames in (
-        (False, False, False, ("flange_poses", "base_poses")),
-        (False, True, False, ("flange_poses",)),
+        (False, False, False, ("flange_frame", "base_frame")),
+        (False, True, False, ("flange_frame",)),
         (True, False, False, ()),
         (False, False, True, ()),
     ):
         samples = a_set(setup, 9, of_joints=joints, touched=np.zeros((3, 2, 3)) if touched else None)
         assert samples.open_frames(simulated) == frames
         head = SimpleNamespace(setup=setup, simulated=simulated)
-        assert _open_frames(samples, head) == tuple(LeftOut(each) for each in frames if each == own)
+        assert _open_frames(samples, head) == tuple(Open(each) for each in frames if each == own)
 
 
 def test_residuals_that_nothing_explains_are_an_error():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from er3a.errors import InputError
-from er3a.files.hand_eye_file import load_hand_eye, read_calibration
+from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.kept_files import ROOT
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
@@ -21,13 +20,13 @@ from er3a.files.vision_file import load_vision
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.cli import app
-from er3a.pipeline.messages.left_out import left_out_text
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.messages.scope import assumed_text, gap_text
+from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.vision.entry import vision_files
 from er3a.robots.joint_limits import joint_columns
 from testing import camera_cells
 from testing.arms import scara
-from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, off, seen
+from testing.hand_eye_sets import X_TRUE, Y_TRUE, flange_poses, noisy, seen
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 POINT_NAMES = [f"{part}_{c}_mm" for part in ("seen", "touched") for c in "xyz"]
@@ -185,41 +184,6 @@ def test_radians_are_told_from_degrees(tmp_path, poses):
         load_hand_eye(write(tmp_path, table), load_robot("er3a_c60"))
 
 
-def swinging(t: np.ndarray) -> np.ndarray:
-    """Poses (N, 4, 4), m, of a flange that swings, at times (N,) in s."""
-    turns = np.stack([0.7 * np.sin(0.9 * t), 0.6 * np.sin(1.3 * t + 1), 0.8 * np.sin(0.7 * t + 2)], axis=1)
-    T = np.tile(np.eye(4), (len(t), 1, 1))
-    T[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-    T[:, :3, 3] = 0.2 * turns + [0.4, 0, 0.4]
-    return T
-
-
-@pytest.mark.long
-def test_two_clocks_are_brought_together(tmp_path):
-    """Streams of an arm that swings, the camera's clock 0.137 s behind; one pose in ten is a wrong detection."""
-    random = np.random.default_rng(3)
-
-    t_arm, t_eye = np.arange(0, 40, 0.01), np.arange(1, 38, 0.05)
-    target = noisy(seen("eye_in_hand", swinging(t_eye + 0.137)), random, 3e-4, 1e-3)
-    epoch = 1_491_416_776.0  # recorders write seconds since 1970
-    wrong = random.choice(len(t_eye), len(t_eye) // 10, replace=False)
-    target[wrong, :3, :3] = Rotation.random(len(wrong), random_state=4).as_matrix()
-    head = HEAD.format(setup="eye_in_hand").replace(
-        "samples: samples.csv", "streams: {flange: hand.csv, target: samples.csv}"
-    )
-    write(tmp_path, {"t_s": epoch + t_arm} | columns(swinging(t_arm), "flange", "quaternion"))
-    shutil.move(tmp_path / "samples.csv", tmp_path / "hand.csv")
-    path = write(tmp_path, {"t_s": epoch + t_eye} | columns(target, "target", "quaternion"), head)
-    samples, offset, _ = read_calibration(path, None)
-    assert abs(offset.offset - 0.137) < max(offset.half_width, 1e-3)
-    assert offset.half_width < 5e-3
-    from er3a.vision.hand_eye import calibrate_hand_eye
-
-    found = calibrate_hand_eye(samples)
-    assert np.abs(off(found.X, X_TRUE)).max() < 2e-3
-    assert np.abs(off(found.Y, Y_TRUE)).max() < 2e-3
-
-
 def test_joints_that_slide_are_given_in_millimetres(tmp_path, poses):
     robot = scara()
     values = np.array([[10.0 + k, 20 - 3 * k, 100 + 5 * k, 5 * k] for k in range(8)])
@@ -274,86 +238,18 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
         codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
         record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
         assert record["touch_contradicts"] == (beside > 0)
-        subjects = ("joint_zeros", "touched_points", "real_camera", "flange_poses", "base_poses")
-        told = (left_out_text(LeftOut(each)) for each in subjects)
-        assert [each in record["not_examined"] for each in told] == [True, False, False, True, False]
+        told = [
+            assumed_text(Open(each)) in record["assumed"] for each in ("joint_zeros", "touched_points", "real_camera")
+        ]
+        assert told == [True, False, False]
+        frames = [gap_text(Open(each)) in record["not_checked"] for each in ("flange_frame", "base_frame")]
+        assert frames == [True, False]
     text = file.read_text()
     file.write_text(text.replace("touched: touched.csv", ""))
     unconfirmed = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert all(left_out_text(LeftOut(each)) in unconfirmed for each in ("flange_poses", "base_poses"))
+    assert all(gap_text(Open(each)) in unconfirmed for each in ("flange_frame", "base_frame"))
     file.write_text(text.replace("touched: touched.csv", "simulated: true"))
     untouched = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert all(
-        f"not examined: {left_out_text(LeftOut(each))}" in untouched for each in ("touched_points", "real_camera")
-    )
+    assert all(f"assumed: {assumed_text(Open(each))}" in untouched for each in ("touched_points", "real_camera"))
     assert "recorded poses" not in untouched
     assert codes == [(0, False), (1, True)]
-
-
-def _streams(folder: Path, ahead: float, start: float = 0.0, every: float = 0.05, widest: str = "") -> Path:
-    """Streams of an arm that swings, the camera's clock so far behind (s); it is seen from ``start`` s on."""
-
-    t_arm, t_eye = np.arange(0, 30, 0.02), start + np.arange(3, 27, every)
-    streams = f"streams: {{flange: hand.csv, target: samples.csv{widest}}}"
-    head = HEAD.format(setup="eye_in_hand").replace("samples: samples.csv", streams)
-    write(folder, {"t_s": t_arm} | columns(swinging(t_arm), "flange", "quaternion"))
-    shutil.move(folder / "samples.csv", folder / "hand.csv")
-    target = seen("eye_in_hand", swinging(t_eye))
-    return write(folder, {"t_s": t_eye - ahead} | columns(target, "target", "quaternion"), head)
-
-
-@pytest.mark.parametrize(
-    ("made", "reason"),
-    [
-        ({"ahead": 2.3}, r"streams\.widest_s: turns of arm and camera agree best at 2 s, an end of the range searched"),
-        ({"ahead": 100.0}, r"can't be compared \(flange: 0 to 29\.98 s, 1500 rows; target: -97 to"),
-        (
-            {"ahead": 0.3, "every": 1.0},
-            r"it takes camera poses 0\.4 to 0\.8 s apart while the arm was recorded for 2 s",
-        ),
-    ],
-)
-def test_streams_whose_clocks_cant_be_compared_are_refused(made, reason, tmp_path):
-    with pytest.raises(InputError, match=reason):
-        read_calibration(_streams(tmp_path, **made), None)
-
-
-def test_a_stream_of_joint_values_says_where_the_flange_was(tmp_path):
-    """Its samples keep no joint values, but their poses are the table's."""
-    robot, file = load_robot("er3a_c60"), _streams(tmp_path, ahead=0.1)
-    assert not read_calibration(file, None)[0].states_joints
-    t = np.arange(0, 30, 0.02)
-    q = 20 * np.sin(t[:, None] * [0.9, 1.1, 1.3, 1.5, 1.7, 1.9])
-    table = {"t_s": t} | {f"q{j + 1}_deg": q[:, j] for j in range(6)}
-    rows = [list(table), *np.column_stack(list(table.values())).tolist()]
-    (tmp_path / "hand.csv").write_text("\n".join(",".join(map(str, row)) for row in rows))
-    t_eye = np.arange(3, 27, 0.05)
-    angles = np.radians(20 * np.sin(t_eye[:, None] * [0.9, 1.1, 1.3, 1.5, 1.7, 1.9]))
-    target = seen("eye_in_hand", forward(robot.without_tool(), angles))
-    shutil.copy(file, tmp_path / "head.yaml")
-    write(tmp_path, {"t_s": t_eye} | columns(target, "target", "quaternion"), (tmp_path / "head.yaml").read_text())
-    samples, _, _ = read_calibration(file, robot)
-    assert samples.q is None
-    assert samples.states_joints
-
-
-def test_a_wider_range_finds_the_offset_as_advised(tmp_path):
-    _, offset, _ = read_calibration(_streams(tmp_path, ahead=2.3, widest=", widest_s: 3"), None)
-    assert offset.offset == pytest.approx(2.3, abs=2e-3)
-
-
-def test_poses_of_a_stream_that_no_sample_was_made_of_are_counted(tmp_path):
-    """24 s at 20 poses/s, of which 60 are taken."""
-    file = _streams(tmp_path, ahead=0.1)
-    samples, offset, _ = read_calibration(file, None)
-    assert (len(samples), offset.unused) == (60, 480 - 60)
-    told = CliRunner().invoke(app, ["hand-eye", str(file)]).output
-    assert f"not examined: {left_out_text(LeftOut('stream_poses', amount=420))}" in told
-
-
-def test_images_beside_streams_are_refused(tmp_path):
-    file = _streams(tmp_path, ahead=0.1)
-    board = "images: {board: {pattern: chessboard, squares: [9, 7], square_mm: 20}}\n"
-    file.write_text(file.read_text() + board)
-    with pytest.raises(InputError, match="streams hold board poses, no images"):
-        read_calibration(file, None)

@@ -11,9 +11,19 @@ import typer
 
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.errors import DoubtfulUnit, Er3aError
-from er3a.files.dh_table import AngleUnit, LengthUnit
-from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Xacro, app, print_json, print_note
-from er3a.robots.robot import Convention
+from er3a.pipeline.commands.options import (
+    ROBOT_FILES,
+    Angles,
+    AsJson,
+    Base,
+    Lengths,
+    Tip,
+    Xacro,
+    app,
+    print_json,
+    print_note,
+)
+from er3a.robots.robot import Convention, Robot
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
@@ -25,11 +35,6 @@ TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
-Lengths = Annotated[
-    LengthUnit | None, typer.Option(help="unit of lengths in D-H tables (default: that of their columns)")
-]
-Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in D-H tables (default: that of their columns)")]
-
 
 @app.command(rich_help_panel=ROBOT_FILES)
 def compare(
@@ -39,8 +44,8 @@ def compare(
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Lengths = None,
     angle_unit: Angles = None,
-    base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
+    base: Base = None,
+    tip: Tip = None,
     xacro: Xacro = None,
     tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by at most this are equal")] = TOLERANCE_MM,
     tolerance_deg: Annotated[float, typer.Option(help="angles that differ by at most this are equal")] = TOLERANCE_DEG,
@@ -64,12 +69,8 @@ def compare(
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
-    ranked = best_of(
-        arm,
-        {name: other.robot for name, other in others.items()},
-        tolerance_mm=tolerance_mm,
-        tolerance_deg=tolerance_deg,
-    )
+    robots = {name: other.robot for name, other in others.items()}
+    ranked = best_of(arm, robots, tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)
     ranked = [(each, _beside(found, first, others[each])) for each, found in ranked]
     name, found = ranked[0]
     notes = _notes((a, first), (name, others[name]))
@@ -82,24 +83,39 @@ def compare(
         ranked[0] = name, found
     for note in notes:
         print_note(note)
-    if output is not None and found.corrected is not None:
-        from er3a.files.robot_writer import write_robot
-
-        write_robot(found.corrected.replace(name=output.stem), output)
-    if html is not None:
-        from er3a.pipeline.viewing.comparison import write_comparison
-
-        where = str(folder / name) if folder.is_dir() else name
-        write_comparison((a, arm), (where, others[name].robot), found, html, (tolerance_mm, tolerance_deg), told)
+    where = str(folder / name) if folder.is_dir() else name
+    written = _written((a, arm), (where, others[name].robot), found, output, html, (tolerance_mm, tolerance_deg, told))
     if as_json:
         print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told})
     else:
         _print(ranked, folder.is_dir(), told)
-        for written in (output if found.corrected is not None else None, html):
-            if written is not None:
-                print(f"{written}: written")
+        for file in written:
+            print(f"{file}: written")
     if found.verdict != "equal":
         raise typer.Exit(1)
+
+
+def _written(
+    one: tuple[str, Robot],
+    other: tuple[str, Robot],
+    found: Comparison,
+    output: Path | None,
+    html: Path | None,
+    asked: tuple[float, float, list[str]],
+) -> list[Path]:
+    """The files that were written: the corrected table, and the page, with tolerances (mm, deg) and doubts."""
+    files = []
+    if output is not None and found.corrected is not None:
+        from er3a.files.robot_writer import write_robot
+
+        write_robot(found.corrected.replace(name=output.stem), output)
+        files.append(output)
+    if html is not None:
+        from er3a.pipeline.viewing.comparison import write_comparison
+
+        write_comparison(one, other, found, html, asked[:2], asked[2])
+        files.append(html)
+    return files
 
 
 def _refuse_wrong(tolerances: dict[str, float], output: Path | None) -> None:
@@ -131,10 +147,11 @@ def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool
 
 
 def _beside(found: Comparison, first: ReadArm, other: ReadArm) -> Comparison:
-    """A comparison of two tables, with what both files give beside them."""
-    from er3a.comparison.compare import given_by_both
+    """A comparison of two tables, its units named as their headings do, with what both files give beside them."""
+    from er3a.comparison.compare import by_headings, given_by_both
 
     ranges = (each for each in found.not_examined if each in ("limits", "speeds", "limits_on_sums"))
+    found = by_headings(found, first.units, other.units)
     return replace(found, not_examined=(*ranges, *given_by_both(first.beside, other.beside)))
 
 

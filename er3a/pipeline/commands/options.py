@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, InputWarning
+from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.files.kept_files import given_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
@@ -93,6 +94,12 @@ AnyRobot = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot's name o
 StudyFile = Annotated[Path, typer.Option("--study", envvar="ER3A_STUDY", help="the study file")]
 Results = Annotated[Path, typer.Option(help="folder of the results")]
 Reports = Annotated[Path, typer.Option(help="folder of the reports")]
+Base = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm begins (default: the root)")]
+Tip = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm ends, if there are several ends")]
+Lengths = Annotated[
+    LengthUnit | None, typer.Option(help="unit of lengths in a D-H table (default: that of its columns)")
+]
+Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in a D-H table (default: that of its columns)")]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 

@@ -170,10 +170,10 @@ def write(
     from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.expectations import outcome_word
     from er3a.pipeline.messages.programs import say
-    from er3a.pipeline.program_reports import missed_line, programs_of, shapes_line
+    from er3a.pipeline.program_reports import missed_checks, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
-    from er3a.pipeline.stages.left_out import left_out_of_units, left_out_without_tool, missed_of_program
-    from er3a.pipeline.stages.trajectory.motion import by_subject
+    from er3a.pipeline.scope import by_reason
+    from er3a.pipeline.stages.covered import assumed_tool, covered_units, gaps_of_program
     from er3a.pipeline.viewing.conditions import program_head
     from er3a.programs.program_findings import TargetsLeftOut
     from er3a.programs.writing import with_head_lines
@@ -181,8 +181,8 @@ def write(
     with noted_doubts() as doubts, shown_work(f"{paths}: checking each path"):
         arm, around = load_robot(robot), load_scene(scene) if scene else None
         programs = list(programs_of(paths, arm, language, around, only, unsafe))
-    refused, alone = 0, (*missed_of_program(arm, around), *left_out_of_units(doubts))
-    head = program_head(None, (*alone, *left_out_without_tool(arm)))
+    refused, alone = 0, (*gaps_of_program(arm, around), *covered_units(1, doubts).gaps)
+    head = program_head(None, missed_checks(alone), assumed_tool(arm))
     for made in programs:
         if made.files is None:
             refused += 1
@@ -196,8 +196,8 @@ def write(
             print(f"{file}: written")
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
-        refused += bool(made.left_out) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
-    missed = by_subject(each for made in programs for each in made.left_out)
+        refused += bool(made.open) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
+    missed = by_reason(each for made in programs for each in made.open)
     for line in filter(None, (shapes_line(arm), missed_line((*alone, *missed)))):
         print_note(line)
     if refused:

@@ -38,8 +38,8 @@ def import_urdf(
     file: Annotated[Path, typer.Argument(help="a URDF or xacro of a serial arm")],
     output: Annotated[Path, typer.Option(help="the robot file to write")],
     *,
-    base: Annotated[str | None, typer.Option(help="the link at which the arm begins (default: the root)")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link at which the arm ends, if there are several ends")] = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
     references: Annotated[
         Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
     ] = None,
@@ -288,11 +288,11 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
-    from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-    from er3a.pipeline.messages.say import bracketed, say
+    from er3a.pipeline.messages.say import say
+    from er3a.pipeline.messages.scope import assumed_text, gap_text
     from er3a.pipeline.messages.vision import hand_eye_lines, hand_eye_record
-    from er3a.pipeline.results import LeftOut
-    from er3a.pipeline.stages.vision.compute import left_out_of_calibration
+    from er3a.pipeline.scope import GAPS, Open
+    from er3a.pipeline.stages.vision.compute import open_of_calibration
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -301,7 +301,7 @@ def hand_eye(
     arm = load_robot(robot).replace(base=np.eye(4)) if robot else None
     head = load(HandEyeFile, file)
     with shown_work(f"{file}: reading the samples") as at:
-        samples, offset, images = read_calibration(file, arm)
+        samples, images = read_calibration(file, arm)
         open_tilts = ambiguous_tilts(images.views, samples.names) if images else ()
         at(f"{file}: estimating the camera's pose")
         try:
@@ -311,17 +311,19 @@ def hand_eye(
             raise Er3aError(f"{file}: {say(error.finding)}") from None
     boardless = images.boardless if images else ()
     missed = [
-        *left_out_of_calibration(samples, head, offset, images, (found, unseen, least_zero)),
-        *map(LeftOut, samples.open_frames(head.simulated)),
+        *open_of_calibration(samples, head, images, (found, unseen, least_zero)),
+        *map(Open, samples.open_frames(head.simulated)),
     ]
-    not_examined = [bracketed(left_out_text(each), left_out_names(each)) for each in missed]
+    not_checked = [gap_text(each) for each in missed if each.reason in GAPS]
+    assumed = [assumed_text(each) for each in missed if each.reason not in GAPS]
     if as_json:
-        record = hand_eye_record(found, offset, boardless, open_tilts)
-        options.print_json(record | {"not_examined": not_examined})
+        record = hand_eye_record(found, boardless, open_tilts)
+        options.print_json(record | {"not_checked": not_checked, "assumed": assumed})
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
-        sample_lines += [f"not examined: {each}" for each in not_examined]
-        print("\n".join([hand_eye_lines(found, offset, boardless), *sample_lines]))
+        sample_lines += [f"not checked: {each}" for each in not_checked]
+        sample_lines += [f"assumed: {each}" for each in assumed]
+        print("\n".join([hand_eye_lines(found, boardless), *sample_lines]))
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)

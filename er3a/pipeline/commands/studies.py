@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.pipeline.commands import options
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
@@ -31,20 +30,16 @@ def new(
     *,
     urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
     xacro: options.Xacro = None,
-    base: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm begins")] = None,
-    tip: Annotated[str | None, typer.Option(help="the link of the URDF at which the arm ends")] = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: the file's name)")] = None,
     convention: Annotated[
         Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
     ] = None,
-    length_unit: Annotated[
-        LengthUnit | None, typer.Option(help="unit of the table's lengths, if its columns don't say")
-    ] = None,
-    angle_unit: Annotated[
-        AngleUnit | None, typer.Option(help="unit of the table's angles, if its columns don't say (default: deg)")
-    ] = None,
+    length_unit: options.Lengths = None,
+    angle_unit: options.Angles = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
     from er3a.pipeline.new_study.arms import arm_of

@@ -13,7 +13,7 @@ from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssum
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages import left_out  # noqa: F401
+from er3a.pipeline.messages import scope  # noqa: F401
 from er3a.pipeline.messages.numbers import at_least, at_most
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
 from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap

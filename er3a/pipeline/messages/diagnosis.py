@@ -35,7 +35,7 @@ from er3a.diagnosis.faults import (
     WrongScale,
     WrongUnit,
 )
-from er3a.pipeline.language import N_, as_text, with_unit
+from er3a.pipeline.language import N_, as_text
 from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
 
 ENTRIES = {
@@ -170,7 +170,7 @@ TEXTS = texts(
         "more_positions#needed": Plural(
             "missing", "at least {count} more position is needed", "at least {count} more positions are needed"
         ),
-        "more_positions#request": "{known}; {needed}. Spread them over all joints, for example {examples}.",
+        "more_positions#request": "{known}; {needed}. Spread them over the range of all joints.",
         "more_positions#for_entries": "{needed} for {entries:, }",
         "more_touches": Plural(
             "poses",
@@ -363,8 +363,7 @@ def _(found: MorePositions) -> str:
     needed = say_as(found, "needed")
     if found.entries:
         needed = say_as(found, "for_entries", needed=needed)
-    poses = [with_unit(f"({', '.join(as_text(angle, 'g') for angle in pose)})", "deg") for pose in found.examples_deg]
-    return say_as(found, "request", known=known, needed=needed, examples=_with_and(poses))
+    return say_as(found, "request", known=known, needed=needed)
 
 
 @say.register

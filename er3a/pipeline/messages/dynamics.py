@@ -13,9 +13,9 @@ from er3a.dynamics.plausibility import (
     ImpossibleInertia,
 )
 from er3a.pipeline.language import N_, own_title
-from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody

@@ -5,8 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.pipeline.language import N_
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.kinematics import RULE_NAMES, sum_of_joints
-from er3a.pipeline.messages.left_out import names_in_words
+from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
 from er3a.pipeline.stages.inverse.model import (
     AllSolved,
@@ -21,7 +20,6 @@ from er3a.pipeline.stages.inverse.model import (
 from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceeded, SlideExceeded
 
 NAMED = 3
-names_in_words("rules", "rule", RULE_NAMES)
 KEY_FIGURES = {
     "targets_solved": N_("targets solved"),
     "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),

@@ -12,7 +12,6 @@ from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
 from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.planning import rate_needed
 from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, sentence, texts, word
@@ -275,9 +274,6 @@ def event_distance(event: model.Singularity) -> str:
     if event.distance_mm is not None:
         return f"{event.distance_mm:.3g} mm"
     return sentence("smallest_singular_value", value=event.smallest_singular_value)
-
-
-names_in_words("strategies", "trajectory.strategy", STRATEGIES)
 
 
 def strategy_word(name: StrategyName) -> str:

@@ -12,9 +12,9 @@ from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.language import N_, as_text, distinct, own_title, tr, with_unit
-from er3a.pipeline.messages.left_out import names_in_words
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
 from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
     Claims,
@@ -76,7 +76,6 @@ PART_ENTRIES = {
 }
 names_in_words("references", "reference.group", GROUP_WORDS)
 names_in_words("loose_references", "reference.group", GROUP_WORDS)
-names_in_words("conflicting_references", "reference.group", GROUP_WORDS)
 names_in_words("tool_and_base", "placed", PLACED)
 GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
 

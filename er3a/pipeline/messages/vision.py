@@ -18,7 +18,6 @@ from er3a.pipeline.stages.vision.model import (
     GraspCounts,
 )
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
-from er3a.vision.calibration_set import TimeOffset
 from er3a.vision.grasping import (
     GraspCollides,
     GraspUnlikely,
@@ -284,7 +283,7 @@ def pose_words(setup: str) -> tuple[str, str]:
     return word("vision.pose", {"pose": first}, "pose"), word("vision.pose", {"pose": second}, "pose")
 
 
-def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequence[BoardlessImage] = ()) -> str:
+def hand_eye_lines(found: HandEye, boardless: Sequence[BoardlessImage] = ()) -> str:
     """A calibration as lines of text for a terminal; ``boardless``: images that it leaves out."""
     spread, turned = spread_of(found)
     about = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -299,9 +298,6 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequenc
         ),
         f"spread of the board's position {1000 * spread:.3g} mm, {np.degrees(turned):.2g} deg (root mean square)",
     ]
-    if offset:
-        shift = as_text(offset.offset, ".4f")
-        lines.append(f"the camera's clock plus {shift} ± {offset.half_width:.2g} s is the arm's")
     for name, T, half in zip(pose_words(found.samples.setup), (found.X, found.Y), found.half_width.reshape(2, 6)):
         lines.append(f"{name}, with 95 % intervals; rotations are about the parent frame's axes:")
         for axis, value, h in zip("xyz", 1000 * T[:3, 3], 1000 * half[:3]):
@@ -323,7 +319,6 @@ def hand_eye_lines(found: HandEye, offset: TimeOffset | None, boardless: Sequenc
 
 def hand_eye_record(
     found: HandEye,
-    offset: TimeOffset | None,
     boardless: Sequence[BoardlessImage] = (),
     open_tilts: Sequence[AmbiguousTilt] = (),
 ) -> dict[str, object]:
@@ -357,7 +352,6 @@ def hand_eye_record(
         "left_out": named(boardless),
         "open_tilts": named(open_tilts),
         "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
-        "time_offset_s": offset.offset if offset else None,
         "touch_probability": found.touch.probability if found.touch else None,
         "touch_contradicts": found.touch is not None and found.touch.contradiction is not None,
     }

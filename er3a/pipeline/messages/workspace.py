@@ -320,7 +320,7 @@ def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, s
 
 def run_again_text(summary: Summary, *, stand: bool) -> str:
     """What to do before a motion is run beside the tray, or with a tool; ``stand``: whether the tray needs one."""
-    bare = any(each.subject == "tool" for each in summary.not_examined)
+    bare = any(each.reason == "tool" for each in summary.assumed)
     again = sentence("box.run_again#stand" if stand else "box.run_again#tray")
     return joined([again, sentence("box.no_tool") if bare else ""], " ")
 
@@ -376,7 +376,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     else:
         rests = sentence("void.rests", limits=limits) if limits and not confirmed else ""
         cause = joined([sentence("void.cause#noun", cause=say(judged.cause)), rests], " ")
-    bare = normal and any(each.subject == "tool" for each in summary.not_examined)
+    bare = normal and any(each.reason == "tool" for each in summary.assumed)
     more = sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else ""
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     open_one = sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else ""

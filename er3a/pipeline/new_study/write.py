@@ -28,7 +28,6 @@ HELP = f"{REFERENCES}/README.md"
 SCHEMAS = ("study", "robot", "targets", "paths", "scene")
 SAMPLES = 8_000_000
 """Of the workspace: a quarter of the project's own study."""
-PATH_WORDS = {"joint": "move of the joints", "line": "line of the tool", "arc": "arc of the tool"}
 
 
 @dataclass(frozen=True, eq=False)

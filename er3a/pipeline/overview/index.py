@@ -24,10 +24,11 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.collision import near_shapes
 from er3a.pipeline.messages.dynamics import payload_text
-from er3a.pipeline.messages.left_out import left_out_text, say_reserved
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
+from er3a.pipeline.messages.scope import assumed_text, say_reserved
+from er3a.pipeline.messages.scope import missed_text as missed_of_check
 from er3a.pipeline.messages.validation import (
     CONVENTIONS,
     condition,
@@ -44,7 +45,7 @@ from er3a.pipeline.results import (
     THE_CODE,
     THE_SETTINGS,
     AbsentResults,
-    NoPass,
+    NotChecked,
     Provenance,
     Stored,
     is_computed,
@@ -236,11 +237,6 @@ def _points(line: Reals) -> str:
 SHOWN_FIGURES = 3
 RATES = ("own_speeds", "own_accelerations")
 MAY_RUN = {name: motions for name, motions in MOTIONS.items() if STAGES[name].may_run}
-OF_ALL_RUNS = (  # what may turn any of them unsafe
-    *("obstacles", "uncovered_links", "partial_links", "bare_tool", "base_inside", "allowed_contacts"),
-    *("program_rest", "program_findings", "given_rates", "missed_rows", "controller_language", "tool", "carried"),
-    *("units", "own_limits", "torques"),
-)
 MAX_TALLIED = 3  # that do not pass, though nothing expects it, and are named beside their number
 MAX_FAULTS = 20  # of a robot's paths, and of its programs, that are listed
 INLINE = ("a", "b", "code", "em", "i", "mark", "span", "strong", "sub", "sup", "wbr")  # no blank before or behind
@@ -297,7 +293,7 @@ class _TextOfPage(HTMLParser):
         self.texts: dict[str, dict[str, None]] = {}
         self._heads = {"h2": "", "h3": ""}
         self._depth = dict.fromkeys(("main", "tr", *self.NOT_READ), 0)
-        self._parts, self._unexamined = list[str](), False
+        self._parts = list[str]()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Begin a block or row; what an image shows counts as text."""
@@ -305,9 +301,6 @@ class _TextOfPage(HTMLParser):
         self._between(tag)
         if tag in self._depth:
             self._depth[tag] += 1
-        self._unexamined |= named.get("id") == "table-not-examined"
-        if tag == "tr" and self._unexamined:
-            self._parts = [tr("not examined"), tr(": ")]
         self.handle_data(named.get("alt") or "")
 
     def handle_endtag(self, tag: str) -> None:
@@ -317,7 +310,6 @@ class _TextOfPage(HTMLParser):
         if tag in self._heads:
             self._heads |= {"h3": ""} | {tag: " ".join("".join(self._parts).split())}
         self._between(tag)
-        self._unexamined &= tag != "table"
 
     def handle_data(self, data: str) -> None:
         """Take text of the main part, but for what is in ``NOT_READ``."""
@@ -407,12 +399,12 @@ def _entry(
             for stage, head in heads.items()
         },
         "bare": any(
-            _misses(heads[stage], "carried") or _misses(heads[stage], "tool") for stage in MAY_RUN if stage in heads
+            _assumes(heads[stage], "carried") or _assumes(heads[stage], "tool") for stage in MAY_RUN if stage in heads
         ),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
-        "grasps_missed": say(NoPass(missed))
+        "grasps_missed": say(NotChecked(missed))
         if "vision" in computed and (missed := computed["vision"].results.summary.verdict.missed)
         else "",
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
@@ -460,7 +452,7 @@ def _conflict(finding: object) -> str:
 
 def _assumed_rates(heads: Mapping[str, Head]) -> str:
     """Which of the joints' speeds and accelerations paths and programs rest on without a document."""
-    speeds, rates = ([_misses(heads[stage], each) for stage in MAY_RUN if stage in heads] for each in RATES)
+    speeds, rates = ([_assumes(heads[stage], each) for stage in MAY_RUN if stage in heads] for each in RATES)
     if any(speeds) and any(rates):
         return tr("joint speeds and accelerations")
     return tr("joint speeds") if any(speeds) else tr("joint accelerations") if any(rates) else ""
@@ -524,7 +516,7 @@ def _answers(heads: Mapping[str, Head], robot: Robot, placing: Placing | None) -
     """What is asked of an arm first; ``placing``: where to put the tray."""
     workspace = heads["workspace"].summary if "workspace" in heads else None
     if isinstance(workspace, WorkspaceSummary):
-        reach = _reach_text(workspace, bare=_misses(heads["workspace"], "tool"))
+        reach = _reach_text(workspace, bare=_assumes(heads["workspace"], "tool"))
         yield Answer(tr("Reach"), reach, page="workspace.html")
     summary = heads["dynamics"].summary if "dynamics" in heads else None
     yield Answer(tr("Payload"), *payload_text(summary, robot), "dynamics.html#payload" if summary else "")
@@ -574,9 +566,9 @@ def _parts(heads: Mapping[str, Head]) -> Sequence[PartFound]:
     return evidence.parts if evidence else ()
 
 
-def _misses(head: Head, subject: str) -> bool:
-    """Whether a stage left something out."""
-    return any(each.subject == subject for each in head.summary.not_examined)
+def _assumes(head: Head, reason: str) -> bool:
+    """Whether a stage assumes something."""
+    return any(each.reason == reason for each in head.summary.assumed)
 
 
 def _without_box() -> str:
@@ -595,7 +587,7 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
         followed, lost, faults = results.summary.paths, len(results.summary.not_followed), path_faults(results)
     faults += _otherwise(stage, followed, {fault.name for fault in faults})
     sound = sound_motions(results)
-    left_out = [left_out_text(each) for each in results.summary.not_examined if each.subject in OF_ALL_RUNS]
+    scope = results.summary
     count = len(sound) + len(faults) + lost
     return {
         "stage": stage,
@@ -605,9 +597,9 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
         "links": {fault.name: f"{robot}/{fault.address}" for fault in faults}
         | {_passing(stage, len(sound), count): f"#faults-{robot}-{stage}" if faults else f"#runs-{robot}"},
         "faults": faults,
-        "open": left_out,
-        "no_pass": say(NoPass(missed)) if (missed := results.summary.verdict.missed) else "",
-        "more": len(results.summary.not_examined) - len(left_out),
+        "missed": [missed_of_check(each) for each in scope.checked if not each.complete],
+        "assumed": [assumed_text(each) for each in scope.assumed],
+        "no_pass": say(NotChecked(missed)) if (missed := results.summary.verdict.missed) else "",
     }
 
 
@@ -659,9 +651,9 @@ def _note(head: Head, runs: Sequence[Mapping[str, Any]]) -> str:
         if len(run["sound"]) < run["count"]
     ]
     parts += [tr("{count} expected to fail", count=head.demonstrations)] if head.demonstrations else []
-    if head.stage == "vision" and any(each.subject == "carried" for each in head.summary.verdict.missed):
+    if head.stage == "vision" and _assumes(head, "carried"):
         parts.append(tr("gripper's shape not given"))
-    return joined([*parts, tr("simulated") if _misses(head, "real_camera") else ""])
+    return joined([*parts, tr("simulated") if _assumes(head, "real_camera") else ""])
 
 
 def _cell(head: Head, changed: Sequence[str]) -> dict[str, Any]:
@@ -670,7 +662,7 @@ def _cell(head: Head, changed: Sequence[str]) -> dict[str, Any]:
     verdict = head.summary.verdict
     unexamined = [say(found) for found in verdict.findings[1:] if found is not verdict.shapes]
     near = near_shapes(verdict.shapes.margin_mm, verdict.shapes.near) if verdict.shapes else ""
-    lead, rest = page.led(joined([say_reserved(head.finding, head.summary.not_examined), *unexamined, near], " "))
+    lead, rest = page.led(joined([say_reserved(head.finding, head.summary.assumed), *unexamined, near], " "))
     if changed:
         lead = sentence("stage.outdated", names=_changed_names(changed), text=lead)
     return {

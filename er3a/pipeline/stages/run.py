@@ -15,7 +15,6 @@ from er3a.files.units import noted_doubts
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
-    LeftOut,
     NotComputed,
     Results,
     Stored,
@@ -25,7 +24,8 @@ from er3a.pipeline.results import (
     read_stage,
     write_results,
 )
-from er3a.pipeline.stages.left_out import left_out_of_limits, left_out_of_units, left_out_of_values
+from er3a.pipeline.scope import uncovered
+from er3a.pipeline.stages.covered import assumed_limits, assumed_values, covered_units
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import Study
@@ -57,9 +57,11 @@ def compute(name: str, study: Study, robot: str, folder: Path) -> str | None:
     read = input_records(file for file in study.inputs(robot, name) if file.is_file())
     with noted_doubts() as doubts:
         results = _computed(stage, study, robot)
-    assumed = _assumed(study, robot) if stage.rests_on else ()
     doubts = [each for each in doubts if stage.weighs or not each.key.startswith(MASSES)]
-    results = _in_doubt(results, (*assumed, *left_out_of_units(doubts)))
+    if not isinstance(results, AbsentResults):
+        summary = _with_inputs(results.summary, study, robot, stage)
+        checked = (*summary.checked, covered_units(len(read), doubts))
+        results = replace(results, summary=replace(summary, checked=checked))
     write_results(folder, study, robot, stage, results, read)
     if isinstance(results, AbsentResults):
         import_module(stage.messages)
@@ -70,22 +72,17 @@ def compute(name: str, study: Study, robot: str, folder: Path) -> str | None:
     return None
 
 
-def _assumed(study: Study, name: str) -> tuple[LeftOut, ...]:
-    """What the robot's file assumes of the values that its stages rest on."""
+def _with_inputs(summary: Summary, study: Study, name: str, stage: Stage) -> Summary:
+    """A summary that says what the robot's file assumes of the values that the stage rests on."""
+    if not stage.rests_on:
+        return summary
     robot, entry = study.robot(name), study.entry(name)
     replaced = [group for group in ("base", "tool") if getattr(entry, group)]
-    return (*left_out_of_limits(robot), *left_out_of_values(robot, replaced))
+    checked = uncovered(summary.checked, assumed_limits(robot))
+    return replace(summary, checked=checked, assumed=(*summary.assumed, *assumed_values(robot, replaced)))
 
 
 MASSES = "inertia."
-
-
-def _in_doubt(results: Results[Any], left_out: tuple[LeftOut, ...]) -> Results[Any]:
-    """Results whose verdict is no pass by numbers of doubtful unit in the inputs read, or by assumed limits."""
-    if not left_out or isinstance(results, AbsentResults):
-        return results
-    summary = results.summary
-    return replace(results, summary=replace(summary, not_examined=(*summary.not_examined, *left_out)))
 
 
 def _computed(stage: Stage, study: Study, robot: str) -> Results[Any]:

@@ -19,9 +19,9 @@ from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
 from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings

@@ -9,14 +9,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from er3a.pipeline import language
-from er3a.pipeline.messages.left_out import left_out_text
+from er3a.pipeline.messages.scope import assumed_text, missed_text, never_text
 from er3a.pipeline.messages.validation import condition
-from er3a.pipeline.results import NEVER_A_PASS, LeftOut, LeftOutSubject, read_stage
+from er3a.pipeline.results import read_stage
+from er3a.pipeline.scope import Coverage, Open
 from er3a.pipeline.stages.registry import STAGES
-
-WARNED_OF: frozenset[LeftOutSubject] = NEVER_A_PASS | {
-    *("tool", "carried", "gripped_parts", "placed_box", "torques", "ways_between"),
-}
 
 
 def condition_of(validated: Path | None) -> str:
@@ -40,18 +37,23 @@ def condition_of(validated: Path | None) -> str:
     return condition(evidence.parts if evidence else (), getattr(finding, "unbounded", ()))
 
 
-def program_head(validated: Path | None, not_examined: Iterable[LeftOut] = ()) -> list[str]:
+def program_head(
+    validated: Path | None, checked: Iterable[Coverage] = (), assumed: Iterable[Open] = (), stage: str = "trajectory"
+) -> list[str]:
     """What a robot program begins with, in English.
 
     Parameters
     ----------
     validated : folder of the validation stage's results; None where there are none
-    not_examined : what the checks of the motion leave out
+    checked : what the checks of the motion cover
+    assumed : what these rest on
+    stage : that checked it
 
     Returns
     -------
-    lines : what has to be confirmed, as :func:`condition_of` says it, and what was not checked (``WARNED_OF``)
+    lines : what has to be confirmed, as :func:`condition_of` says it, what was not checked, and what was assumed
     """
     with language.using("en"):
-        missed = [f"not checked: {left_out_text(each)}" for each in not_examined if each.subject in WARNED_OF]
-        return [line for line in (condition_of(validated), *missed) if line]
+        missed = [f"not checked: {missed_text(each)}" for each in checked if not each.complete]
+        given = [f"assumed: {assumed_text(each)}" for each in assumed]
+        return [line for line in (condition_of(validated), *missed, *given, never_text(stage)) if line]

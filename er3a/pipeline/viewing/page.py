@@ -29,7 +29,6 @@ from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text, say_reserved
 from er3a.pipeline.messages.numbers import (
     at_least,
     at_most,
@@ -43,9 +42,9 @@ from er3a.pipeline.messages.numbers import (
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, say_reserved
 from er3a.pipeline.results import (
     AbsentResults,
-    LeftOut,
     Provenance,
     Status,
     Stored,
@@ -214,8 +213,8 @@ class Head:
 
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
     to know first; ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
-    ``not_examined``: what the verdict leaves out, and of which. ``numerics``: figures of the computation, not of the
-    arm. ``links``: addresses that words of the text lead to.
+    ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document. ``numerics``: figures
+    of the computation, not of the arm. ``links``: addresses that words of the text lead to.
     """
 
     robot: str
@@ -227,7 +226,8 @@ class Head:
     caveats: Mapping[str, Caveat]
     demonstrations: int
     summary: Any
-    not_examined: tuple[tuple[str, str], ...] = ()
+    checked: tuple[tuple[str, str, str], ...] = ()
+    assumed: tuple[str, ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
 
@@ -266,18 +266,6 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-EXAMINED_BY = {"torques": "dynamics"}  # what a stage leaves out, by the stage that examines it
-
-
-def _missed(found: LeftOut, pages: Sequence[str] | None) -> tuple[str, str]:
-    """What a verdict leaves out, and of which, or which of the robot's ``pages`` has it, where that is asked."""
-    named, stage = left_out_names(found), EXAMINED_BY.get(found.subject)
-    if stage and not named and pages is not None:
-        linked = Markup('<a href="{}.html">{}</a>').format(stage, tr(PAGES[stage]))
-        named = linked if stage in pages else tr("not examined in this study")
-    return left_out_text(found), named
-
-
 OF_SHAPES = frozenset(
     (
         *("free_of_collisions", "free_of_itself", "free_of_scene", "clear_places", "joined_places", "lost_volume"),
@@ -293,13 +281,12 @@ def _figure_text(stage: str, name: str, text: str, assumed: bool) -> str:
     return tr("{figure}, with assumed shapes", figure=said) if assumed and name in OF_SHAPES else said
 
 
-def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: Sequence[str] | None = None) -> Head:
+def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head:
     """The head of a stage's page.
 
     Parameters
     ----------
     links : addresses by words, as of :class:`Head`
-    pages : of the robot; what this stage leaves out may be on one of them
 
     Returns
     -------
@@ -321,9 +308,13 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: 
     )
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
-    found = say_reserved(verdict.finding, stored.results.summary.not_examined)
+    summary = stored.results.summary
+    found = say_reserved(verdict.finding, summary.assumed)
     text = joined([found, *listed(verdict.findings[1:])], " ")
-    missed = tuple(_missed(each, pages) for each in stored.results.summary.not_examined)
+    checked = tuple(
+        (check_name(each.check), covered_text(each), joined([gap_text(gap, None) for gap in each.gaps], ", "))
+        for each in summary.checked
+    )
     return Head(
         stored.robot,
         stage,
@@ -333,8 +324,9 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None, pages: 
         stored.provenance,
         caveats,
         meant,
-        stored.results.summary,
-        missed,
+        summary,
+        checked,
+        tuple(map(assumed_text, summary.assumed)),
         tuple(figure for figure in shown if figure.name in NUMERICS),
         links or {},
     )
@@ -448,8 +440,9 @@ def render_stage(
     context : what the template needs besides, by name
     """
     name, stage = stored.robot, stored.stage
-    shared = {
-        "head": head or head_of(stored, head_links, study.pages(name)),
+    shared: dict[str, Any] = {
+        "head": head or head_of(stored, head_links),
+        "never": never_text(stage),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -10,19 +10,19 @@ from er3a.collision import free_space
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
-from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import OF_MOTIONS, Coverage, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
-from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_without_tool
+from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
-from er3a.pipeline.stages.trajectory.motion import ListedMotion, by_subject, study_motions
+from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -191,12 +191,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         ),
         blocked=blocked,
     )
+    covered = covered_collisions(robot, bodies, scene)
     home = None if at_home is None else model.HomeCollides(at_home, float(-smallest[0] * 1000), free)
     return model.CollisionResults(
         summary=model.CollisionSummary(
-            verdict=_verdict(pairs, mounting, wrong, free, home)
-            .without(() if wrong else bodies.in_error)
-            .resting_on(assumed),
+            verdict=_verdict(pairs, mounting, wrong, free, home).resting_on(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,
@@ -209,12 +208,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             places=places_found,
             mounting=mounting,
             closest=closest,
-            not_examined=(
-                *_of_collisions(bodies, scene, settings),
-                LeftOut("joint_vectors", amount=settings.samples),
-                *_left_out_of_places(places_found),
-                *_left_out(study, name, targets, motions),
-                *left_out_without_tool(robot),
+            checked=_checked(study, name, covered, motions),
+            assumed=(
+                *by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed),
+                *assumed_tool(robot),
+                *covered.assumed,
             ),
         ),
         matrix=matrix,
@@ -227,12 +225,6 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     )
 
 
-def _of_collisions(bodies: Bodies, scene: Scene | None, settings: CollisionSettings) -> Iterator[LeftOut]:
-    """What is not seen of collisions, but that the base lies in a solid: the stage fails for that."""
-    found = left_out_of_collisions(bodies.robot, bodies, scene, settings.penetration_tolerance_mm)
-    yield from (each for each in found if each.subject != "base_inside")
-
-
 def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
     if not closest:
         return None
@@ -240,29 +232,16 @@ def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
     return model.NearestTarget(least.name, least.clearance_mm, least.between)
 
 
-def _left_out_of_places(places: model.PlacesSummary) -> Iterator[LeftOut]:
-    """Cells of which the search leaves something open, if there are any, and what lies beside those found."""
-    if lost := places.reached - places.clear:
-        yield LeftOut("lost_cells", amount=lost)
-    if unjoined := places.clear - places.joined:
-        yield LeftOut("unjoined_cells", amount=unjoined)
-    yield LeftOut("within_cells", amount=1000 * places.cell_m)
-
-
-def _left_out(study: Study, name: str, found: model.TargetClearances, motions: list[ListedMotion]) -> Iterator[LeftOut]:
-    """Targets and paths that no clearance is known of, and turns that many targets leave out; targets in solids."""
+def _checked(study: Study, name: str, seen: Covered, motions: list[ListedMotion]) -> tuple[Coverage, ...]:
+    """What the checks cover of bodies, and of the paths that are given to be run."""
     targets = load_targets(study.entry(name).targets, study.robot(name))
     asked = ((each.name, each.T[:3, 3], 0.0) for each in targets if each.expect in (None, "reached"))
-    yield from left_out_in_solids(study.scene(name, STAGE_NAME), asked)
-    if unsolved := tuple(target.name for target in targets if not (found.target == target.name).any()):
-        yield LeftOut("targets", unsolved)
-    if len(targets) > MANY_TARGETS:
-        yield LeftOut("turns", amount=MANY_TARGETS)
-    if skipped := tuple(each.name for each in motions if each.motion is None):
-        yield LeftOut("paths", skipped)
-    if unknown := tuple(each.name for each in motions if each.motion and np.isnan(each.motion.q).any()):
-        yield LeftOut("path_stretches", unknown)
-    yield from by_subject(rest for each in motions if each.meant_safe for rest in each.left_out)
+    own = [motion for motion in motions if motion.meant_safe]
+    rest = (each for motion in own for each in motion.gaps)
+    gaps = (*seen.gaps, *gaps_in_solids(study.scene(name, STAGE_NAME), asked), *by_reason(rest))
+    joints = (study.robot(name).joints,) * 2
+    followed = sum(motion.motion is not None for motion in own)
+    return coverages({**seen.asked, "limits": joints, **dict.fromkeys(OF_MOTIONS, (followed, followed))}, gaps)
 
 
 def _matrix(bodies: Bodies) -> model.MatrixRows:

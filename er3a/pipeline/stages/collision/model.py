@@ -11,6 +11,7 @@ from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
 
@@ -163,6 +164,8 @@ class CollisionSummary(Summary):
     home_deg : where places are to be joined to; None where no home is free of overlap
     proven_m : cells' witnesses are joined by moves that are proven free but for overlaps less deep than this
     """
+
+    needs = ("self_collision", "scene_collision", "limits", *OF_MOTIONS)
 
     verdict: Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]
     scene: str | None

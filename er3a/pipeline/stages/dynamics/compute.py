@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import get_args
@@ -18,7 +18,8 @@ from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imba
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Status, Verdict
+from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.scope import GAPS, OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
@@ -26,7 +27,6 @@ from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measu
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
-    by_subject,
     limits_of,
     near_singular,
     study_motions,
@@ -545,11 +545,11 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         motors=motors,
         uses=uses,
         power_imbalance=max(imbalances, default=None),
-        not_examined=(
-            *rest,
-            *_left_out(robot, summaries, skipped, unknown, settings.samples),
-            *_weight(study, name, settings),
-            *(() if study.scene(name, "trajectory") or not paths else (LeftOut("obstacles"),)),
+        checked=_checked(paths, rest, settings),
+        assumed=(
+            *(each for each in rest if each.reason not in GAPS),
+            *_mounting(study, name),
+            *_assumed(robot, unknown),
         ),
     )
     followed = [path.rows for path in paths if path.demand]
@@ -606,15 +606,24 @@ def _loaded_arm(
     )
 
 
-def _left_out(
+def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: DynamicsSettings) -> tuple[Coverage, ...]:
+    """What the checks cover of the paths that are given to be run."""
+    own = [path for path in paths if path.asked]
+    of, counts = (sum(path.summary.counts for path in own), len(own)), (len(own), len(own))
+    elsewhere = not ON_EARTH[0] <= settings.gravity_m_s2 <= ON_EARTH[1]
+    not_run = tuple(path.summary.name for path in own if not path.summary.counts)
+    gaps = [*rest, *([Open("gravity", amount=settings.gravity_m_s2)] if elsewhere else [])]
+    gaps += [Open("paths_not_run", not_run)] if not_run else []
+    asked: dict[Check, tuple[int, int]] = {"torque": of, "limits": counts, **dict.fromkeys(OF_MOTIONS, counts)}
+    return coverages(asked, (each for each in gaps if each.reason in GAPS))
+
+
+def _assumed(
     robot: Robot,
-    paths: tuple[model.PathLoad, ...],
-    skipped: tuple[str, ...],
     unknown: tuple[model.DataOpen, ...],
-    samples: int,
-) -> tuple[LeftOut, ...]:
-    """What the files leave open, paths that count for nothing, and what the model and its samples can't see."""
-    subjects: dict[model.Need, tuple[LeftOutSubject, ...]] = {
+) -> tuple[Open, ...]:
+    """What the files leave open, and paths that count for nothing."""
+    subjects: dict[model.Need, tuple[str, ...]] = {
         "masses": ("link_masses",),
         "peak": ("peak_torques",),
         "rated": ("rated_torques",),
@@ -627,7 +636,7 @@ def _left_out(
         "payload": ("wrist_limits",),
         "load": ("load",),
     }
-    names: dict[LeftOutSubject, set[int]] = {}
+    names: dict[str, set[int]] = {}
     parts = [each.what for each in unknown if each.what in get_args(model.LoadPart)]
     for each in unknown:
         if each.what in parts:
@@ -637,30 +646,26 @@ def _left_out(
         for subject in subjects[each.what]:
             names.setdefault(subject, set()).update(() if whole else each.numbers or everything)
     found = [
-        LeftOut(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
+        Open(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
         for subject, numbers in names.items()
     ]
     if parts:
-        found.append(LeftOut("load", tuple(parts)))
-    if not_run := (*skipped, *(path.name for path in paths if not path.counts)):
-        found.append(LeftOut("paths_not_run", not_run))
-    return (*found, LeftOut("torque_peaks", amount=samples), LeftOut("program_torques"), LeftOut("drive_behaviour"))
+        found.append(Open("load", tuple(parts)))
+    return tuple(found)
 
 
 ON_EARTH = (9.76, 9.84)  # m/s^2, from the equator's mountains to the poles
 
 
-def _weight(study: Study, name: str, settings: DynamicsSettings) -> Iterator[LeftOut]:
-    """Gravity other than Earth's, and a base of which nothing says how it is mounted."""
-    if not ON_EARTH[0] <= settings.gravity_m_s2 <= ON_EARTH[1]:
-        yield LeftOut("other_gravity", amount=settings.gravity_m_s2)
-    if study.table(name).base is None and study.entry(name).base is None:
-        yield LeftOut("mounting")
+def _mounting(study: Study, name: str) -> tuple[Open, ...]:
+    """That nothing says how the base is mounted."""
+    placed = study.table(name).base is not None or study.entry(name).base is not None
+    return () if placed else (Open("mounting"),)
 
 
 def _paths(
     study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
-) -> tuple[list[PathTorques], tuple[str, ...], tuple[LeftOut, ...]]:
+) -> tuple[list[PathTorques], tuple[str, ...], tuple[Open, ...]]:
     """The paths, the names of those that an arm of its class can't follow, and what programs have besides."""
     joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
@@ -668,16 +673,16 @@ def _paths(
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
     judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
-    found, skipped, rest = [], [], list[LeftOut]()
+    found, skipped, rest = [], [], list[Open]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
-        rest += each.left_out if each.meant_safe else ()
+        rest += each.open if each.meant_safe else ()
         if each.motion is None:
             skipped.append(each.name)
         else:
             found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
             if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
-                rest.append(LeftOut("program_loads", (each.name,)))
-    return found, tuple(skipped), by_subject(rest)
+                rest.append(Open("program_loads", (each.name,)))
+    return found, tuple(skipped), by_reason(rest)
 
 
 def _holding(arm: LoadedArm) -> tuple[model.HoldingTorque, ...]:

@@ -15,7 +15,8 @@ from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict
 from er3a.robots.robot import Grade
@@ -340,7 +341,7 @@ class DynamicsSummary(Summary):
     power_imbalance : largest difference of power and change of energy, of the largest power; None without paths
     """
 
-    decisive = NEVER_A_PASS - {"obstacles"} | {"program_loads"}
+    needs = ("torque", "limits", *OF_MOTIONS)
 
     verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
     gravity_m_s2: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,17 +29,19 @@ from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.progress import shown_work
-from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import Check, Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.covered import (
+    Covered,
+    assumed_tool,
+    covered_collisions,
+    gaps_in_solids,
+    gaps_of_orientations,
+)
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.left_out import (
-    left_out_in_solids,
-    left_out_of_collisions,
-    left_out_of_orientations,
-    left_out_without_tool,
-)
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown
@@ -400,15 +402,14 @@ def compute(study: Study, name: str) -> model.InverseResults:
     T_of = {target.name: target.T for target in targets}
     smallest = {each.name: each.clearance.least_mm / 1000 for each in asked if each.clearance}
     rests_on = shapes_assumed(robot, margin, smallest)
+    covered = covered_collisions(robot, bodies_of(robot, scene), scene)
     complete = not isinstance(arm_solver(robot).chain, Unsolved)
     random = np.random.default_rng([study.seed, ROUND_TRIP_STREAM])
     wanted = settings.round_trips if has_branches(robot) else min(settings.round_trips, MAX_BY_CLASS)
     trips = batch_round_trips(robot, random, wanted) if complete else None
     worst = _worst_residuals(solutions, trips)
     summary = model.InverseSummary(
-        verdict=_verdict(results, worst, trips, bool(scene and scene.solids))
-        .without(bodies_of(robot, scene).in_error)
-        .resting_on(rests_on),
+        verdict=_verdict(results, worst, trips, bool(scene and scene.solids)).resting_on(rests_on),
         figures=_figures(results, worst, trips),
         mix=settings.mix,
         scene=scene.title if scene else None,
@@ -416,13 +417,16 @@ def compute(study: Study, name: str) -> model.InverseResults:
         targets=results,
         sequence=sequence(robot, targets, solved, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
-        not_examined=(
-            *_left_out(robot, results, many, settings.mix, trips),
-            *left_out_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
-            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
-            *left_out_in_solids(scene, ((each.name, T_of[each.name][:3, 3], 0.0) for each in asked)),
-            *left_out_without_tool(robot),
+        checked=_checked(
+            results,
+            trips,
+            covered,
+            (
+                *gaps_of_orientations(robot, ((each.name, T_of[each.name], q) for each, q in zip(asked, chosen))),
+                *gaps_in_solids(scene, ((each.name, T_of[each.name][:3, 3], 0.0) for each in asked)),
+            ),
         ),
+        assumed=(*_assumed(results), *assumed_tool(robot), *covered.assumed),
     )
     return model.InverseResults(summary, solutions, model.RankingRows.stacked(ranked))
 
@@ -440,28 +444,20 @@ def _with_clearance(
     return tuple(targets)
 
 
-def _left_out(
-    robot: Robot,
-    targets: Sequence[model.TargetResult],
-    many: bool,
-    mix: Mapping[RuleName, float],
-    trips: BatchRoundTrips | None,
-) -> Iterator[LeftOut]:
-    """What the number of targets, the settings and the kind of arm leave out."""
-    if uncertain := tuple(each.name for each in targets if not _is_certain(each.method)):
-        yield LeftOut("uncertain_solutions", uncertain)
-    if trips is None:
-        yield LeftOut("all_solutions")
-    else:
-        yield LeftOut("round_trips", amount=trips.poses)
-    if many:
-        yield LeftOut("turns", amount=MANY_TARGETS)
-    if unadvised := tuple(each.name for each in targets if each.obstacle and not each.advice):
-        yield LeftOut("advice", unadvised)
-    known = available_rules(robot)
-    if unknown := tuple(rule for rule in mix if rule not in known):
-        yield LeftOut("rules", unknown)
-    yield LeftOut("ways_between")
+def _checked(
+    targets: Sequence[model.TargetResult], trips: BatchRoundTrips | None, seen: Covered, gaps: Iterable[Open]
+) -> tuple[Coverage, ...]:
+    """What the checks cover of the targets that are to be reached, and of random poses solved back."""
+    asked = [each for each in targets if each.expect in (None, "reached")]
+    all_of = len(asked), len(asked)
+    checks: dict[Check, int | tuple[int, int]] = {"reach": all_of, "limits": all_of, **seen.asked}
+    return coverages(checks | ({"round_trips": (trips.own_found, trips.poses)} if trips else {}), (*seen.gaps, *gaps))
+
+
+def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
+    """Targets whose solutions may not be all that there are."""
+    names = tuple(each.name for each in targets if not _is_certain(each.method))
+    return (Open("solutions_complete", names),) if names else ()
 
 
 def _is_certain(method: Method) -> bool:

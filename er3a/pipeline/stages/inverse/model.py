@@ -291,6 +291,8 @@ class InverseSummary(Summary):
     round_trips : None for arms without a closed form
     """
 
+    needs = ("reach", "limits", "self_collision", "scene_collision")
+
     verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]
     mix: dict[RuleName, float]
     scene: str | None

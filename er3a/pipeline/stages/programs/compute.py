@@ -13,10 +13,11 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
+from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.covered import Covered, assumed_rates, covered_collisions
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_of_rates
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
@@ -79,23 +80,19 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         if each.expect in (None, "pass")
     }
     assumed = shapes_assumed(robot, options.assumed_margin, smallest)
+    covered = covered_collisions(robot, bodies_of(robot, scene), scene, arms)
     return model.ProgramsResults(
         summary=model.ProgramsSummary(
-            verdict=_verdict(summaries).without(bodies_of(robot, scene).in_error).resting_on(assumed),
+            verdict=_verdict(summaries).resting_on(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
             assumed_speed=tuple(bool(value) for value in ~speeds_given(robot)),
             programs=tuple(summaries),
-            not_examined=(
-                *left_out_of_collisions(
-                    robot,
-                    bodies_of(robot, scene),
-                    scene,
-                    1000 * options.penetration_tolerance,
-                    arms,
-                ),
-                *left_out_of_rates(speeds_given(robot), not limits.acceleration_assumed, jerk=False),
-                *_left_out(summaries, unknown_starts),
+            checked=_checked(summaries, covered),
+            assumed=(
+                *assumed_rates(speeds_given(robot), not limits.acceleration_assumed),
+                *_assumed(summaries, unknown_starts),
+                *covered.assumed,
             ),
         ),
         lines=model.Lines.stacked(lines),
@@ -104,24 +101,28 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
     )
 
 
-def _left_out(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[LeftOut]:
-    """Lines that were not examined, ways from where the arm is not known to stand, and what no check sees."""
-    lines = tuple(f"{each.name}: {', '.join(map(str, each.not_examined))}" for each in programs if each.not_examined)
-    if lines:
-        yield LeftOut("program_lines", lines)
+def _checked(programs: Sequence[model.ProgramSummary], seen: Covered) -> tuple[Coverage, ...]:
+    """What the checks cover of the programs that are given to be run; of each motion all or nothing."""
+    asked = [each for each in programs if each.expect in (None, "pass")]
+    lines = tuple(f"{each.name}: {', '.join(map(str, each.not_examined))}" for each in asked if each.not_examined)
+    of = sum(each.motions for each in asked)
+    done = max(of - sum(len(each.not_examined) for each in asked), 0)
+    gaps = (*seen.gaps, *((Open("program_lines", lines),) if lines else ()))
+    checks: dict[Check, tuple[int, int]] = dict.fromkeys((*OF_MOTIONS, "limits", "singularity"), (done, done))
+    return coverages({**checks, "program_lines": (done, of), **seen.asked}, gaps)
+
+
+def _assumed(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[str]) -> Iterator[Open]:
+    """Where the arm stands at first, axes beside its own, and loads."""
     if unknown_starts:
-        yield LeftOut("program_starts", tuple(unknown_starts))
+        yield Open("program_starts", tuple(unknown_starts))
     outer = tuple(each.name for each in programs if any(_is_of_outer_axes(at.finding) for at in each.findings))
     if outer:
-        yield LeftOut("outer_axes", outer)
+        yield Open("outer_axes", outer)
     loads = [(each, at.finding) for each in programs for at in each.findings]
     said = (f"{each.name}: {load.mass_kg:g} kg" for each, load in loads if isinstance(load, LoadAbovePayload))
     if texts := tuple(dict.fromkeys(said)):
-        yield LeftOut("program_loads", texts)
-    yield LeftOut("program_again")
-    yield LeftOut("controller_language")
-    yield LeftOut("controller_ramps")
-    yield LeftOut("torques")
+        yield Open("program_load", texts)
 
 
 def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:

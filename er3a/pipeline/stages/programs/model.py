@@ -10,6 +10,7 @@ from typing import Any
 from er3a.by_value import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
@@ -137,6 +138,8 @@ class ProgramSummary:
 
 class ProgramsSummary(Summary):
     """Head and programs; ``scene`` is its title, None where the study names none."""
+
+    needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
     verdict: Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]
     scene: str | None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
@@ -20,21 +19,16 @@ from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, LeftOut, Status, Verdict
+from er3a.pipeline.results import Figure, Status, Verdict
+from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.covered import Covered, assumed_rates, assumed_tool, covered_collisions, gaps_of_orientations
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import (
-    left_out_of_collisions,
-    left_out_of_orientations,
-    left_out_of_rates,
-    left_out_without_tool,
-)
 from er3a.pipeline.stages.programs.model import finding_at
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
     ListedMotion,
     Motion,
-    by_subject,
     corner_misses,
     limits_of,
     listed_motions,
@@ -419,11 +413,13 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     paths: list[model.PathSummary] = []
     programs: list[model.ProgramFiles] = []
     skipped: list[model.PathNotFollowed] = []
-    rest: list[LeftOut] = []
+    rest: list[Open] = []
+    chosen: list[Open] = []
     turned: list[tuple[str, Reals, Reals]] = []
     for each in listed_motions(file, planning, near, settings.checks_per_sample):
         motion = each.motion
-        rest += each.left_out if each.meant_safe else ()
+        rest += each.gaps if each.meant_safe else ()
+        chosen += each.assumed if each.meant_safe else ()
         if motion is None:
             skipped.append(_not_followed(robot, each))
             continue
@@ -448,10 +444,9 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     length = characteristic_length(robot)
     clearance = {path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.meant_safe}
     assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
+    covered = covered_collisions(robot, surroundings.bodies, scene)
     summary = model.TrajectorySummary(
-        verdict=_verdict(paths, skipped, assumed_shapes)
-        .without(surroundings.bodies.in_error)
-        .resting_on(assumed_shapes),
+        verdict=_verdict(paths, skipped, assumed_shapes).resting_on(assumed_shapes),
         figures=_figures(paths, length, used, assumed_shapes),
         characteristic_length_m=length,
         near=model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm),
@@ -460,14 +455,12 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),
-        not_examined=(
-            *left_out_of_collisions(robot, surroundings.bodies, scene, settings.penetration_tolerance_mm),
-            *left_out_of_rates(speeds_given(robot), not used.acceleration_assumed, limits.jerk is not None),
-            *_left_out(paths, skipped, only),
-            *by_subject(rest),
-            *left_out_of_orientations(robot, turned),
-            *left_out_without_tool(robot),
-            LeftOut("torques"),
+        checked=_checked(covered, paths, skipped, (*rest, *gaps_of_orientations(robot, turned))),
+        assumed=(
+            *assumed_rates(speeds_given(robot), not used.acceleration_assumed),
+            *by_reason(chosen),
+            *assumed_tool(robot),
+            *covered.assumed,
         ),
     )
     return model.TrajectoryResults(
@@ -506,21 +499,18 @@ def _limits_used(robot: Robot, limits: JointLimits, settings: TrajectorySettings
     )
 
 
-def _left_out(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], only: StrategyName | None
-) -> Iterator[LeftOut]:
-    """Paths that were not followed or planned, stretches that bounds leave open, strategies not asked for."""
-    if skipped:
-        whys = {path.name: f": {path.refused}" if path.refused else "" for path in skipped}
-        yield LeftOut("paths", tuple(name + why for name, why in whys.items()))
-    if open_ := tuple(path.name for path in paths if path.undecided):
-        yield LeftOut("path_stretches", open_)
-    if unplanned := tuple(path.name for path in paths if path.verdict == "none found"):
-        yield LeftOut("plans", unplanned)
-    if len(paths) + len(skipped) > 1:
-        yield LeftOut("ways_between")
-    if only:
-        yield LeftOut("strategies", tuple(name for name in get_args(StrategyName) if name != only))
+def _checked(
+    seen: Covered, paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], rest: Iterable[Open]
+) -> tuple[Coverage, ...]:
+    """What the checks cover of the paths that are given to be run."""
+    asked = [each for each in skipped if set(each.expect) <= {"safe"}]
+    lost = tuple(f"{each.name}: {each.refused}" if each.refused else each.name for each in asked)
+    followed = sum(path.meant_safe for path in paths)
+    of = followed, followed
+    gaps = (*seen.gaps, *by_reason(rest))
+    gaps += (Open("not_followed", lost),) if lost else ()
+    checks: dict[Check, tuple[int, int]] = dict.fromkeys((*OF_MOTIONS, "limits", "singularity"), of)
+    return coverages({**checks, "reach": (followed, followed + len(lost)), **seen.asked}, gaps)
 
 
 def _checks(

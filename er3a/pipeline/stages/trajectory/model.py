@@ -17,6 +17,7 @@ from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
@@ -464,6 +465,8 @@ class TrajectorySummary(Summary):
     scene : title; None where the study names none
     penetration_tolerance_mm : no overlap deeper than this goes unnoticed between points
     """
+
+    needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
     verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]
     characteristic_length_m: float

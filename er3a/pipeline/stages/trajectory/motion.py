@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -21,7 +21,7 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
-from er3a.pipeline.results import LeftOut, LeftOutSubject
+from er3a.pipeline.scope import GAPS, Open
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.model import TimesIn
 from er3a.pipeline.study import Study
@@ -443,8 +443,18 @@ class ListedMotion:
     expected: tuple[PathVerdict, ...]
     motion: Motion | None
     ends: PathEndsError | None = None
-    left_out: tuple[LeftOut, ...] = ()
+    open: tuple[Open, ...] = ()
     refused: InputError | None = None
+
+    @property
+    def gaps(self) -> tuple[Open, ...]:
+        """Why no check covers all of it."""
+        return tuple(each for each in self.open if each.reason in GAPS)
+
+    @property
+    def assumed(self) -> tuple[Open, ...]:
+        """What was chosen for it."""
+        return tuple(each for each in self.open if each.reason not in GAPS)
 
     @property
     def found(self) -> tuple[LocatedFinding, ...]:
@@ -463,23 +473,6 @@ class ListedMotion:
         if self.ends is None:
             return "undecided"
         return "unreachable" if self.ends.kind == "out_of_reach" else "singular"
-
-
-def by_subject(found: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
-    """What paths leave out, each subject once.
-
-    Parameters
-    ----------
-    found : of all paths
-
-    Returns
-    -------
-    left_out : with the names of all that it is left out of, each once
-    """
-    names: dict[LeftOutSubject, dict[str, None]] = {}
-    for each in found:
-        names.setdefault(each.subject, {}).update(dict.fromkeys(each.names))
-    return tuple(LeftOut(subject, tuple(own)) for subject, own in names.items())
 
 
 def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
@@ -542,26 +535,26 @@ def listed_motions(
                 lost |= {listed.name, entry.name}
             ends[entry.name] = ends[listed.name] = nowhere if motion is None else motion.q[-1]
             part = entry if isinstance(entry, PartOfProgram) else None
-            parts: tuple[tuple[LeftOutSubject, Sequence[object]], ...] = (
+            parts: tuple[tuple[str, Sequence[object]], ...] = (
                 ("program_rest", part.rest if part else ()),
-                ("given_rates", misfits(task.robot, motion.built) if motion else ()),
-                ("missed_rows", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
+                ("rates_contradict", misfits(task.robot, motion.built) if motion else ()),
+                ("points_missed", tuple(filter(None, [motion and rows_missed(task.robot, motion.built)]))),
                 ("half_turns", motion.built.turns_open if motion and not part else ()),
             )
-            rest = [LeftOut(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own]
-            rest += [LeftOut(of, (listed.name,)) for of in (_chosen(task.robot, motion) if motion and not part else ())]
+            rest = [Open(of, (f"{listed.name}: {', '.join(map(str, own))}",)) for of, own in parts if own]
+            rest += [Open(of, (listed.name,)) for of in (_chosen(task.robot, motion) if motion and not part else ())]
             if part and part.part.found:
-                rest.append(LeftOut("program_findings", tuple(f"{listed.name}: {at}" for at in at_lines(part))))
+                rest.append(Open("program_findings", tuple(f"{listed.name}: {at}" for at in at_lines(part))))
             yield ListedMotion(
                 *(listed.name, entry.name, entry.title, entry.expected, motion, ended), tuple(rest), refused
             )
 
 
-CHOSEN: tuple[LeftOutSubject, ...] = ("half_turns", "start_branches", "arm_angles")
+CHOSEN: tuple[str, ...] = ("half_turns", "start_branches", "arm_angles")
 """What a path leaves open, and a program that is written of it settles."""
 
 
-def _chosen(robot: Robot, motion: Motion) -> Iterator[LeftOutSubject]:
+def _chosen(robot: Robot, motion: Motion) -> Iterator[str]:
     """What a path of the tool leaves open, and was chosen here."""
     built = motion.built
     if built.tool is None:

@@ -14,14 +14,13 @@ from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of, undeclared_bases
 from er3a.identifiability.statements import made_from_table, title_of
 from er3a.kinematics.forward import frames
-from er3a.kinematics.round_trips import MAX_BY_CLASS
 from er3a.kinematics.table_batch import robot_of
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import LeftOut
+from er3a.pipeline.scope import Check, Coverage, Open, coverages
 from er3a.pipeline.stages.validation import model
-from er3a.pipeline.stages.validation.checks import GROUP as ROUND_TRIPS
 from er3a.pipeline.stages.validation.checks import (
+    OF_THE_TOOL,
     checks_of_set,
     counts_of,
     key_figures,
@@ -207,10 +206,8 @@ def compute(study: Study, name: str) -> model.ValidationResults:
         round_trips=trips,
         counts=counts_of(checks),
         evidence=evidence,
-        not_examined=(
-            *_left_out(settings, checks, diagnoses if turning else None, trips, evidence),
-            *_left_out_of_places(study.robot(name), robot),
-        ),
+        checked=_covered(trips, evidence),
+        assumed=tuple(_assumed(checks, study.robot(name), robot)),
     )
     return model.ValidationResults(
         summary=summary,
@@ -220,14 +217,16 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     )
 
 
-def _left_out(
-    settings: ValidationSettings,
-    checks: list[model.Check],
-    diagnoses: tuple[model.SetDiagnosis, ...] | None,
-    trips: model.RoundTripErrors | None,
-    evidence: model.TableEvidence | None,
-) -> Iterator[LeftOut]:
-    """What references, settings and the kind of arm leave out; ``diagnoses``: None where none are made."""
+def _covered(trips: model.RoundTripErrors | None, evidence: model.TableEvidence | None) -> tuple[Coverage, ...]:
+    """Of the table's entries how many documents settle, of poses solved back how many were found."""
+    parts = [part for part in evidence.parts if part.part in OF_THE_TOOL] if evidence else []
+    settled = sum(part.entries if part.status == "settled" else part.settled for part in parts)
+    asked: dict[Check, tuple[int, int]] = {"table": (settled, sum(part.entries for part in parts))}
+    return coverages(asked | ({"round_trips": (trips.poses, trips.poses)} if trips else {}), ())
+
+
+def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator[Open]:
+    """What no reference states or settles, and what the study places otherwise than the model that was checked."""
     judged = {check.subject for check in checks if isinstance(check, model.ReferenceCheck)}
     groups = {check.group for check in checks if isinstance(check, model.ReferenceCheck)}
     missing = {
@@ -238,38 +237,12 @@ def _left_out(
         and (check.group not in groups if isinstance(check.subject, model.WholeGroup) else check.subject not in judged)
     }
     if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
-        yield LeftOut("references", unstated)
+        yield Open("references", unstated)
     if loose := tuple(dict.fromkeys(check.group for check in checks if isinstance(check.note, model.TooUncertain))):
-        yield LeftOut("loose_references", loose)
-    conflicting = [
-        check.group for check in checks if isinstance(check, model.ReferenceCheck) if check.status == "conflict"
-    ]
-    if conflicting:
-        yield LeftOut("conflicting_references", tuple(dict.fromkeys(conflicting)))
-    entries = evidence.entries if evidence else ()
-    doubtful = tuple(each.entry for each in entries if each.status not in ("settled", "gauge", "given"))
-    if doubtful or evidence is None:
-        yield LeftOut("table_entries", doubtful)
-    if diagnoses is None:
-        yield LeftOut("diagnosis")
-    else:
-        yield LeftOut("more_faults")
-    unsolved = [check for check in checks if isinstance(check, model.Unjudged) and check.group == ROUND_TRIPS]
-    if unsolved:
-        yield LeftOut("all_solutions")
-    else:
-        yield LeftOut("round_trips", amount=settings.round_trips if trips else min(settings.round_trips, MAX_BY_CLASS))
-    if trips and trips.near_singular:
-        yield LeftOut("near_singular_poses", amount=trips.near_singular)
-    yield LeftOut("reach_starts", amount=settings.reach_starts)
-    yield LeftOut("the_arm_itself")
-
-
-def _left_out_of_places(placed: Robot, robot: Robot) -> Iterator[LeftOut]:
-    """Tool and base of the robot as the study places it, as far as the model that was checked has them otherwise."""
+        yield Open("loose_references", loose)
     names = tuple(name for name in ("tool", "base") if not np.array_equal(getattr(placed, name), getattr(robot, name)))
     if names:
-        yield LeftOut("tool_and_base", names)
+        yield Open("tool_and_base", names)
 
 
 def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.TableEvidence | None:

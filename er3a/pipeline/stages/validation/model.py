@@ -515,6 +515,8 @@ class ValidationSummary(Summary):
     evidence : None where no reference speaks about the table
     """
 
+    needs = ("table",)
+
     verdict: Verdict[Validated]
     checks: tuple[Check, ...]
     conflicts: tuple[Conflict, ...]

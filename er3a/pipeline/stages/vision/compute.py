@@ -21,129 +21,31 @@ from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import from_si, stated
-from er3a.pipeline.results import Figure, LeftOut, LeftOutSubject, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import GAPS, Check, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.covered import assumed_rates, assumed_tool, covered_collisions, gaps_in_solids
 from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
-from er3a.pipeline.stages.left_out import (
-    left_out_in_solids,
-    left_out_of_collisions,
-    left_out_of_intrinsics,
-    left_out_of_rates,
-    left_out_without_tool,
-)
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
 from er3a.pipeline.study import Study
 from er3a.planning.timing import JointLimits
-from er3a.programs import instructions
-from er3a.programs.csv_program import write_csv
-from er3a.programs.from_commands import TO_START
-from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_names import LanguageName
-from er3a.programs.writing import HEAD, WriteOptions, ascii_text, program_name
-from er3a.robots.joint_limits import joint_columns, meant, shown, speeds_given
+from er3a.robots.joint_limits import meant, shown, speeds_given
 from er3a.robots.robot import Robot
 from er3a.vision.boards import ambiguous_tilts, projected
-from er3a.vision.calibration_set import CalibrationSet, TimeOffset
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.field_of_view import in_sight
-from er3a.vision.grasp_motion import DEPTH, PARTS, GraspLeg
+from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
 
-LONGEST_NAME = 24
-GRIPPER_S = 1.0
-CLOSE = "close the gripper here"  # in a controller's file, which is plain ASCII
-SIMULATED = "the camera is simulated: put in the position that a real one measures before you run this"
-FRAMES_OPEN = "no joint values tell whether the camera was calibrated with the flange's poses, in the arm's base"
-NO_LOAD = "whether the arm may carry the object was not examined"
-CSV_POINTS = 41
-
-
-def grasp_programs(
-    robot: Robot,
-    name: str,
-    home: Reals,
-    chosen: ChosenGrasp,
-    languages: Sequence[LanguageName],
-    *,
-    speed: Reals,
-    simulated: bool,
-    frames_open: bool = False,
-) -> model.GraspPrograms:
-    """A grasp in each language that has this arm's joints.
-
-    ``speed`` : (n,), the joints' greatest, rad/s or m/s; ``simulated``: whether the camera is;
-    ``frames_open``: whether it was calibrated with recorded poses alone
-    """
-    own = program_name(f"grasp_{name}", LONGEST_NAME)
-    what = f"grasp {ascii_text(chosen.grasp)} of {ascii_text(name)} by {ascii_text(robot.title)}, from where it waits"
-    head = (what, *([SIMULATED] if simulated else []), *([FRAMES_OPEN] if frames_open else []), NO_LOAD)
-    rows: list[tuple[str, str, str]] = []
-    for language in languages:
-        if not_written(language, robot):
-            continue
-        if language == "csv":
-            files = {".csv": _programs_table(robot, chosen, head)}
-        else:
-            options = WriteOptions(robot, home, head=head, assumed_speed=speed)
-            files = dict(write_program(_listing(robot, own, home, chosen), language, options).files)
-        rows += [(language, own + suffix, text) for suffix, text in files.items()]
-    return model.GraspPrograms.of_rows((name, *row) for row in rows)
-
-
-def _listing(robot: Robot, name: str, home: Reals, chosen: ChosenGrasp) -> instructions.Listing:
-    tool, base, to_robot = (
-        instructions.NamedFrame("", robot.tool),
-        instructions.NamedFrame("", np.eye(4)),
-        np.linalg.inv(robot.base),
-    )
-    found: list[instructions.Instruction] = [
-        instructions.ArmMotion("joint", instructions.JointTarget(home), speed=TO_START, tool=tool, base=base)
-    ]
-    for before, leg in zip((None, *chosen.legs), chosen.legs):
-        if before is not None and _closes(before, leg):
-            found += [instructions.Remark(CLOSE), instructions.Pause(GRIPPER_S)]
-        rate = instructions.Rate(leg.duration, "s")
-        if leg.T_end is None:
-            found.append(
-                instructions.ArmMotion("joint", instructions.JointTarget(leg.q_end), speed=rate, tool=tool, base=base)
-            )
-        else:
-            target = instructions.PoseTarget(to_robot @ leg.T_end, joints=leg.q_end)
-            found.append(instructions.ArmMotion("line", target, speed=rate, tool=tool, base=base))
-    return instructions.Listing(name, tuple(found))
-
-
-def _programs_table(robot: Robot, chosen: ChosenGrasp, head: tuple[str, ...]) -> str:
-    """The motion over time, at rest where the gripper closes."""
-    times, rows, now = [np.zeros(1)], [chosen.legs[0].joints(np.zeros(1))], 0.0
-    for leg, next_leg in zip(chosen.legs, (*chosen.legs[1:], None)):
-        t, q = leg.sampled(CSV_POINTS)
-        times.append(now + t[1:])
-        rows.append(q[1:])
-        now += leg.duration
-        if next_leg is not None and _closes(leg, next_leg):
-            now += GRIPPER_S
-            times.append(np.array([now]))
-            rows.append(q[-1:])
-    joints = np.concatenate(rows)
-    poses = np.linalg.inv(robot.base) @ forward(robot, joints)
-    comments = tuple(HEAD + line for line in head)
-    return write_csv(np.concatenate(times), shown(robot, joints), poses, comments, joint_columns(robot))
-
-
-def _closes(before: GraspLeg, after: GraspLeg) -> bool:
-    """Whether the gripper closes between two legs."""
-    return before.part == "approach" and after.part == "retreat"
-
 
 def calibration_result(
     head: HandEyeFile,
     found: HandEye,
-    offset: TimeOffset | None,
     images: SeenImages | None,
 ) -> model.CalibrationResult:
     """All that the summary says of a calibration.
@@ -152,7 +54,6 @@ def calibration_result(
     ----------
     head : the file that describes the recording
     found : poses and half-widths of their 95 % intervals, m and rad
-    offset : between the clocks of two streams; None for one table
     images : None for poses given as numbers
 
     Returns
@@ -181,7 +82,6 @@ def calibration_result(
         moved_mm=from_si("mm", moved),
         moved_deg=from_si("deg", tilted),
         touch=_touch(found),
-        time_offset=stated(model.OffsetResult, offset) if offset else None,
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
         copies=found.copies,
@@ -290,54 +190,52 @@ def compute(study: Study, name: str) -> model.VisionResults:
     if head.setup == "eye_in_hand" and task_file.picture_deg is None:
         problem = "missing, though the camera is on the flange"
         raise InputError(file, "picture_deg", problem, "Add the joint angles at which the picture was taken")
-    samples, offset, images = read_calibration(head_path, robot)
+    samples, images = read_calibration(head_path, robot)
     title = scene.title if scene else None
     settings, motions = study.section(VisionSettings), study.section(TrajectorySettings)
-    bodies, frames = bodies_of(robot, scene), _open_frames(samples, head)
-    of_motions = (*frames, *GRASPS_REST_ON, *_left_out_of_motions(robot, bodies, scene, motions))
+    frames = _open_frames(samples, head)
+    of_file = (*frames, *_open_of_file(task_file))
+    seen = covered_collisions(robot, bodies_of(robot, scene), scene)
+    given = motions.acceleration_deg_s2 is not None
+    assumed = (*assumed_rates(speeds_given(robot), given), *assumed_tool(robot), *seen.assumed)
     try:
         with_zeros = zeros_tried(calibrate_hand_eye(samples), robot)
     except HandEyeError as error:
-        left_out = (
-            _no_grasps(task_file),
-            *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images),
-            *of_motions,
-        )
-        return _without_calibration(error, task_file, title, settings, left_out)
+        return _without_calibration(error, task_file, title, settings)
     found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
     camera = _camera_at(robot, found, picture)
     places = {each.name: camera @ each.pose() for each in task_file.objects}
-    calibration = calibration_result(head, found, offset, images)
+    calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
     limits = (limits_of(robot, motions), study.seed)
     planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
     objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
+    open_points = (
+        *of_file,
+        *open_of_calibration(samples, head, images, with_zeros, task_file.gripper.tolerance_mm),
+        *gaps_in_solids(scene, _places(robot, task_file, found, picture)),
+        *(() if scene and scene.carried else (Open("gripper"),)),
+    )
+    gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
     judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     summary = model.VisionSummary(
-        verdict=judged.without(bodies.in_error).resting_on(shapes),
+        verdict=judged.resting_on(shapes),
         figures=figures_of(calibration, objects, near),
         title=task_file.title,
         scene=title,
         least_success=settings.least_success,
         calibration=calibration,
         objects=objects,
-        not_examined=(
-            *((_no_grasps(task_file),) if doubt else ()),
-            *_left_out_of_file(task_file),
-            *left_out_of_calibration(samples, head, offset, images, with_zeros, task_file.gripper.tolerance_mm),
-            *of_motions,
-            *left_out_in_solids(scene, _places(robot, task_file, found, picture)),
-        ),
+        checked=coverages(_asked(objects, found) | seen.asked, gaps),
+        assumed=(*(each for each in open_points if each.reason not in GAPS), *assumed),
     )
     return model.VisionResults(
         summary,
         sample_rows(found, robot),
         _all_ways(robot, planned),
-        _all_programs(robot, task_file, planned, motions, (head.simulated, bool(frames))),
         corner_rows(found, images),
     )
 
@@ -355,106 +253,71 @@ def _places(
             yield each.name, (camera @ each.pose())[:3, 3], float(error_sizes(error.camera + error.calibration)[0])
 
 
-def _rates_given(motions: TrajectorySettings) -> tuple[bool, bool]:
-    """Whether the study gives the joints' accelerations, and their jerk."""
-    return motions.acceleration_deg_s2 is not None, motions.jerk_deg_s3 is not None
-
-
-def _all_programs(
-    robot: Robot, file: VisionFile, planned: Planned, motions: TrajectorySettings, open_points: tuple[bool, bool]
-) -> model.GraspPrograms:
-    """The programs of all grasps; ``open_points``: whether the camera is simulated, and its frames are open."""
-    home, (simulated, frames_open) = meant(robot, np.array(file.home_deg)), open_points
-    write = partial(
-        grasp_programs,
-        speed=limits_of(robot, motions).speed,
-        languages=motions.programs,
-        simulated=simulated,
-        frames_open=frames_open,
-    )
-    return model.GraspPrograms.stacked(
-        write(robot, entry.name, home, plan.chosen) for entry, plan, _ in planned if plan.chosen
-    )
+def _asked(objects: Sequence[model.ObjectResult], found: HandEye) -> dict[Check, tuple[int, int]]:
+    """What the checks of the calibration and of the grasps cover."""
+    asked = [each for each in objects if each.expect in (None, "grasped")]
+    of = len(asked), len(asked)
+    used = int(found.used.sum())
+    return {"camera": (used, used), "reach": of, "limits": of}
 
 
 def _without_calibration(
-    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings, left_out: tuple[LeftOut, ...]
+    error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings
 ) -> model.VisionResults:
     """What is written where the samples allow no calibration: why, and no rows."""
     verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
-    summary = model.VisionSummary(
-        verdict, (), file.title, scene, settings.least_success, None, (), not_examined=left_out
-    )
+    summary = model.VisionSummary(verdict, (), file.title, scene, settings.least_success, None, ())
     return model.VisionResults(
         summary,
         model.SampleRows.empty(),
         model.PathRows.empty(),
-        model.GraspPrograms.empty(),
         model.CornerRows.empty(),
     )
 
 
-def _left_out_of_file(file: VisionFile) -> Iterator[LeftOut]:
+def _open_of_file(file: VisionFile) -> Iterator[Open]:
     """What the file of the cell leaves open whatever the samples say: objects out of view, errors of the arm."""
     places = np.array([each.pose()[:3, 3] for each in file.objects])
     seen = in_sight(file.view.view(), places)
     if hidden := tuple(each.name for each, visible in zip(file.objects, seen) if not visible):
-        yield LeftOut("objects_out_of_view", hidden)
+        yield Open("out_of_view", hidden)
     if not file.arm.states_all:
-        yield LeftOut("arm_errors")
+        yield Open("arm_errors")
 
 
-def _left_out_of_motions(
-    robot: Robot, bodies: Bodies, scene: Scene | None, settings: TrajectorySettings
-) -> Iterator[LeftOut]:
-    """What of collisions, speeds and torques nobody looks at."""
-    yield from left_out_of_collisions(robot, bodies, scene, 1000 * DEPTH)
-    yield from left_out_of_rates(speeds_given(robot), *_rates_given(settings))
-    yield from left_out_without_tool(robot)
-    yield LeftOut("torques")
-
-
-def _no_grasps(file: VisionFile) -> LeftOut:
-    """The objects that no grasp is looked for of, as no calibration says where they are."""
-    return LeftOut("grasps", tuple(each.name for each in file.objects))
-
-
-def left_out_of_calibration(
+def open_of_calibration(
     samples: CalibrationSet,
     head: HandEyeFile,
-    offset: TimeOffset | None,
     images: SeenImages | None,
-    found: tuple[HandEye, tuple[str, ...] | None, float] | None = None,
+    found: tuple[HandEye, tuple[str, ...] | None, float],
     tolerance_mm: Sequence[float] = (),
-) -> tuple[LeftOut, ...]:
-    """What a calibration does not rest on, and what nothing checks it against.
+) -> tuple[Open, ...]:
+    """What nothing checks a calibration against, and what it takes as given.
 
-    ``found`` : as :func:`zeros_tried` returns it, without joints where no arm is known; None: no calibration.
-    ``tolerance_mm`` : what touched points have to agree within, to stand for the intrinsics; empty for any distance.
+    Parameters
+    ----------
+    found : as :func:`zeros_tried` returns it, without joints where no arm is known
+    tolerance_mm : what touched points have to agree within, to stand for the intrinsics; empty for any distance
+
+    Returns
+    -------
+    open_points : gaps of the check of the camera, and assumptions
     """
-    hand_eye, zeros, least_zero = found or (None, None, 0.0)
-    touch = hand_eye.touch if hand_eye else None
-    boardless = tuple(each.sample for each in images.boardless) if images else ()
-    rejected = hand_eye.rejected if hand_eye else ()
-    copies = hand_eye.copies if hand_eye else ()
-    unused = offset.unused if offset else 0
-    touched = touch is not None and (not tolerance_mm or touched_within(touch, tolerance_mm))
-    left: dict[LeftOut, object] = {
-        LeftOut("real_camera"): head.simulated,
-        LeftOut("boardless_images", boardless): boardless,
-        LeftOut("left_out_samples", rejected): rejected,
-        LeftOut("stream_poses", amount=unused): unused,
-        LeftOut("copied_samples", copies): copies,
-        LeftOut("joint_zeros", zeros or ()): zeros != (),
-        LeftOut("small_joint_zeros", amount=least_zero): least_zero,
-        LeftOut("touched_points"): touch is None if hand_eye else samples.touched is None,
-        **{LeftOut(each): True for each in left_out_of_intrinsics(samples, images, head.simulated, touched)},
+    hand_eye, zeros, least_zero = found
+    touched = hand_eye.touch is not None and (not tolerance_mm or touched_within(hand_eye.touch, tolerance_mm))
+    points = {
+        Open("real_camera"): head.simulated,
+        Open("joint_zeros", zeros or ()): zeros != (),
+        Open("small_joint_zeros", amount=least_zero): least_zero > 0,
+        Open("touched_points"): hand_eye.touch is None,
+        Open("given_intrinsics"): images is not None and images.views.shared is None,
     }
-    return tuple(each for each, is_so in left.items() if is_so)
-
-
-GRASPS_REST_ON = (LeftOut("detections"), LeftOut("gripped_parts"))
-"""What grasps take as it is given."""
+    if images is None:
+        # Touched points show where a fixed camera is. Of a camera on the flange they show where the board is, and a
+        # wrong focal length may leave that as it is.
+        confirmed = head.simulated or (samples.setup == "eye_to_hand" and touched)
+        points[Open("pose_intrinsics" if confirmed else "intrinsics")] = True
+    return tuple(each for each, is_so in points.items() if is_so)
 
 
 def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> bool:
@@ -470,14 +333,14 @@ def touched_within(touch: TouchCheck | None, tolerance_mm: Sequence[float]) -> b
     return touch is not None and 1000 * touch.largest <= min(tolerance_mm)
 
 
-def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[LeftOut, ...]:
+def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[Open, ...]:
     """Of the frames that nothing is compared with, the one that the camera is in: grasps rest on no other.
 
     A tool's pose in place of the flange's moves a camera on the flange by as much, and what it sees of the base not at
     all, so touched points agree. A fixed camera stays where it is, in the frame that poses and touched points are in.
     """
-    camera_in: LeftOutSubject = "flange_poses" if head.setup == "eye_in_hand" else "base_poses"
-    return tuple(LeftOut(each) for each in samples.open_frames(head.simulated) if each == camera_in)
+    camera_in = "flange_frame" if head.setup == "eye_in_hand" else "base_frame"
+    return tuple(Open(each) for each in samples.open_frames(head.simulated) if each == camera_in)
 
 
 def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:

@@ -50,9 +50,7 @@ def calibration_files(path: str | Path) -> list[Path]:
     """
     path = Path(path)
     head: dict[str, Any] = read_yaml(path)
-    streams = head.get("streams")
     named = [head.get("samples"), head.get("touched")]
-    named += [streams.get("flange"), streams.get("target")] if isinstance(streams, dict) else []
     files = [path, *(path.parent / name for name in named if isinstance(name, str))]
     if head.get("images") is not None and isinstance(head.get("samples"), str):
         table = path.parent / head["samples"]
@@ -68,8 +66,8 @@ class VisionSettings(StrictModel):
     ``least_limit_margin_deg`` : of joints from their limits, mm of a prismatic joint.
     ``least_singular_value`` : of the Jacobian with lengths divided by the wrist's reach. ``least_success`` : the
     probability of success below which an object is not graspable.
-    ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates, and the
-    languages in which grasps are written as programs, are those of ``trajectory``.
+    ``line_speed_mm_s`` : the tool's maximum speed on approach and retreat. Limits of the joints' rates
+    are those of ``trajectory``.
     """
 
     scene: Text | None = None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from er3a.by_value import Finding
 from er3a.collision.pairs import Pair
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.boards import AmbiguousTilt, BoardlessImage
@@ -97,16 +97,6 @@ class TouchResult:
 
 
 @dataclass(frozen=True)
-class OffsetResult:
-    """The camera's clock plus this is the arm's, with half its 95 % interval; ``unused``: poses without a sample."""
-
-    offset_s: float
-    half_width_s: float
-    rms_deg: float
-    unused: int = 0
-
-
-@dataclass(frozen=True)
 class CalibrationResult:
     """The calibration.
 
@@ -146,7 +136,6 @@ class CalibrationResult:
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
-    time_offset: OffsetResult | None
     open_tilts: tuple[AmbiguousTilt, ...] = ()
     boardless: tuple[BoardlessImage, ...] = ()
     copies: tuple[str, ...] = ()
@@ -234,7 +223,7 @@ class VisionSummary(Summary):
     grasps are no pass.
     """
 
-    decisive = NEVER_A_PASS | {"carried"}
+    needs = ("camera", "reach", "limits", "self_collision", "scene_collision")
 
     verdict: Verdict[CalibrationImpossible | CalibrationDoubtful | TouchContradicts | GraspCounts | ExpectationsUnmet]
     title: str
@@ -281,21 +270,11 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-class GraspPrograms(Table):
-    """Programs of the grasps for controllers: from home to the approach, to the grasp, and away."""
-
-    target: Texts = column("name of the object")
-    language: Texts = column("language of the program, by its name in a study (`trajectory.programs`)")
-    file: Texts = column("name of the file")
-    text: Texts = column("what the file holds")
-
-
 class VisionResults(Results[VisionSummary]):
     """The stage's results; without a calibration the tables are empty."""
 
     samples: SampleRows
     ways: PathRows
-    programs: GraspPrograms
     corners: CornerRows
 
 

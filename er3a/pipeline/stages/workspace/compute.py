@@ -17,9 +17,10 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
-from er3a.pipeline.results import Figure, LeftOut, Verdict
+from er3a.pipeline.results import Figure, Verdict
+from er3a.pipeline.scope import Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.left_out import left_out_of_collisions, left_out_without_tool
+from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSettings
 from er3a.pipeline.stages.workspace.sample import draw_of, sampled
@@ -143,10 +144,10 @@ def _summary(
         tried = single_changes(robot, judged.finding.cause, study.seed)
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
     examined = not isinstance(tool.capability, model.CapabilityMissing)
-    volume = model.Bounds(*proven.proof.bounds)
+    volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
-        verdict=judged.without(tool.unexamined).resting_on(assumed if examined else None),
+        verdict=judged.resting_on(assumed if examined else None),
         figures=_figures(reach, voids, volume, hull, settings.samples),
         samples=settings.samples,
         sampling=settings.sampling,
@@ -168,46 +169,34 @@ def _summary(
         pocket_block_m=pocket_block(proven),
         capability=tool.capability,
         placement=tool.placement,
-        not_examined=(
-            *_left_out(settings, proven, tool),
-            *_in_solids(robot, scene, tool.placement),
-            *left_out_of_collisions(robot, bodies_of(robot, scene), scene),
-            *left_out_without_tool(robot),
-        ),
+        checked=_checked((robot.joints, robot.joints), proven, seen, tuple(_in_solids(robot, scene, tool.placement))),
+        assumed=(*_assumed(tool), *assumed_tool(robot), *seen.assumed),
     )
 
 
-def _left_out(settings: WorkspaceSettings, proven: Proven, tool: ToolCapability) -> Iterator[LeftOut]:
-    """What samples, the proof's budget and the kind of arm leave out."""
-    yield LeftOut("joint_vectors", amount=settings.samples)
-    lower, upper = proven.proof.bounds
-    if upper > lower:
-        yield LeftOut("undecided_volume", amount=1000 * (upper - lower))
-    if proven.proof.width > SETTLED:
-        yield LeftOut("hidden_voids", amount=100 * proven.proof.width)
-    yield LeftOut("colliding_reach")
+def _checked(joints: tuple[int, int], proven: Proven, seen: Covered, gaps: Sequence[Open]) -> tuple[Coverage, ...]:
+    """What the checks cover: of the volume in per cent what the proof decides, of collisions where the tray stands."""
+    undecided = 100 * proven.proof.width
+    hidden = (Open("undecided_cells", amount=undecided),) if proven.proof.width > SETTLED else ()
+    decided = 100 if not hidden else int(100 - undecided)
+    return coverages(
+        {"reach": (decided, 100), "limits": joints, "self_collision": seen.asked["self_collision"]},
+        (*seen.gaps, *gaps, *hidden),
+    )
+
+
+def _assumed(tool: ToolCapability) -> Iterator[Open]:
+    """What the kind of arm leaves out of what its tool can do."""
     found, placement = tool.capability, tool.placement
     if isinstance(found, model.CapabilityMissing):
-        yield LeftOut("capability")
-        return
-    yield LeftOut("tool_directions", amount=found.directions)
-    if found.clear.without:
-        yield LeftOut("lost_cells", amount=found.clear.without)
-    if isinstance(placement, model.PlacementTooLong):
-        yield LeftOut("places")
+        yield Open("capability")
+    elif isinstance(placement, model.PlacementTooLong):
+        yield Open("places")
     elif placement and not getattr(placement, "named_places", ()):
-        yield LeftOut("tray_nowhere", (f"{' × '.join(f'{edge:g}' for edge in placement.task.box_mm)} mm",))
-    if isinstance(placement, model.PlacementSummary):
-        if placement.fitting:
-            yield LeftOut("sampled_places", amount=placement.fitting)
-        yield LeftOut("between_places", amount=1000 * max(placement.spacing_m))
-        if found.asked != "directions":
-            yield LeftOut("box_directions")
-        if placement.named_places:
-            yield LeftOut("placed_box")
+        yield Open("tray_nowhere", (f"{' × '.join(f'{edge:g}' for edge in placement.task.box_mm)} mm",))
 
 
-def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None) -> Iterator[LeftOut]:
+def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None) -> Iterator[Open]:
     """Places of the box that would be in solids, but for those that it stands on."""
     if scene is None or not isinstance(found, model.PlacementSummary):
         return
@@ -217,7 +206,7 @@ def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None)
         for solid in solids_met(robot, Box(name, translation(*place.centre_m), np.array(place.size_m)), scene)
     ]
     if named:
-        yield LeftOut("places_in_solids", tuple(named))
+        yield Open("tray_inside", tuple(named))
 
 
 def _bars(proven: Proven) -> model.Bars | None:

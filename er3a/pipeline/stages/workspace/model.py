@@ -15,7 +15,7 @@ from er3a.collision.pairs import Pair
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import NEVER_A_PASS, Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
@@ -464,7 +464,7 @@ class WorkspaceSummary(Summary):
     What the verdict says is of the arm's lengths and limits, whatever stands around it.
     """
 
-    decisive = NEVER_A_PASS - {"obstacles"}
+    needs = ("reach", "limits", "self_collision")
 
     verdict: Verdict[WorkspaceFinding]
     samples: int

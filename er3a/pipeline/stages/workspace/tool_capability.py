@@ -15,7 +15,6 @@ from functools import partial
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
@@ -174,13 +173,12 @@ CLEAR_STREAM = 11
 
 @dataclass(frozen=True, eq=False)
 class ToolCapability:
-    """This part's entries of the summary, and its tables; ``unexamined``: pairs whose collisions were not looked at."""
+    """This part's entries of the summary, and its tables."""
 
     capability: model.CapabilitySummary | model.CapabilityMissing
     placement: model.Placement | None
     cells: model.CapabilityCells
     places: model.BoxPlaces
-    unexamined: tuple[Pair, ...] = ()
 
 
 def tool_capability(
@@ -234,9 +232,7 @@ def tool_capability(
     placement, places = _placed(
         robot, settings, task, plan, scene=scene, margin=margin, best=float(found.manipulability.max())
     )
-    return ToolCapability(
-        summary, placement, model.capability(middles, found, tried, frame.bar > 0), places, bodies.in_error
-    )
+    return ToolCapability(summary, placement, model.capability(middles, found, tried, frame.bar > 0), places)
 
 
 def _placed(

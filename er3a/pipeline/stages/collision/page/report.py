@@ -14,9 +14,9 @@ from er3a.collision.pairs import TRIED
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import state_word, why
-from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model

@@ -23,9 +23,9 @@ from er3a.pipeline.messages.inverse import (
     limits_in_short,
 )
 from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
-from er3a.pipeline.messages.left_out import pair_words
 from er3a.pipeline.messages.numbers import fixed, no_noise, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
+from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study

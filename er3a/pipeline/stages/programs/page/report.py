@@ -55,7 +55,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
         limits_assumed=limits_assumed(
-            summary.assumed_speed, any(each.subject == "own_accelerations" for each in summary.not_examined)
+            summary.assumed_speed, any(each.reason == "own_accelerations" for each in summary.assumed)
         ),
         faults={fault.name: fault for fault in faults(results)},
         player=player(robot, motions(robot, results), scene),

@@ -29,7 +29,7 @@ from er3a.pipeline.messages.trajectory import (
 )
 from er3a.pipeline.player.motions import PlayedEvent
 from er3a.pipeline.player.player import drawing_head, moment, player
-from er3a.pipeline.results import LeftOut, Stored
+from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
@@ -64,9 +64,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
-    box_asked = "workspace" in study.stages(stored.robot) and not contradicted
-    boxes = [LeftOut("placed_box")] if box_asked else []
-    lines = program_head(stored.validated, [*summary.not_examined, *boxes])
+    lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)

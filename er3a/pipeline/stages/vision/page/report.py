@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -18,21 +18,16 @@ from er3a.pipeline.messages.say import bracketed, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
-from er3a.pipeline.results import LeftOut, Stored
-from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
     render_stage,
-    text_address,
 )
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
-from er3a.programs.languages import titles_unwritten
-from er3a.programs.writing import with_head_lines
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -127,17 +122,11 @@ PARTS = {
 }
 
 
-SIMULATED = N_("The camera is simulated: put in the position that a real one measures before you run this.")
-NO_LOAD = N_("Whether the arm may carry the object was not examined.")
-
-
 def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
-    robot, contradicted = study.robot(name), stored.rests_on.get("validation") == "fail"
-    boxes = [LeftOut("placed_box")] if "workspace" in study.stages(name) else []
-    head = program_head(stored.validated, [*summary.not_examined, *boxes])
+    robot = study.robot(name)
     render_stage(
         study,
         stored,
@@ -152,13 +141,6 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         overview=[_overview(each) for each in summary.objects],
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        programs=[] if contradicted else _programs(results.programs, head),
-        program_warnings=[
-            *filter(None, [condition_of(stored.validated)]),
-            *([tr(SIMULATED)] if found and found.simulated else []),
-            tr(NO_LOAD),
-        ],
-        unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
         player=player(robot, _motions(robot, results), scene),
@@ -170,15 +152,7 @@ def _image_folder(study: Study, name: str) -> Path:
     """Where the table of samples stands, beside which its images are."""
     file = Path(str(study.entry(name).vision))
     head = file.parent / load_vision(file).calibration
-    return (head.parent / str(load(HandEyeFile, head).samples)).parent
-
-
-def _programs(rows: model.GraspPrograms, head: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Of each object its programs: the file's name, and the data address of its text, which begins with ``head``."""
-    found: dict[str, list[tuple[str, str]]] = {}
-    for target, file, text in zip(rows.target.tolist(), rows.file.tolist(), rows.text.tolist()):
-        found.setdefault(target, []).append((file, text_address(with_head_lines(text, head))))
-    return list(found.items())
+    return (head.parent / load(HandEyeFile, head).samples).parent
 
 
 def _motions(robot: Robot, results: model.VisionResults) -> list[PlayedMotion]:

@@ -16,9 +16,9 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import as_text, own_title, tr
-from er3a.pipeline.messages.left_out import body_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import bracketed, joined
+from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.player.player import moment
 from er3a.pipeline.results import AbsentResults, Stored, is_computed, read_stage

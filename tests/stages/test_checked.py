@@ -1,27 +1,30 @@
-"""What a stage's settings, inputs and limits leave out stands in its summary and closes its page."""
+"""A verdict passes only on what was checked: what checks do not cover, and what they assume, stands in the summary."""
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from importlib import import_module
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.matrix import base_contacts, collision_matrix, solids_met
+from er3a.collision.matrix import base_contacts, solids_met
 from er3a.collision.pairs import ASSUMED_MARGIN, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
 from er3a.files.path_file import load_paths
-from er3a.files.robot_file import Placement
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
@@ -30,50 +33,46 @@ from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.pipeline.messages.left_out import left_out_names, left_out_text
-from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline import language
+from er3a.pipeline.messages.say import say, say_all, sentence
+from er3a.pipeline.messages.scope import TEXTS, assumed_text, check_name, gap_text
 from er3a.pipeline.new_study.arms import arm_of
 from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import (
-    NEVER_A_PASS,
-    LeftOut,
-    LeftOutSubject,
-    NoPass,
+    NotChecked,
     Results,
     Summary,
     Verdict,
     read_results,
-    summary_type,
+    read_scope,
 )
+from er3a.pipeline.scope import GAPS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute as collision
 from er3a.pipeline.stages.collision.model import FreeSpace
+from er3a.pipeline.stages.covered import covered_collisions, gaps_in_solids, gaps_of_orientations
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.inverse.compute import compute as inverse
-from er3a.pipeline.stages.left_out import left_out_in_solids, left_out_of_collisions, left_out_of_orientations
 from er3a.pipeline.stages.programs.compute import compute as programs
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as trajectory
 from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.motion import (
-    by_subject,
     listed_motions,
     near_singular,
     planning_of,
 )
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.stages.trajectory.page.report import report
-from er3a.pipeline.stages.validation.compute import compute as validation
 from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
-from er3a.pipeline.stages.workspace.model import CapabilityMissing
 from er3a.pipeline.study import Study, load_study
-from er3a.pipeline.viewing.conditions import program_head
-from er3a.references.rows import GROUPS
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 
 ROBOT = "er3a_c60"
+CHECKS = get_args(Check)
+FREE = FreeSpace(0.5, 1, 1, 1, 0)
 
 
 @pytest.fixture(scope="module")
@@ -88,9 +87,21 @@ def changed(study: Study, entry=None, **sections) -> Study:
     return study.model_copy(update=made | {"robots": robots})
 
 
-def subjects(results) -> dict[str, LeftOut]:
-    """What is left out, by subject."""
-    return {each.subject: each for each in results.summary.not_examined}
+def subjects(results) -> dict[str, Open]:
+    """What is not covered, and what is assumed, by reason."""
+    summary = results.summary
+    return {each.reason: each for each in (*(gap for check in summary.checked for gap in check.gaps), *summary.assumed)}
+
+
+def missing(verdict) -> list[Open]:
+    """Why a verdict's checks do not cover all."""
+    return [gap for check in verdict.missed for gap in check.gaps]
+
+
+def open_points(robot: Robot, scene: Scene | None) -> tuple[Open, ...]:
+    """Why checks for collisions do not cover all, and what they assume."""
+    found = covered_collisions(robot, bodies_of(robot, scene), scene)
+    return (*found.gaps, *found.assumed)
 
 
 def one_path(folder: Path) -> str:
@@ -99,29 +110,6 @@ def one_path(folder: Path) -> str:
     content["paths"] = [each for each in content["paths"] if each["name"] == "line_clean"]
     (folder / "paths.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     return str(folder / "paths.yaml")
-
-
-def test_paths_name_what_their_settings_leave_out(study, tmp_path):
-    entry = {"paths": one_path(tmp_path)}
-    bare = changed(study, entry, trajectory={"scene": None, "penetration_tolerance_mm": 3.0, "avoidance": "slow"})
-    found = subjects(trajectory(bare, ROBOT))
-    assert {"obstacles", "jerk", "torques", "strategies"} <= found.keys()
-    assert found["shallow_overlaps"].amount == 3.0
-    assert "slow" not in found["strategies"].names
-    assert len(found["strategies"].names) > 2
-    robot = study.robot(ROBOT)
-    unknown = tuple(f"J{j + 1}" for j in np.flatnonzero(~np.isfinite(robot.speed)))
-    assert (found["own_speeds"].names if unknown else ()) == unknown
-    jerky = changed(study, entry, trajectory={"jerk_deg_s3": [1e6] * robot.joints})
-    more = subjects(trajectory(jerky, ROBOT))
-    assert "jerk" not in more
-    assert {"own_accelerations"} <= found.keys() & more.keys()
-    known = changed(study, entry, trajectory={"acceleration_deg_s2": [700.0] * robot.joints, "avoidance": "slow"})
-    assert "own_accelerations" not in subjects(trajectory(known, ROBOT))
-    assert "strategies" not in more
-    assert "scene_shapes" not in found
-    absent = "scene_shapes" if study.scene(ROBOT, "trajectory") is None else "obstacles"
-    assert {"scene_shapes", "obstacles"} - more.keys() == {absent}
 
 
 @pytest.mark.parametrize(("grade", "names"), [("inferred", tuple(f"J{j}" for j in range(1, 7))), ("claim", None)])
@@ -143,7 +131,7 @@ def test_stages_that_follow_paths_without_obstacles_say_so(study, tmp_path, stag
     compute, entry = STAGES[stage].module("compute").compute, {"paths": one_path(tmp_path)}
     for scene in (None, "data/scenes/table_and_post.yaml"):
         results = compute(changed(study, entry, trajectory={"scene": scene, "avoidance": "slow"}), ROBOT)
-        assert ("obstacles" in subjects(results)) == (scene is None)
+        assert ("no_scene" in subjects(results)) == (scene is None)
 
 
 @pytest.mark.long
@@ -164,17 +152,17 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
     quick = {"programs": [], "avoidance": "slow"}
     for subject, names, more, settings in (
         (None, (), {}, {}),
-        ("obstacles", (), {}, {"scene": None}),
+        ("no_scene", (), {}, {"scene": None}),
         ("allowed_contacts", tuple(map("/".join, pairs)), {}, {"scene": str(tmp_path / "allowing.yaml")}),
         ("uncovered_links", ("link_2", "link_3", "link_4", "link_6"), {"file": str(tmp_path / f"{ROBOT}.yaml")}, {}),
     ):
         results = trajectory(changed(study, entry | more, trajectory=quick | settings), ROBOT)
         verdict = results.summary.verdict
         assert verdict.status == ("caution" if subject else "fail"), subject
-        assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
+        assert [(each.reason, each.names) for each in missing(verdict)] == ([(subject, names)] if subject else [])
         if subject:
             assert subjects(results)[subject].names == names
-            assert left_out_text(verdict.missed[0]) in say_all(verdict.findings)
+            assert gap_text(missing(verdict)[0]) in say_all(verdict.findings)
 
 
 def test_rates_that_do_not_go_together_in_a_trajectory_of_ros_are_no_pass(study, tmp_path):
@@ -188,7 +176,9 @@ def test_rates_that_do_not_go_together_in_a_trajectory_of_ros_are_no_pass(study,
         (tmp_path / "paths.yaml").write_text(json.dumps({"kind": "paths", "paths": [path]}))
         results = trajectory(changed(study, {"paths": str(tmp_path / "paths.yaml")}), ROBOT)
         verdict = results.summary.verdict
-        assert [each.names for each in verdict.missed if each.subject == "given_rates"] == ([named] if named else [])
+        assert [each.names for each in missing(verdict) if each.reason == "rates_contradict"] == (
+            [named] if named else []
+        )
         assert verdict.status == ("caution" if named else "pass")
         speed = results.summary.paths[0].max_joint_speed_deg_s[0]
         assert speed == pytest.approx(np.degrees(0.05 if named else 0.075), rel=1e-12)
@@ -207,7 +197,7 @@ def test_rows_that_a_table_passes_beside_though_nobody_asked_for_it_are_no_pass(
     (found,) = results.summary.paths
     assert found.verdict == "safe"
     assert found.corner_deviation_deg == pytest.approx(3 / 8 * (blend or 10))
-    missed = [each.names for each in results.summary.verdict.missed if each.subject == "missed_rows"]
+    missed = [each.names for each in missing(results.summary.verdict) if each.reason == "points_missed"]
     assert missed == ([] if blend else [("back: 3.75 deg",)])
     assert results.summary.verdict.status == ("pass" if blend else "caution")
     krl = [text for language, text in zip(results.programs.language, results.programs.text) if language == "krl"]
@@ -246,32 +236,6 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
     assert "nothing else is given to be judged" in say_all(verdict.findings)
 
 
-def test_programs_name_their_lines_and_starts(study, tmp_path):
-    text = "def a():\n  movej([0, -0.2, -0.2, 0, -1.2, 0])\nend\ndef b():\n  movej([0, -0.3, -0.2, 0, -1.2, 0])\nend\n"
-    (tmp_path / "a.script").write_text(text)
-    listed = {"kind": "programs", "programs": [{"name": "job", "title": "Job", "file": str(tmp_path / "a.script")}]}
-    (tmp_path / "programs.yaml").write_text(json.dumps(listed))
-    results = programs(changed(study, {"programs": str(tmp_path / "programs.yaml")}), ROBOT)
-    found = subjects(results)
-    assert found["program_lines"].names == ("job: 2, 5",)
-    assert found["program_starts"].names == ("job",)
-    assert {"controller_ramps", "torques", "shallow_overlaps", "own_accelerations"} <= found.keys()
-    assert results.summary.verdict.status == "caution"
-
-
-def test_free_space_names_its_samples(study, tmp_path):
-    quick = {"samples": 1000, "cells_across": 4, "rounds": 0, "scene": None}
-    results = collision(changed(study, {"paths": one_path(tmp_path)}, collision=quick), ROBOT)
-    found = subjects(results)
-    assert [each.subject for each in results.summary.verdict.missed] == ["obstacles"]
-    assert results.summary.verdict.status == "caution"
-    assert found["joint_vectors"].amount == 1000
-    places = results.summary.places
-    assert places.reached == places.clear
-    assert "lost_cells" not in found
-    assert found["joined_pairs"].names
-
-
 def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
     """One random joint vector of no collision: no place is shown to be reached from home."""
     few = {"samples": 1, "cells_across": 4, "rounds": 0, "neighbours": 1}
@@ -279,19 +243,6 @@ def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
     assert summary.places.clear == 1
     assert summary.places.joined == 0
     assert summary.verdict.status == "caution"
-
-
-def test_free_space_names_targets_and_paths_without_clearance(study, tmp_path):
-    quick = {"samples": 1000, "cells_across": 4, "rounds": 0, "neighbours": 1}
-    targets = {"kind": "targets", "targets": [{"name": "far", "xyz_mm": [9000, 0, 0], "rpy_deg": [0, 0, 0]}]}
-    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
-    entry = {"paths": one_path(tmp_path), "targets": str(tmp_path / "targets.yaml")}
-    results = collision(changed(study, entry, collision=quick), ROBOT)
-    found, places = subjects(results), results.summary.places
-    assert found["targets"].names == ("far",)
-    assert found["within_cells"].amount == pytest.approx(1000 * places.cell_m)
-    assert found["lost_cells"].amount == places.reached - places.clear
-    assert found["unjoined_cells"].amount == places.clear - places.joined
 
 
 def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path):
@@ -331,7 +282,7 @@ def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, 
     near = near_singular(study.trajectory)
     task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
     motions = [*listed_motions(tmp_path / "paths.yaml", task, near, 5)]
-    left_out = {each.subject: each.names for each in by_subject(rest for each in motions for rest in each.left_out)}
+    left_out = {each.reason: each.names for each in by_reason(rest for each in motions for rest in each.open)}
     assert left_out.get("program_rest", ()) == ((f"job: {lines}",) if lines else ())
 
 
@@ -371,7 +322,6 @@ def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     summary = results.summary
     named = subjects(results)["program_findings"].names
     assert any(each.startswith(f"job: {code} (") and str(line) in each for each in named)
-    assert "program_findings" in NEVER_A_PASS
     doubtful = [
         each for each in summary.paths if (line, code) in {(at.line, at.finding.code) for at in each.of_program}
     ]
@@ -379,7 +329,7 @@ def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     assert {each.name for each in doubtful} <= set(summary.verdict.finding.of_program)
     assert all(each.verdict == "safe" for each in summary.paths), "only the program is in doubt"
     assert summary.verdict.status == "caution"
-    assert code in say(NoPass(summary.verdict.missed))
+    assert code in say(NotChecked(summary.verdict.missed))
     assert {name: fault.status for name, fault in ((each.name, each) for each in faults(results))} == {
         each: "caution" for each in summary.verdict.finding.of_program
     }
@@ -428,7 +378,7 @@ def test_a_program_that_no_path_can_be_made_of_leaves_the_others(study, tmp_path
         "then": "the path 'tool' does not reach its end",
     }
     assert results.summary.verdict.status == "caution"
-    assert set(subjects(results)["paths"].names) == {f"{name}: {why}" for name, why in lost.items()}
+    assert set(subjects(results)["not_followed"].names) == {f"{name}: {why}" for name, why in lost.items()}
 
 
 def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
@@ -443,14 +393,14 @@ def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
     ball = Envelope(5, point, point, 0.01)  # about the tool's point, until joint 6 turns
     for arm, scene, subject, names in (
         (robot, Scene("a", part, (), (links,)), "allowed_contacts", ("link_2/link_6",)),
-        (robot, Scene("a", (), part), "obstacles", ()),
+        (robot, Scene("a", (), part), "no_scene", ()),
         (robot.replace(tool=tool), Scene("a", part), "bare_tool", ("tool",)),
         (aside.replace(envelopes=(*robot.envelopes, ball)), Scene("a", part), "bare_tool", ("tool",)),
     ):
-        found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, scene), scene)}
+        found = {each.reason: each.names for each in open_points(arm, scene)}
         assert found[subject] == names
     held = Scene("a", (), part)
-    assert "bare_tool" not in {each.subject for each in left_out_of_collisions(robot, bodies_of(robot, held), held)}
+    assert "bare_tool" not in {each.reason for each in open_points(robot, held)}
 
 
 @pytest.mark.parametrize(
@@ -472,8 +422,8 @@ def test_what_is_carried_has_to_reach_from_the_last_link_to_the_tools_tip(solids
     carried = [Box(n, transform(np.array([beside, 0, z]), np.zeros(3)), sizes[n]) for n, z in solids]
     scene = Scene("Carried", (), tuple(carried))
     assert has_bare_tool(robot, scene) is bare
-    found = left_out_of_collisions(robot, bodies_of(robot, scene), scene)
-    assert (LeftOut("bare_tool", ("tool",)) in found) is bare
+    found = open_points(robot, scene)
+    assert (Open("bare_tool", ("tool",)) in found) is bare
 
 
 def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
@@ -567,7 +517,7 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
             study.section(DynamicsSettings)
         if stage == "vision":
             load_vision(files["vision"], robot)
-        return Results(Summary(Verdict("pass", NoPass(())), ()))
+        return Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
 
     written = []
     monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
@@ -576,7 +526,7 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
     (verdict,) = [each.summary.verdict for each in written]
     expected = place and not confirmed
     assert verdict.status == ("caution" if expected else "pass")
-    named = [name.rpartition("/")[2] for missed in verdict.missed for name in missed.names]
+    named = [name.rpartition("/")[2] for missed in missing(verdict) for name in missed.names]
     assert named == ([place] if expected else [])
     assert not expected or place in say_all(verdict.findings)
     settled = {"units_checked"} & read.computed_from(ROBOT, stage).keys()
@@ -591,13 +541,13 @@ def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, statu
     study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
     written = []
-    passing = Results(Summary(Verdict("pass", NoPass(())), ()))
+    passing = Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
     monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary.verdict))
     for stage in ("trajectory", "validation"):
         monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
         run.compute(stage, Study.model_validate(study), ROBOT, tmp_path)
     assert [verdict.status for verdict in written] == [status, "pass"]
-    assert [each.names for each in written[0].missed] == [(content["limits"]["source"],)] * (status == "caution")
+    assert [each.names for each in missing(written[0])] == [(content["limits"]["source"],)] * (status == "caution")
 
 
 def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
@@ -613,62 +563,13 @@ def test_a_target_near_assumed_shapes_is_a_caution(study, tmp_path):
         assert verdict.status == ("caution" if near else "pass")
 
 
-def test_targets_name_what_rests_on_samples_rules_and_obstacles(study, tmp_path):
-    """The one target lies inside a table that no scene holds."""
-    targets = {"kind": "targets", "targets": [{"name": "a", "q_deg": [0, -10, -10, 0, -70, 0]}]}
-    (tmp_path / "targets.yaml").write_text(yaml.safe_dump(targets))
-    few = {"round_trips": 3, "mix": {"time": 1}, "scene": None}
-    results = inverse(changed(study, {"targets": str(tmp_path / "targets.yaml")}, inverse=few), ROBOT)
-    found = subjects(results)
-    assert found["round_trips"].amount == 3
-    assert ("rules" in found) == (not np.isfinite(study.robot(ROBOT).speed).all())
-    assert {"obstacles", "carried", "ways_between", "bare_links", "tool"} <= found.keys()
-    assert "shallow_overlaps" not in found
-    assert results.summary.verdict.status == "caution"
-    assert [each.subject for each in results.summary.verdict.missed] == ["obstacles"]
-
-
-def test_validation_names_what_no_reference_states(study, tmp_path):
-    """A table whose speeds and limits nobody can judge."""
-    content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8")) | {"references": []}
-    (tmp_path / f"{ROBOT}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
-    few = {"round_trips": 400, "reach_starts": 2}
-    results = validation(changed(study, {"file": str(tmp_path / f"{ROBOT}.yaml")}, validation=few), ROBOT)
-    found = subjects(results)
-    assert results.summary.verdict.status == "no_reference"
-    assert found["references"].names == tuple(GROUPS)
-    assert found["table_entries"].names == ()
-    assert found["round_trips"].amount == 400
-    assert found["near_singular_poses"].amount == results.summary.round_trips.near_singular > 0
-    assert found["reach_starts"].amount == 2
-    assert {"more_faults", "the_arm_itself"} <= found.keys()
-    assert {"diagnosis", "tool_and_base", "conflicting_references"}.isdisjoint(found)
-    tilted = {"xyz_mm": [0.0, 0.0, 500.0], "rpy_deg": [0.0, 20.0, 0.0]}
-    for key in ("tool", "base"):
-        entry = {"file": str(tmp_path / f"{ROBOT}.yaml"), key: Placement(**tilted)}
-        found = subjects(validation(changed(study, entry, validation={"round_trips": 5, "reach_starts": 2}), ROBOT))
-        assert found["tool_and_base"].names == (key,)
-
-
-@pytest.mark.long
-def test_validation_of_seven_joints_names_what_diagnosis_leaves_out(study):
-    few = {"round_trips": 5, "reach_starts": 2}
-    seven = {"targets": "data/targets/lbr_iiwa_14.yaml", "paths": "data/paths/lbr_iiwa_14.yaml"}
-    entry = study.robots[ROBOT].model_copy(update=seven)
-    made = study.model_copy(
-        update={"robots": {"lbr_iiwa_14": entry}, "validation": study.validation.model_copy(update=few)}
-    )
-    found = subjects(validation(made, "lbr_iiwa_14"))
-    assert "diagnosis" not in found
-    assert "more_faults" in found
-
-
 @pytest.mark.parametrize("width", [0.1, 0.2])
 def test_a_proof_that_leaves_much_undecided_names_hidden_voids(study, width):
     proven = SimpleNamespace(proof=SimpleNamespace(bounds=(0.5, 1.0), width=width))
-    tool = SimpleNamespace(capability=CapabilityMissing("a reason"), placement=None)
-    left_out = STAGES["workspace"].module("compute")._left_out(study.workspace, proven, tool)
-    assert ("hidden_voids" in {each.subject for each in left_out}) == (width == 0.2)
+    seen = SimpleNamespace(asked={"self_collision": (8, 8)}, gaps=())
+    checked = {each.check: each for each in STAGES["workspace"].module("compute")._checked((6, 6), proven, seen, ())}
+    assert checked["reach"].complete == (width == 0.1)
+    assert checked["reach"].covered == (80 if width == 0.2 else 100)
 
 
 @pytest.mark.long
@@ -685,7 +586,7 @@ def test_a_proof_cut_short_takes_no_hole_for_the_shoulders(study):
     assert verdicts[2000].finding.code == "workspace.void_unexpected"
     assert verdicts[2000].missed == ()
     assert verdicts[10].status == "caution"
-    assert [each.subject for each in verdicts[10].missed] == ["hidden_voids"]
+    assert [each.reason for each in missing(verdicts[10])] == ["undecided_cells"]
 
 
 SOLIDS = {
@@ -702,8 +603,8 @@ def test_a_place_in_a_solid_is_named_but_not_one_that_stands_on_it(tmp_path, kin
     """All four end 15 mm above their middle; what is sunk by less than it may be, or by 1 mm, stands on it."""
     (tmp_path / "scene.yaml").write_text(yaml.safe_dump({"kind": "scene", "title": "a", kind: SOLIDS[kind]}))
     point = np.array([0.0, 0.0, height / 1000])
-    found = left_out_in_solids(load_scene(tmp_path / "scene.yaml"), [("here", point, sunk / 1000)])
-    assert found == ((LeftOut("places_in_solids", ("here: solid",)),) if inside else ())
+    found = gaps_in_solids(load_scene(tmp_path / "scene.yaml"), [("here", point, sunk / 1000)])
+    assert found == ((Open("inside_solid", ("here: solid",)),) if inside else ())
 
 
 def test_a_place_in_a_piece_of_a_mesh_is_named():
@@ -714,8 +615,8 @@ def test_a_place_in_a_piece_of_a_mesh_is_named():
         ("beside", np.array([0.25, 0, 0]), 0.0),
         ("margin", np.array([0, 0, 0.12]), 0.0),
     ]
-    assert left_out_in_solids(scene, places) == (LeftOut("places_in_solids", ("in: bin",)),)
-    assert left_out_in_solids(None, places) == ()
+    assert gaps_in_solids(scene, places) == (Open("inside_solid", ("in: bin",)),)
+    assert gaps_in_solids(None, places) == ()
 
 
 @pytest.mark.long
@@ -736,13 +637,13 @@ def test_a_target_in_a_solid_is_no_pass(study, tmp_path):
         scene = {"kind": "scene", "title": "a", "spheres": [ball], "carried": held}
         (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene))
         verdict = inverse(changed(study, entry, inverse=few), ROBOT).summary.verdict
-        assert [(each.subject, each.names) for each in verdict.missed] == [("places_in_solids", named)] * bool(named)
+        assert [(each.reason, each.names) for each in missing(verdict)] == [("inside_solid", named)] * bool(named)
         assert verdict.status == ("caution" if named else "pass")
-        said = "they lie inside solids on which they don't stand (a: part)" in say_all(verdict.findings)
+        said = "places inside solids (a: part)" in say_all(verdict.findings)
         assert said == bool(named)
         quick = {"samples": 200, "cells_across": 4, "scene": str(tmp_path / "scene.yaml")}
         clear = collision(changed(study, entry | {"paths": one_path(tmp_path)}, collision=quick), ROBOT)
-        assert ("places_in_solids" in subjects(clear)) == bool(named)
+        assert ("inside_solid" in subjects(clear)) == bool(named)
 
 
 def test_a_box_that_would_be_in_a_solid_is_named_but_not_on_its_stand():
@@ -775,7 +676,7 @@ def test_an_object_in_a_solid_is_no_grasp_that_passes(study, tmp_path):
         place = can.xyz_mm
         assert can.outcome == "grasped"
         assert summary.verdict.status == ("caution" if named else "pass")
-        assert [(each.subject, each.names) for each in summary.verdict.missed] == [("places_in_solids", named)] * bool(
+        assert [(each.reason, each.names) for each in missing(summary.verdict)] == [("inside_solid", named)] * bool(
             named
         )
 
@@ -792,24 +693,21 @@ def test_a_grasp_passes_by_no_object_out_of_view_and_no_arm_without_errors(study
     own = {"vision": str(tmp_path / "vision.yaml"), "scene": str(tmp_path / "scene.yaml")}
     for subject, names, more in (
         (None, (), {}),
-        ("objects_out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
-        ("objects_out_of_view", ("can",), {"view": content["view"] | {"farthest_mm": 900}}),
+        ("out_of_view", ("can",), {"view": content["view"] | {"horizontal_deg": 5}}),
+        ("out_of_view", ("can",), {"view": content["view"] | {"farthest_mm": 900}}),
         ("arm_errors", (), {"arm": {"source": "none", "repeatability_mm": 0.02}}),
         ("arm_errors", (), {"arm": content["arm"] | {"table_angle_standard_deviation_deg": 0.0}}),
     ):
         (tmp_path / "vision.yaml").write_text(yaml.safe_dump(content | more), encoding="utf-8")
         verdict = vision(changed(study, own), ROBOT).summary.verdict
         assert verdict.status == ("caution" if subject else "pass"), more
-        assert [(each.subject, each.names) for each in verdict.missed] == ([(subject, names)] if subject else [])
+        assert [(each.reason, each.names) for each in missing(verdict)] == ([(subject, names)] if subject else [])
     rows = (tmp_path / "fixed_camera.csv").read_text(encoding="utf-8").splitlines()
     again = "again" + rows[-1][rows[-1].index(",") :]
     (tmp_path / "fixed_camera.csv").write_text("\n".join([*rows, again, ""]), encoding="utf-8")
     summary = vision(changed(study, {"vision": str(tmp_path / "vision.yaml")}), ROBOT).summary
-    assert "carried" in [each.subject for each in summary.verdict.missed]
-    left = {each.subject: each.names for each in summary.not_examined}
-    assert left["left_out_samples"] == ("pose_12",)
-    assert left["copied_samples"] == ("again",)
-    assert left["joint_zeros"] == ("J1", "J6")
+    assert "gripper" in [each.reason for each in missing(summary.verdict)]
+    assert {each.reason: each.names for each in summary.assumed}["joint_zeros"] == ("J1", "J6")
     assert summary.verdict.finding.left_out == ("pose_12", "again")
 
 
@@ -833,9 +731,9 @@ def by_poses(folder: Path, name: str, robot: Robot, **more) -> None:
     ("name", "camera", "more", "subject"),
     [
         ("er3_600", "carried_camera", {}, None),
-        ("er3_600", "carried_camera", {"simulated": None}, "flange_poses"),
+        ("er3_600", "carried_camera", {"simulated": None}, "flange_frame"),
         ("er3a_c60", "fixed_camera", {"simulated": None}, None),
-        ("er3a_c60", "fixed_camera", {"simulated": None, "touched": None}, "base_poses"),
+        ("er3a_c60", "fixed_camera", {"simulated": None, "touched": None}, "base_frame"),
     ],
 )
 def test_recorded_poses_that_no_joint_values_confirm_are_no_pass(study, tmp_path, name, camera, more, subject):
@@ -848,38 +746,10 @@ def test_recorded_poses_that_no_joint_values_confirm_are_no_pass(study, tmp_path
     results = vision(study.model_copy(update={"robots": {name: entry}}), name)
     verdict = results.summary.verdict
     assert verdict.status == "caution"  # no gripper has a shape
-    missed = [each.subject for each in verdict.missed if each.subject != "carried"]
-    assert missed == (["open_intrinsics", subject] if subject else [])
+    missed = [each.reason for each in missing(verdict) if each.reason != "gripper"]
+    assert missed == (["intrinsics", subject] if subject else [])
     krl = [text for file, text in zip(results.programs.file, results.programs.text) if file.endswith(".src")]
     assert ["no joint values tell" in text for text in krl] == [bool(subject)]
-
-
-def test_what_no_verdict_passes_without_turns_it_and_is_said():
-    """Whatever a stage computes, its summary makes no pass of it; obstacles turn no reach and no torque.
-
-    A grasp needs the gripper's shape, and torques the load of the program that they are of.
-    """
-    import er3a.pipeline.messages.collision  # noqa: F401
-
-    own = {
-        "workspace": NEVER_A_PASS - {"obstacles"},
-        "dynamics": NEVER_A_PASS - {"obstacles"} | {"program_loads"},
-        "vision": NEVER_A_PASS | {"carried"},
-    }
-    for stage in STAGES.values():
-        decisive = summary_type(stage.module("model").RESULTS).decisive
-        assert decisive == own.get(stage.name, NEVER_A_PASS)
-    for subject in LeftOutSubject.__args__:
-        for status in ("pass", "caution", "fail", "no_reference"):
-            verdict = Summary(
-                Verdict(status, FreeSpace(0.5, 1, 1, 1, 0)), (), not_examined=(LeftOut(subject, amount=3.0),)
-            ).verdict
-            assert verdict.status == ("caution" if status == "pass" and subject in NEVER_A_PASS else status)
-            assert ("no pass" in say_all(verdict.findings)) == (subject in NEVER_A_PASS)
-        if subject in NEVER_A_PASS:  # programs say it too, as who gets one may never see a page
-            assert program_head(None, [LeftOut(subject, amount=3.0)])[-1].startswith("not checked: ")
-    many = LeftOut("allowed_contacts", tuple(f"link_{k}/table" for k in range(9)))
-    assert say(NoPass((many,))).endswith("link_5/table, 3 more).")
 
 
 @pytest.mark.parametrize(("link", "reaches_out"), [(2, True), (3, False), (4, True), (5, False), (6, True)])
@@ -915,7 +785,7 @@ def test_a_shape_that_covers_a_small_part_of_its_link_is_no_pass(link, end, shar
             envelopes=(*capsules, own), sources={**robot.sources, **(official if grade == "official" else {})}
         )
         shapes, few = arm_shapes(arm), length == "part" and link != 6
-        found = {each.subject: each for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
+        found = {each.reason: each for each in open_points(arm, None)}
         assumed = shapes_assumed(arm, ASSUMED_MARGIN, {})
         covered, table = covered_lengths(arm, shapes, link)
         assert covered / table == pytest.approx(1.0 if length == "whole" else share, abs=0.011)
@@ -924,9 +794,11 @@ def test_a_shape_that_covers_a_small_part_of_its_link_is_no_pass(link, end, shar
         if few:
             left = found["partial_links"]
             assert left.names == (f"{link_label(link)}: {100 * covered / table:.0f} %",)
-            assert "along less than 75 % of their lengths" in left_out_text(left)
+            assert "cover less than 75 % of their length" in gap_text(left)
             assert ("cover some links only in part" in say(assumed)) == (grade == "official")
-            summary = Summary(Verdict("pass", FreeSpace(0.5, 1, 1, 1, 0)), (), not_examined=(left,))
+            summary = Summary(
+                Verdict("pass", FreeSpace(0.5, 1, 1, 1, 0)), (), checked=coverages({"self_collision": 8}, [left])
+            )
             assert summary.verdict.status == "caution"
 
 
@@ -962,19 +834,8 @@ def test_an_allowed_pair_that_overlaps_in_few_poses_hides_something():
     (pair,) = [k for k, each in enumerate(plain.pairs) if each.label == "link_1/link_2"]
     assert not plain.overlaps(q)[:, pair].any()
     allowing = arm.replace(pair_rules=(PairRule("link_1", "link_2", "allow", "a test"),))
-    found = {each.subject: each.names for each in left_out_of_collisions(allowing, bodies_of(allowing, None), None)}
+    found = {each.reason: each.names for each in open_points(allowing, None)}
     assert found["allowed_contacts"] == ("link_1/link_2",)
-
-
-def test_bodies_that_a_joint_holds_are_named_where_others_of_their_links_meet():
-    arm = Robot.from_dh([0.3], [0.0], [0.0])
-    shapes = (Envelope(0, (0, 0, -0.1), (0, 0, 0), 0.05), Envelope(0, (0.25, 0, 0), (0.25, 0, 0), 0.02))
-    arm = arm.replace(envelopes=(*shapes, Envelope(1, (0, 0, 0), (0.3, 0, 0), 0.05)))
-    (row,) = collision_matrix(arm).rows
-    assert (row.state, row.left_out > 0) == ("joined", True)
-    assert bodies_of(arm, None).pairs  # the rest is checked
-    found = {each.subject: each.names for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
-    assert found["joined_pairs"] == ("base/link_1",)
 
 
 def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
@@ -984,10 +845,9 @@ def test_orientations_that_an_arm_of_few_joints_leaves_off_are_named():
     T = forward(scara, q)
     tilted = T[1] @ transform(np.zeros(3), np.array([np.radians(30), 0, 0]))
     asked = [("own", T[0], q[0]), ("tilted", tilted, q[1])]
-    (found,) = left_out_of_orientations(scara, asked)
-    assert found == LeftOut("orientations", ("tilted",), pytest.approx(30))
-    assert left_out_of_orientations(scara, asked[:1]) == ()
-    assert "orientations" in NEVER_A_PASS
+    (found,) = gaps_of_orientations(scara, asked)
+    assert found == Open("tool_turned", ("tilted",), pytest.approx(30))
+    assert gaps_of_orientations(scara, asked[:1]) == ()
 
 
 @pytest.mark.long
@@ -1008,8 +868,9 @@ def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkey
         Path("data/paths/scara.yaml").write_text(json.dumps({"kind": "paths", "paths": [line]}), encoding="utf-8")
         summary = trajectory(written, "scara").summary
         assert [path.verdict for path in summary.paths] == ["safe"]
-        assert [each.names for each in summary.not_examined if each.subject == "orientations"] == [named] * bool(named)
-        assert ("orientations" in {each.subject for each in summary.verdict.missed}) == bool(named)
+        assert [each.names for each in missing(summary.verdict) if each.reason == "tool_turned"] == [named] * bool(
+            named
+        )
 
 
 def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
@@ -1021,12 +882,11 @@ def test_what_the_robots_file_allows_and_where_the_base_stands_is_named():
     places = ((0, 0, 0.1), (0.09, 0, 0.1), (0.4, 0, 0.1))
     balls = [Sphere(name, transform(np.array(p), np.zeros(3)), 0.05) for name, p in zip("abc", places)]
     scene = Scene("Balls", tuple(balls))
-    found = {each.subject: each.names for each in left_out_of_collisions(robot, bodies_of(robot, scene), scene)}
-    assert (found["allowed_contacts"], found["allowed_pairs"]) == (("base/link_6", "link_2/link_4"), ("link_1/link_2",))
+    found = {each.reason: each.names for each in open_points(robot, scene)}
+    assert found["allowed_contacts"] == ("base/link_6", "link_2/link_4")
     assert (found["base_inside"], found["base_contacts"]) == (("a",), ("b",))
     guessed = load_robot("er3a_c60_article")  # it allows two pairs of guessed shapes that can't be right
-    subjects = {each.subject: each.names for each in left_out_of_collisions(guessed, bodies_of(guessed, None), None)}
-    assert subjects["allowed_pairs"] == ("base/link_2", "link_2/link_4")
+    subjects = {each.reason: each.names for each in open_points(guessed, None)}
     assert "allowed_contacts" not in subjects
 
 
@@ -1060,22 +920,22 @@ def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypa
     study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
     written = []
-    passing = Results(Summary(Verdict("pass", NoPass(())), ()))
+    passing = Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
     monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
     monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
     run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
     assert written[0].verdict.status == "pass"
-    assert [(each.subject, each.names) for each in written[0].not_examined] == [("own_values", named)]
+    assert [(each.reason, each.names) for each in written[0].assumed] == [("own_values", named)]
 
 
 @pytest.mark.parametrize(
     ("arm", "given", "status", "named"),
     [
-        (ROBOT, {}, "caution", (LeftOut("half_turns", ("turn: 1",)), LeftOut("start_branches", ("turn",)))),
+        (ROBOT, {}, "caution", (Open("half_turns", ("turn: 1",)), Open("start_branches", ("turn",)))),
         (ROBOT, {"half_turn_axis": [0, 0, 1], "start_branch": "front, elbow up, flip"}, "pass", ()),
         (
             *("lbr_iiwa_14", {"half_turn_axis": [0, 0, 1]}, "pass"),
-            (LeftOut("start_branches", ("turn",)), LeftOut("arm_angles", ("turn",))),
+            (Open("start_branches", ("turn",)), Open("arm_angles", ("turn",))),
         ),
     ],
 )
@@ -1087,8 +947,8 @@ def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
     robot, settings = load_robot(arm), load_study("config/small.yaml").trajectory
     task = planning_of(robot, settings, None, 0)
     (listed,) = listed_motions(tmp_path / "paths.yaml", task, near_singular(settings), 1)
-    assert tuple(listed.left_out) == named
-    summary = Summary(Verdict("pass", NoPass(())), (), not_examined=listed.left_out)
+    assert tuple(listed.open) == named
+    summary = Summary(Verdict("pass", NotChecked(())), (), checked=coverages({"reach": 1}, listed.gaps))
     assert summary.verdict.status == status
 
 
@@ -1105,126 +965,67 @@ def test_a_link_that_looks_larger_than_its_shapes_is_named(link, farthest, reach
     guessed = seen.replace(envelopes=(), sources={})
     assert (link in arm_shapes(guessed).uncovered) == reaches_out
     for arm in (robot, seen):  # equal, but for what they look like
-        subjects = {each.subject for each in left_out_of_collisions(arm, bodies_of(arm, None), None)}
+        subjects = {each.reason for each in open_points(arm, None)}
         assert ("uncovered_links" in subjects) == (arm is seen and reaches_out)
     longer = robot.replace(flange=transform(np.array([0, 0, 0.1]), np.zeros(3)), tool=np.eye(4))
     assert has_bare_tool(longer)
     assert not has_bare_tool(robot)
-    assert LeftOut("bare_tool", ("flange",)) in left_out_of_collisions(longer, bodies_of(longer, None), None)
-
-
-@pytest.mark.long
-def test_workspace_names_what_samples_and_budgets_leave_open(study):
-    small = {"samples": 3000, "blocks": 1, "cells_across": 8, "proof_cells": 50}
-    little = {"directions": 12, "scene": None, "placement": BoxTask(cone_deg=5)}
-    results = workspace(changed(study, workspace=small, capability=little), ROBOT)
-    found, summary = subjects(results), results.summary
-    assert found["joint_vectors"].amount == 3000
-    volume = summary.volume_m3
-    assert found["undecided_volume"].amount == pytest.approx(1000 * (volume.upper - volume.lower))
-    assert found["tool_directions"].amount == 12
-    assert {"obstacles", "colliding_reach", "carried", "tool"} <= found.keys()
-    placed = summary.placement
-    assert found["sampled_places"].amount == placed.fitting
-    assert found["between_places"].amount == pytest.approx(1000 * max(placed.spacing_m))
-    assert summary.verdict.shapes is not None
-    assert placed.margin_mm == summary.verdict.shapes.margin_mm == 1000 * ASSUMED_MARGIN
-    assert placed.places
-    assert all(
-        place.clearance_mm >= placed.margin_mm for place in placed.places
-    )  # by distances in full, at all that was asked
+    assert Open("bare_tool", ("flange",)) in open_points(longer, None)
 
 
 def test_grasps_are_refused_where_arms_without_branches_are_near_singular(study):
     assert study.vision.least_singular_value == MIN_SINGULAR_VALUE
 
 
-def test_names_are_words():
-    import er3a.pipeline.messages.inverse
-    import er3a.pipeline.messages.trajectory
-    import er3a.pipeline.messages.validation  # noqa: F401
+@given(
+    status=st.sampled_from(["pass", "caution", "fail", "no_reference"]),
+    parts=st.lists(st.tuples(st.sampled_from(CHECKS), st.integers(0, 3), st.integers(0, 3)), unique_by=lambda p: p[0]),
+    reasons=st.lists(st.sampled_from(sorted(GAPS)), max_size=2),
+    needs=st.sets(st.sampled_from(CHECKS), max_size=3),
+)
+def test_a_verdict_passes_only_if_each_check_is_made_and_covers_all(status, parts, reasons, needs):
+    """Whatever a stage computes: a check that is not made, or not of all, leaves no pass."""
 
-    assert left_out_names(LeftOut("references", ("zero_pose", "speeds"))) == "zero pose, speeds"
-    assert left_out_names(LeftOut("strategies", ("slow",))) == "slow down on the path"
-    assert left_out_names(LeftOut("paths", ("a_path",))) == "a_path"
+    class Asking(Summary):
+        needs = ()
 
-
-LEFT_OUT_BY_SETTINGS = {
-    "validation": {"round_trips": "round_trips", "reach_starts": "reach_starts"},
-    "workspace": {"samples": "joint_vectors", "proof_cells": "undecided_volume"},
-    "capability": {
-        "directions": "tool_directions",
-        "rolls": "tool_directions",
-        "scene": "obstacles",
-        "placement": "between_places",
-    },
-    "collision": {
-        "samples": "joint_vectors",
-        "cells_across": "within_cells",
-        "rounds": "lost_cells",
-        "neighbours": "unjoined_cells",
-        "scene": "obstacles",
-        "penetration_tolerance_mm": "shallow_overlaps",
-    },
-    "inverse": {"round_trips": "round_trips", "scene": "obstacles", "mix": "rules"},
-    "trajectory": {
-        "avoidance": "strategies",
-        "checks_per_sample": "path_stretches",
-        "assumed_speed_deg_s": "own_speeds",
-        "assumed_speed_mm_s": "own_speeds",
-        "acceleration_time_s": "own_accelerations",
-        "acceleration_deg_s2": "own_accelerations",
-        "jerk_deg_s3": "jerk",
-        "scene": "obstacles",
-        "penetration_tolerance_mm": "shallow_overlaps",
-    },
-    "dynamics": {
-        "gravity_m_s2": "other_gravity",
-        "samples": "torque_peaks",
-        "capsule_density_kg_m3": "link_masses",
-    },
-    "vision": {"scene": "obstacles"},
-    "programs": {"most_steps": "program_lines", "most_branches": "program_lines", "loop_rounds": "program_lines"},
-}
-LEAVE_NOTHING_OUT = {
-    "workspace": ("sampling", "blocks", "cells_across", "hull_directions", "cloud_points"),
-    "trajectory": (
-        *("near_wrist_deg", "near_elbow_deg", "near_shoulder_mm"),
-        *("assumed_margin_mm", "programs", "write_unsafe"),
-    ),
-    "dynamics": ("payload_centre_mm", "payload_gyration_mm"),
-    "vision": (
-        *("least_clearance_mm", "least_limit_margin_deg", "least_singular_value", "least_success"),
-        "line_speed_mm_s",
-    ),
-    "programs": ("tool_speed_mm_s", "tool_acceleration_mm_s2", "joint_speed_percent"),
-}
-"""Thresholds, what is drawn, and what verdicts and findings say of themselves."""
+    Asking.needs = tuple(sorted(needs))
+    asked = {check: (min(covered, of), of) for check, covered, of in parts}
+    summary = Asking(Verdict(status, FREE), (), checked=coverages(asked, map(Open, reasons)))
+    lost = {check for check, (covered, of) in asked.items() if covered < of}
+    lost |= {GAPS[reason] for reason in reasons} & asked.keys() | needs - asked.keys()
+    assert summary.verdict.status == ("caution" if status == "pass" and lost else status)
+    assert {each.check for each in summary.verdict.missed} == lost
 
 
-def test_every_setting_is_known_to_leave_something_out_or_nothing():
-    """A new setting has to be entered above, and what it leaves out in its stage's list."""
-    for stage in STAGES.values():
-        for key, model in stage.settings.items():
-            known = {*LEFT_OUT_BY_SETTINGS.get(key, ()), *LEAVE_NOTHING_OUT.get(key, ())}
-            assert set(model.model_fields) == known, f"the tables above say what settings of '{key}' leave out"
-    for found in LEFT_OUT_BY_SETTINGS.values():
-        assert set(found.values()) <= set(LeftOutSubject.__args__)
+def test_stages_make_the_checks_that_their_questions_need(small_study):
+    for file in sorted(small_study.glob("results/*/*/summary.json")):
+        stage = STAGES[file.parent.name]
+        summary = read_scope(file.parent, stage)
+        if summary.verdict.status != "not_computed":
+            checked = [each.check for each in summary.checked]
+            assert {*summary.needs, "units"} <= {*checked}
+            assert not any(gap.reason == "not_run" for each in summary.checked for gap in each.gaps)
+            assert len(checked) == len({*checked}) <= 12
 
 
-def test_the_table_closes_the_page_and_stands_in_the_summary(study, small_results, tmp_path):
-    folder = small_results("trajectory", ROBOT, study)
-    stored = read_results(folder, RESULTS)
-    listed = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["not_examined"]
-    assert [each["subject"] for each in listed] == [each.subject for each in stored.results.summary.not_examined]
+@pytest.mark.parametrize("lang", ["en", "zh"])
+def test_checks_gaps_and_assumptions_have_words(lang):
+    with language.using(lang):
+        texts = [gap_text(Open(reason, ("a",), 3.0)) for reason in GAPS]
+        texts += [assumed_text(Open(key.removeprefix("assumed."), (), 3.0)) for key in TEXTS if key[:8] == "assumed."]
+        texts += [check_name(check) for check in CHECKS] + [sentence(f"never.{stage}") for stage in STAGES]
+    assert all(texts)
+    assert all(len(text.split()) <= 26 for text in texts)
+    assert lang == "en" or not any(
+        re.search("[a-z]{6}", text.replace("units_checked", "")) for text in texts if "`" not in text
+    )
+
+
+def test_the_page_shows_what_was_checked_once(study, small_results, tmp_path):
+    stored = read_results(small_results("trajectory", ROBOT, study), RESULTS)
     report(study, stored, tmp_path / "page.html")
     body = (tmp_path / "page.html").read_text(encoding="utf-8")
-    table = body[body.rindex("<h2") : body.index("</main>")]
-    assert "What this verdict did not examine" in table
-    for each in stored.results.summary.not_examined:
-        assert left_out_text(each).split(",")[0].split("'")[0] in table
-
-
-def test_every_subject_has_words():
-    for subject in LeftOutSubject.__args__:
-        assert not left_out_text(LeftOut(subject, amount=3.0)).startswith("left_out")
+    table = body[body.index('id="checked"') : body.index("</main>")]
+    for each in stored.results.summary.checked:
+        assert table.count(f">{check_name(each.check)}<") == 1

@@ -1,0 +1,117 @@
+"""Orientations as files write them: the columns of each form, and their rotation matrices.
+
+``rpy_deg`` is R = Rz(yaw) Ry(pitch) Rx(roll), ``zyz_deg`` R = Rz(a) Ry(b) Rz(c), ``quaternion_wxyz`` has its real part
+first, ``matrix`` is written by rows. ``rotation_vector_rad`` (axis times angle) is used by OpenCV and by the pendants
+of Universal Robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+
+from er3a.errors import InputError
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, transform
+from er3a.numerics.arrays import Reals
+
+FORMS: dict[str, tuple[str, ...]] = {
+    "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
+    "zyz_deg": ("z1_deg", "y_deg", "z2_deg"),
+    "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
+    "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
+    "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
+}
+LONGEST_VECTOR = 2 * np.pi * 1.01
+
+
+def form_in(path: Path, header: Iterable[str], prefix: str = "") -> str | None:
+    """The form in which a table gives orientations.
+
+    Parameters
+    ----------
+    header : names of all columns
+    prefix : before the names of the form's columns, such as ``flange_``
+
+    Returns
+    -------
+    form : one of ``FORMS``; None if the table has no column of any
+
+    Raises
+    ------
+    InputError
+        for columns of two forms
+    """
+    present = set(header)
+    forms = [form for form, columns in FORMS.items() if any(prefix + name in present for name in columns)]
+    if len(forms) > 1:
+        problem = f"two forms of orientation, {forms[0]} and {forms[1]}"
+        raise InputError(path, "header", problem, f"Keep the columns of one{f' for {prefix}' if prefix else ''}")
+    return forms[0] if forms else None
+
+
+class NoRotationError(ValueError):
+    """Numbers that are no rotation: the ``row`` (from 0) of the first, what is wrong, and the remedy."""
+
+    def __init__(self, row: int, problem: str, remedy: str):
+        super().__init__(f"{problem} | {remedy}")
+        self.row, self.problem, self.remedy = row, problem, remedy
+
+
+def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) -> Reals:
+    """Rotation matrices of orientations in one form.
+
+    Parameters
+    ----------
+    form : one of ``FORMS``
+    values : (N, k), in the order of the form's columns: deg, rad for rotation vectors, else without unit
+    tolerance : by which a quaternion's length, and R R^T of a matrix, may differ from 1
+
+    Returns
+    -------
+    R : (N, 3, 3); of a matrix the nearest rotation, by its singular values
+
+    Raises
+    ------
+    NoRotationError
+        a quaternion without unit length, a skewed or mirrored matrix, a rotation vector of more than a turn
+    """
+    values = np.asarray(values, float)
+    if form == "rpy_deg":
+        return _turned(values)
+    if form == "zyz_deg":
+        first, second, third = (np.zeros_like(values) for _ in range(3))
+        first[:, 2], second[:, 1], third[:, 2] = values.T
+        return np.asarray(_turned(first) @ _turned(second) @ _turned(third))
+    if form == "rotation_vector_rad":
+        length = np.hypot.reduce(values, axis=1)
+        _refuse(length > LONGEST_VECTOR, "{:.4g} rad are more than a turn, and can only be degrees", length, "Convert")
+        return exp_rotation(values)
+    if form == "quaternion_wxyz":
+        length = np.hypot.reduce(values, axis=1)
+        wrong = ~(np.abs(length - 1) <= tolerance)
+        _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
+        return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())
+    R = values.reshape(-1, 3, 3)
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ R.mT - np.eye(3)).max(axis=(1, 2))
+    remedy = f"Its rows must be orthonormal to {tolerance:g}; write more digits"
+    _refuse(~(off <= tolerance), "the matrix is not a rotation: R R^T differs from 1 by {:.3g}", off, remedy)
+    mirrored = np.linalg.det(R)
+    _refuse(mirrored < 0, "the matrix is left-handed (its determinant is {:.0f})", mirrored, "Change one axis's sign")
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)
+
+
+def _turned(rpy_deg: Reals) -> Reals:
+    turned: Reals = transform(np.zeros_like(rpy_deg), np.radians(rpy_deg))[:, :3, :3]
+    return turned
+
+
+def _refuse(wrong: Any, problem: str, values: Reals, remedy: str) -> None:
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise NoRotationError(row, problem.format(values[row]), remedy)
