@@ -190,19 +190,15 @@ def lines_of(checked: CheckedFile, every: bool = False, verdicts: bool = False) 
     return lines + ([_verdict_line(each) for each in checked.check.verdicts] if verdicts else [])
 
 
-def _is_question(each: LocatedFinding) -> bool:
-    """Whether an input answers a finding."""
-    return each.level == "caution" and isinstance(each.finding, NOT_FOLLOWED)
-
-
 def _causes(findings: Iterable[LocatedFinding]) -> list[list[LocatedFinding]]:
     """Findings above notes by their cause, the most important first."""
     rows: dict[tuple[Any, ...], list[LocatedFinding]] = defaultdict(list)
     for each in findings:
         if each.level != "note":
+            asked = each.level == "caution" and isinstance(each.finding, NOT_FOLLOWED)  # what an input answers
             parts = [getattr(each.finding, name, "") for name in ("reason", "joint", "type", "kind", "name")]
-            rows[each.place.file, each.level, each.finding.code, *map(str, parts)].append(each)
-    return sorted(rows.values(), key=lambda row: (not _is_question(row[0]), -RANKS[row[0].level]))
+            rows[not asked, -RANKS[each.level], each.place.file, each.finding.code, *map(str, parts)].append(each)
+    return [rows[key] for key in sorted(rows, key=lambda key: key[:2])]
 
 
 def _cause_line(row: list[LocatedFinding]) -> str:
@@ -295,8 +291,8 @@ def scope_line(checked: CheckedFile) -> str:
     parts += [f"{rest} with caution"] if rest else []
     nowhere = [each.line for each in check.verdicts if each.unreached]
     parts += [f"nothing leads to {len(nowhere)} more (lines {_line_ranges(nowhere)})"] if nowhere else []
-    missing = [NEEDED[each] for each in (*CHECKS, *NEEDED) if each not in check.checked and each in NEEDED]
-    parts += [f"not checked: {', '.join(dict.fromkeys(missing))}"] if missing else []
+    missing = [text for each, text in NEEDED.items() if each not in check.checked]
+    parts += [f"not checked: {', '.join(missing)}"] if missing else []
     return f"{shown(checked.file)}: {'; '.join(parts)}"
 
 
@@ -410,7 +406,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "level": each.level,
                 "complete": check.execution.complete,
                 "checked": list(check.checked),
-                "not_checked": each.lacks(dict.fromkeys((*CHECKS, *NEEDED))),
+                "not_checked": each.lacks((*CHECKS, *NEEDED)),
                 "gaps": [{"check": GAPS[one.reason], "reason": one.reason, "names": one.names} for one in each.missed],
                 "shapes_assumed": check.shapes is not None,
                 "cycle": plain(check.cycle),
@@ -418,7 +414,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "motions": [_verdict_record(one) for one in check.verdicts],
             }
         )
-    return found
+    return [finite(each) for each in found]
 
 
 def _place_record(place: Place) -> dict[str, Any]:
@@ -426,7 +422,7 @@ def _place_record(place: Place) -> dict[str, Any]:
 
 
 def _finding_record(each: LocatedFinding) -> dict[str, Any]:
-    params = {key: finite(value) for key, value in plain(each.finding).items() if key not in ("place", "code")}
+    params = {key: value for key, value in plain(each.finding).items() if key not in ("place", "code")}
     return {
         **_place_record(each.place),
         "level": each.level,
@@ -445,12 +441,18 @@ def finite(value: Any) -> Any:
 
     Parameters
     ----------
-    value : dicts, lists and plain values; a NaN or infinite number is replaced
+    value : dicts, lists and plain values; a NaN or infinite number is replaced, and a long text cut
+
+    Returns
+    -------
+    value : a copy
     """
     if isinstance(value, dict):
         return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list):
         return [finite(part) for part in value]
+    if isinstance(value, str):
+        return excerpt(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

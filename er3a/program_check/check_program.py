@@ -281,17 +281,18 @@ def _located(
     """All findings, like ones of an instruction grouped."""
     program, top = execution.program, Place(execution.program.file)
     found = [LocatedFinding(found_in.level_of(each), each, _place_of(each, top)) for each in program.findings]
+    named = {step.instruction.text for step in execution.steps if isinstance(step.instruction, Unknown)}
     for number, motion in motions.items():
         step = execution.steps[number]
-        found += [
-            LocatedFinding(motion.level_of(each), each, step.place, step.calls, 1, number, moment)
-            for each, moment in motion.findings.items()
-        ]
+        for finding, moment in motion.findings.items():
+            # What follows from an instruction that is named at its own line is no second question.
+            told = isinstance(finding, found_in.NotFollowed) and finding.text in named
+            level: found_in.Level = "note" if told else motion.level_of(finding)
+            found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     for step in execution.steps:
         if isinstance(what := step.instruction, Unknown):
-            text = (
-                NotUnderstood(what.text, step.place) if what.stops else found_in.NotFollowed(what.text, "instruction")
-            )
+            reason: found_in.NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
+            text = NotUnderstood(what.text, step.place) if what.stops else found_in.NotFollowed(what.text, reason)
             found.append(LocatedFinding("fail" if what.stops else "caution", text, step.place, step.calls))
     found += [
         LocatedFinding("caution", found_in.NotFollowed("", each.kind), each.place)

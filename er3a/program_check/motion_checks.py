@@ -14,7 +14,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.errors import PoseError
-from er3a.geometry.transforms import log_rotation, rotation_angle
+from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -23,8 +23,8 @@ from er3a.numerics.arrays import Reals, runs
 from er3a.planning import motion_faults
 from er3a.planning.timing import JointLimits
 from er3a.program_check import program_check_findings as found_in
-from er3a.program_check.continuation import continued
-from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate, arc_length, arc_poses
+from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
+from er3a.programs.solving import WIDE_STEP, joints_along, way_of
 from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
@@ -32,10 +32,8 @@ from er3a.robots.whole_turns import LIMIT_TOLERANCE
 TURN_LENGTH = 0.1  # m of the path, as long as which a turn of the tool by 1 rad counts
 POINTS_APART_M, POINTS_APART_RAD = 0.01, 0.05  # of the tool, or of a joint
 MIN_PARTS, MAX_PARTS = 8, 400
-WIDE_STEP = 0.15  # rad or m, of a joint between two points, beyond which there is one between them
 SHORTEST_PART = 1e-4  # of a way, in which a joint that moves by more jumps
 NO_WAY = 1e-9  # m or rad
-HALF_TURN = math.pi - 1e-5  # rad: a controller's rounding may turn the tool either way
 SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does not matter
 SAME_ARRIVAL = 1e-4  # rad
 OVER_SPEED = 1.001  # ratio; rates are those between points
@@ -335,39 +333,20 @@ def tool_path(
     path : up to where the arm can't follow any more. None if the tool does not move. A finding where the way is not
         followed: points that define no arc, a redundant arm, or a turn that could go either way.
     """
-    begin = forward(arm, start)
-    turn = log_rotation(end[:3, :3] @ begin[:3, :3].T)
-    turned = float(np.linalg.norm(turn))
-    length = float(np.linalg.norm(end[:3, 3] - begin[:3, 3])) if via is None else arc_length(begin, via, end)
-    if length is None:
-        return found_in.NotFollowed(motion.form, "not_understood")
+    way = way_of(forward(arm, start), via, end)
+    if way is None:
+        return found_in.NotFollowed(motion.form, "too_far" if via is None else "not_understood")
+    length, turned = way.length, way.turned
     if max(length, TURN_LENGTH * turned) < NO_WAY:
         return None
     if arm.joints > MOST_JOINTS:
         return found_in.NotFollowed(motion.form, "redundant")
-    if turned > HALF_TURN:
+    if way.half_turn:
         return found_in.NotFollowed(motion.form, "half_turn")
     if motion.with_path and turned > SLIGHT_TURN:
         return found_in.NotFollowed(motion.form, "turns_with_path")
-
-    def poses(share: Reals) -> Reals:
-        found = None if via is None else arc_poses(begin, via, end, share)
-        return _line_poses(begin, end, turn, share) if found is None else found
-
-    share, q, stop = _followed(arm, poses, start, _parts(length, turned))
+    share, q, stop = _followed(arm, way.poses, start, _parts(length, turned))
     return MotionPath(arm, tool_law(motion, length, turned, rules.assumed), share, q, length, turned, True, stop)
-
-
-def _line_poses(begin: Reals, end: Reals, turn: Reals, share: Reals) -> Reals:
-    """Poses (k, 4, 4) on a line, the tool turning about one axis of the base (Rodrigues' formula)."""
-    angle = float(np.linalg.norm(turn))
-    x, y, z = turn / angle if angle > 0 else turn
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(share * angle)[:, None, None], np.cos(share * angle)[:, None, None]
-    found = np.tile(np.eye(4), (len(share), 1, 1))
-    found[:, :3, :3] = (np.eye(3) + sine * K + (1 - cosine) * (K @ K)) @ begin[:3, :3]
-    found[:, :3, 3] = begin[:3, 3] + share[:, None] * (end[:3, 3] - begin[:3, 3])
-    return found
 
 
 def _followed(arm: Robot, poses: Poses, start: Reals, parts: int) -> tuple[Reals, Reals, float | None]:
@@ -375,7 +354,7 @@ def _followed(arm: Robot, poses: Poses, start: Reals, parts: int) -> tuple[Reals
     which it can't be followed."""
     share = np.linspace(0.0, 1.0, parts + 1)
     while True:
-        q = np.concatenate([start[None], continued(arm, poses(share[1:]), start)])
+        q = np.concatenate([start[None], joints_along(arm, poses(share[1:]), start)])
         wide = np.flatnonzero(np.abs(np.diff(q, axis=0)).max(axis=1, initial=0.0) > WIDE_STEP)
         first = int(wide[0]) if wide.size else len(q) - 1  # the last point before the first that is not followed
         open_parts = np.union1d(wide, [len(q) - 1] if len(q) < len(share) else []).astype(int)

@@ -215,11 +215,15 @@ class SpeedNotGiven(Finding):
 
 
 class SuspectNumber(Finding):
-    """A number that is likely a mistake: ``text`` is what it is, ``usual`` what it would be, or what others are."""
+    """A number that is likely a mistake: ``text`` is what it is, ``usual`` what it would be, or what others are.
 
-    kind: Literal["metres", "radians", "speed", "impossible_speed", "share", "tool", "base"]
+    ``unit``: in which it seems to be meant.
+    """
+
+    kind: Literal["unit", "speed", "impossible_speed", "share", "tool", "base"]
     text: str
     usual: str
+    unit: str = ""
 
 
 class FramesFromRobotFile(Finding):
@@ -297,7 +301,7 @@ def level_of(finding: CheckFinding) -> Level:
             return "fail" if reason in WRONG else "caution"
         case SpeedNotGiven(word=word, refused=refused):
             return "fail" if refused else "caution" if word else "note"
-        case SuspectNumber(kind="impossible_speed"):
+        case SuspectNumber(kind="impossible_speed") | SuspectNumber(unit="mm" | "mm/s"):
             return "fail"
         case MotionCollides(touches=touches, assumed=assumed):
             return "fail" if not assumed and any(touch.is_certain for touch in touches) else "caution"

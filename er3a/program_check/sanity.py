@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 
 from er3a.kinematics.chain import arm_length
+from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
 from er3a.program_check.program_check_findings import SuspectNumber
 from er3a.programs.execution import Execution, Step
-from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget
+from er3a.programs.instructions import MM, ArmMotion, JointTarget, NamedFrame, PoseTarget, Rate
 from er3a.robots.robot import Robot
 
-IN_MM = frozenset(("krl", "rapid", "rpl", "xpl"))
+IN_SI = ("urscript",)
+"""Languages in metres and radians; the others are in millimetres and degrees."""
 SMALL = 0.0025  # m, of every coordinate of a target that may have been meant in metres
+MOST_TURNED = 4 * np.pi  # rad, beyond which no joint goes; degrees up to 360
 MANY_TIMES = 10.0  # the usual speed
 USUAL = 3  # motions, from which others are compared with them
 
@@ -36,39 +38,66 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
     """
     steps = list({step.place: step for step in execution.steps if isinstance(step.instruction, ArmMotion)}.values())
     motions = [(step, step.instruction) for step in steps if isinstance(step.instruction, ArmMotion)]
-    if execution.program.language in IN_MM:
-        yield from _other_units(motions, robot)
+    yield from _other_units(motions, robot, execution.program.language not in IN_SI)
     yield from _speeds(motions, robot)
     for which in ("tool", "base"):
         frames = [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)]
         yield from ((step, SuspectNumber(which, *names)) for step, *names in _used_once(frames))  # type: ignore[arg-type]
 
 
-def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
+def _other_units(
+    motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool
+) -> Iterator[tuple[Step, SuspectNumber]]:
+    """Targets that are none of the arm's as they are written, and would be in the other unit."""
     reach = arm_length(robot)
+    unit, meant, scale = ("mm", "m", MM) if in_mm else ("m", "mm", 1.0)
     for step, motion in motions:
-        if isinstance(motion.target, PoseTarget):
-            xyz = motion.target.pose[:3, 3]
-            others = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
-            if others and 0.1 * reach < 1000 * np.linalg.norm(xyz) < 1.5 * reach:
-                mm = ", ".join(f"{1000 * value:g}" for value in xyz)
-                yield step, SuspectNumber("metres", f"({mm}) mm", f"({', '.join(f'{1e6 * v:.0f}' for v in xyz)}) mm")
-        elif isinstance(motion.target, JointTarget) and not robot.slides.any():
-            degrees = np.degrees(motion.target.joints)
-            if np.isfinite(degrees).all() and may_be_radians(degrees.tolist()):
-                turned = ", ".join(f"{value:.0f}" for value in np.degrees(degrees))
-                yield step, SuspectNumber("radians", f"({', '.join(f'{v:g}' for v in degrees)}) deg", f"({turned}) deg")
+        target, other = motion.target, MM if in_mm else 1 / MM
+        if isinstance(target, PoseTarget):
+            xyz = target.pose[:3, 3]
+            small = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
+            if (small or not in_mm) and 0.1 * reach < other * np.linalg.norm(xyz) < 1.5 * reach:
+                yield step, SuspectNumber("unit", _listed(xyz * scale, unit), _listed(xyz * scale * other, unit), meant)
+        elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
+            q = target.joints
+            degrees = np.degrees(q)
+            if in_mm and may_be_radians(degrees.tolist()):
+                yield (
+                    step,
+                    SuspectNumber("unit", _listed(degrees, "deg"), _listed(np.degrees(degrees).round(), "deg"), "rad"),
+                )
+            elif not in_mm and MOST_TURNED < np.abs(q).max() <= 360:
+                yield step, SuspectNumber("unit", _listed(q, "rad"), _listed(np.radians(q).round(3), "rad"), "deg")
+
+
+def _listed(values: Reals, unit: str) -> str:
+    return f"({', '.join(f'{value:g}' for value in values)}) {unit}"
+
+
+def _value(rate: Rate | None, unit: str) -> float | None:
+    """A speed in a unit, also of one that the controller does not take."""
+    if rate is None or rate.unit != unit:
+        return None
+    number = rate.text.rpartition("=")[2]
+    refused = rate.value <= 0 and number.lstrip("+-").replace(".", "", 1).isdecimal()
+    return float(number) if refused else rate.value
 
 
 def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
-    slides = robot.slides.any() or not np.isfinite(robot.speed).all()
-    fastest = np.inf if slides else float(robot.speed.sum()) * arm_length(robot)  # no point of the arm is faster
+    known = not robot.slides.any() and np.isfinite(robot.speed).all()
+    fastest = float(robot.speed.sum()) * arm_length(robot) if known else np.inf  # no point of the arm is faster
+    quickest = 2 * float(robot.speed.max()) if known else np.inf
     for step, motion in motions:
         if motion.speed and motion.speed.unit == "share" and motion.speed.text.endswith(" %"):
             yield step, SuspectNumber("share", motion.speed.text, "100 %")
-        if motion.speed and motion.speed.unit == "m/s" and motion.speed.value > fastest:
-            kind: Literal["impossible_speed"] = "impossible_speed"
-            yield step, SuspectNumber(kind, f"{1000 * motion.speed.value:g} mm/s", f"{1000 * fastest:.0f} mm/s")
+        along, turning = _value(motion.speed, "m/s"), _value(motion.speed, "rad/s")
+        if along is not None and along > fastest:
+            if along / MM < fastest:
+                yield step, SuspectNumber("unit", f"{along:g} m/s", f"{along / MM:g} m/s", "mm/s")
+            else:
+                yield step, SuspectNumber("impossible_speed", f"{MM * along:g} mm/s", f"{MM * fastest:.0f} mm/s")
+        if turning is not None and turning > quickest > np.radians(turning):
+            yield step, SuspectNumber("unit", f"{turning:g} rad/s", f"{np.radians(turning):.2f} rad/s", "deg/s")
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
     values = [value for _, value in given if value > 0]
     if len(values) > USUAL:

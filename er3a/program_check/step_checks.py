@@ -44,7 +44,7 @@ from er3a.program_check.motion_checks import (
     tool_path,
 )
 from er3a.programs import instructions
-from er3a.programs.writing import solutions_meant
+from er3a.programs.solving import solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
 

@@ -8,14 +8,14 @@ Calls of a program's own routines, wherever they stand in expressions, become op
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
-from er3a.programs.lexing import MisreadError, Words
+from er3a.programs.lexing import MisreadError, ProgramText, Words
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -516,6 +516,9 @@ def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs:
     words.finish()
     if isinstance(step, syntax.Constant) and step.value == 0:
         raise MisreadError(f"{by} 0")
+    if words.lexicon.counts_down and isinstance(first, syntax.Constant) and isinstance(last, syntax.Constant):
+        ends = syntax.numbers((first.value, last.value))
+        step = syntax.Constant(-1) if step is None and ends and ends[0] > ends[1] else step
     builder.open_for(place, name, first, last, step, text)
 
 
@@ -543,7 +546,72 @@ def fault(place: Place, problem: str, remedy: str) -> InputError:
     return InputError(place.file, place.where, problem, remedy)
 
 
-Each = Callable[[syntax.Expression], syntax.Expression]
+COMMENT_SIGNS = re.compile(r"^(?:[!;#]|//|\(\*)|\*\)$")
+
+
+def statements(
+    source: ProgramText, breaks: re.Pattern[str], is_over: Callable[[str, str], bool]
+) -> Iterator[tuple[Place, str, bool]]:
+    """Divide a program's text into statements and comments.
+
+    Parameters
+    ----------
+    breaks : what matters for that, by groups: ``comment``; ``text`` in quotes; ``bad``, what begins one of these
+        without its end; ``alone``, a word that is a statement; ``begin``, a word with which one begins; ``mark``, with
+        which one may end; ``line``, the end of a line that ends none
+    is_over : whether a statement ends, by its text so far and the mark after it, which is empty at the end of the file
+
+    Returns
+    -------
+    statements : each with its first line, its text without comments, and whether it is a comment. Comments within a
+        statement are left out.
+
+    Raises
+    ------
+    InputError
+        for texts, comments and statements without an end
+    """
+    text, line, first = "", 1, 1
+    for kind, part in _parts(source.text, breaks):
+        place = Place(source.path, line)
+        if not text:
+            first = line
+        if kind == "bad":
+            what, close = ("text", part) if part in "\"'" else ("comment", "*)")
+            raise fault(place, f"a {what} has no end", f"Close it with {close}")
+        over = kind in ("alone", "begin") or (kind == "mark" and is_over(text, part))
+        if over:
+            whole = _in_one_line(text + part if kind == "mark" and part not in ";\n" else text)
+            if whole:
+                yield Place(source.path, first), whole, False
+            text, first = part if kind == "begin" else "", line
+        if kind == "alone":
+            yield place, part, False
+        elif kind == "comment" and not text:
+            yield place, COMMENT_SIGNS.sub("", part).strip(), True
+        elif kind != "comment" and not over and (text or part.strip()):
+            text += part
+        line += part.count("\n")
+    if text.strip() and not is_over(text, ""):
+        problem = f"'{_in_one_line(text)[:40]}' has no end"
+        raise fault(Place(source.path, first), problem, "End each statement with ; and close each bracket")
+    if text.strip():
+        yield Place(source.path, first), _in_one_line(text), False
+
+
+def _parts(text: str, breaks: re.Pattern[str]) -> Iterator[tuple[str, str]]:
+    """What is found in a text, by its group, and what stands between."""
+    at = 0
+    for match in breaks.finditer(text):
+        if match.start() > at:
+            yield "", text[at : match.start()]
+        yield match.lastgroup or "", match.group()
+        at = match.end()
+    yield "", text[at:]
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split()) if "\n" in text.strip() else text.strip()
 
 
 def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
@@ -579,7 +647,7 @@ def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple
             code.append(operation)
             continue
         calls = _Calls(known, operation)
-        last = mapped(operation, calls.out)
+        last = syntax.mapped(operation, calls.out)
         if isinstance(last, syntax.Doing) and last.what.function in known:
             call = last.what
             last = syntax.Call(last.place, call.function, call.arguments, call.keywords, last.text)
@@ -613,7 +681,7 @@ class _Calls:
         """
         if isinstance(expression, syntax.Constant | syntax.Variable):
             return expression
-        expression = within(expression, self.out)
+        expression = syntax.within(expression, self.out)
         if not isinstance(expression, syntax.Invocation):
             return expression
         name = expression.function
@@ -624,65 +692,3 @@ class _Calls:
         if name[0] != "%":
             self.found.append(syntax.Doing(self.place, expression, f"{name}(...)", within=True))
         return expression
-
-
-def within(expression: syntax.Expression, each: Each) -> syntax.Expression:
-    """An expression with those right below it replaced.
-
-    Parameters
-    ----------
-    each : makes the replacement of one expression
-
-    Returns
-    -------
-    expression : a copy; one that has none below it is returned as it is
-    """
-    match expression:
-        case syntax.Member(of=of):
-            return replace(expression, of=each(of))
-        case syntax.Unary(of=of):
-            return replace(expression, of=each(of))
-        case syntax.Element(of=of, indices=indices):
-            return replace(expression, of=each(of), indices=tuple(map(each, indices)))
-        case syntax.Invocation(arguments=arguments, keywords=keywords):
-            placed = tuple(None if one is None else each(one) for one in arguments)
-            return replace(expression, arguments=placed, keywords=tuple((name, each(one)) for name, one in keywords))
-        case syntax.Binary(left=left, right=right):
-            return replace(expression, left=each(left), right=each(right))
-        case syntax.Aggregate(items=items):
-            return replace(expression, items=tuple((name, each(one)) for name, one in items))
-        case syntax.Listed(items=listed):
-            return replace(expression, items=tuple(map(each, listed)))
-        case _:
-            return expression
-
-
-def mapped(operation: syntax.Operation, each: Each) -> syntax.Operation:
-    """An operation with its expressions replaced.
-
-    Parameters
-    ----------
-    each : makes the replacement of one expression; of a target that is assigned to, only of its parts such as indices
-
-    Returns
-    -------
-    operation : a copy; one without expressions is returned as it is
-    """
-    match operation:
-        case syntax.Assign(target=target, value=value):
-            return replace(operation, target=within(target, each), value=None if value is None else each(value))
-        case syntax.Branch(condition=condition):
-            return replace(operation, condition=each(condition))
-        case syntax.Return(value=value):
-            return replace(operation, value=None if value is None else each(value))
-        case syntax.Move(arguments=arguments, settings=settings):
-            placed = tuple(None if one is None else each(one) for one in arguments)
-            return replace(operation, arguments=placed, settings=tuple((name, each(one)) for name, one in settings))
-        case syntax.Waiting(of=of):
-            return replace(operation, of=None if of is None else each(of))
-        case syntax.Doing(what=what):
-            found = within(what, each)
-            assert isinstance(found, syntax.Invocation)
-            return replace(operation, what=found)
-        case _:
-            return operation

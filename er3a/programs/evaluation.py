@@ -382,6 +382,7 @@ class ProgramMemory:
     shared, local : values by name
     types : declared types by name
     kept : what a language caches until the next assignment
+    outside : an element that was asked for and that its list has not, with the declared sizes; empty for none
     here : where the arm is
     cell : what is known of the cell
     """
@@ -393,6 +394,7 @@ class ProgramMemory:
         self.local: dict[str, syntax.Value] = {}
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
+        self.outside = ""
 
     def copy(self) -> ProgramMemory:
         """An independent copy, for a way that goes on by itself.
@@ -557,35 +559,26 @@ class ProgramMemory:
             case syntax.Element(of=of, indices=indices):
                 start = self.key(of)
                 found = [syntax.number(self.value(each)) for each in indices]
-                if start is None or None in found or self.outside(target):
+                if start is None or None in found:
+                    return None
+                sizes = self.read(start + SIZES)
+                if isinstance(sizes, tuple) and self._is_outside(start, found, sizes):
                     return None
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
 
-    def outside(self, target: syntax.Expression) -> str:
-        """The element in a target that its list's declaration has not.
+    def _is_outside(self, name: str, indices: Sequence[float | None], sizes: tuple[syntax.Value, ...]) -> bool:
+        """Whether a list has no such element by its declaration; then the controller stops (:attr:`outside`).
 
-        Parameters
-        ----------
-        target : indices count from 1
-
-        Returns
-        -------
-        element : as text, with the declared sizes; empty for none. One whose frame is given to the check counts as
-            declared.
+        Indices count from 1. One whose frame is given to the check counts as declared.
         """
-        while isinstance(target, (syntax.Member, syntax.Element)):
-            if isinstance(target, syntax.Element) and isinstance(target.of, syntax.Variable):
-                name = target.of.name
-                declared = self.read(name + SIZES)
-                sizes = declared if isinstance(declared, tuple) else ()
-                found = [syntax.number(self.value(each)) for each in target.indices]
-                pairs = zip(found, sizes) if len(found) == len(sizes) else ()
-                beyond = any(each is not None and not 1 <= each <= (syntax.number(size) or 0) for each, size in pairs)
-                if beyond and (shown := self.shown(target)) not in self.cell.frames:
-                    return f"{shown} of {name}[{','.join(map(syntax.shown, sizes))}]"
-            target = target.of
-        return ""
+        pairs = zip(indices, sizes) if len(indices) == len(sizes) else ()
+        element = f"{name}[{','.join(f'{each:g}' for each in indices)}]"
+        if all(each is None or 1 <= each <= (syntax.number(size) or 0) for each, size in pairs):
+            return False
+        if element not in self.cell.frames:
+            self.outside = f"{element} of {name}[{','.join(map(syntax.shown, sizes))}]"
+        return element not in self.cell.frames
 
     def value(self, expression: syntax.Expression) -> syntax.Value:
         """The value of an expression, in the language's own units.
@@ -629,7 +622,7 @@ class ProgramMemory:
             key = self.key(expression)
             found = None if key is None else self.read(key)
             if found is None and isinstance(of, syntax.Unclear):
-                return syntax.Unclear(key or self.outside(expression) or of.text)
+                return syntax.Unclear(key or self.outside or of.text)
         return syntax.Unclear(self.shown(expression)) if found is None else found
 
     def shown(self, target: syntax.Expression) -> str:

@@ -41,7 +41,7 @@ class RunLimits:
     assumed_values : of variables that the program does not give
     """
 
-    operations: int = 300_000
+    operations: int = 500_000
     ways: int = 64
     rounds: int = 100
     depth: int = 40

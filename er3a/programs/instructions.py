@@ -21,7 +21,6 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one is 0.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -353,107 +352,6 @@ def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
     motions : in the same order, made as they are asked for
     """
     return (each for each in instructions if isinstance(each, ArmMotion))
-
-
-ON_A_LINE = 1e-9
-MAX_LINES = 10_000
-
-
-def arc_poses(start: Reals, via: Reals, end: Reals, shares: Reals) -> Reals | None:
-    """Poses (n, 4, 4) on the arc from a pose through a point to another, at shares (n,) of its angle.
-
-    The tool turns evenly from the one orientation to the other, the shorter way.
-
-    Parameters
-    ----------
-    start, via, end : (4, 4), m
-
-    Returns
-    -------
-    poses : None if the points fix no circle
-    """
-    circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
-    if circle is None:
-        return None
-    centre, normal, angle = circle
-    spoke = start[:3, 3] - centre
-    turn = (angle * shares)[:, None]
-    poses = np.tile(np.eye(4), (len(shares), 1, 1))
-    poses[:, :3, 3] = centre + np.cos(turn) * spoke + np.sin(turn) * np.cross(normal, spoke)
-    rotation = log_rotation(end[:3, :3] @ start[:3, :3].T)
-    poses[:, :3, :3] = exp_rotation(shares[:, None] * rotation) @ start[:3, :3]
-    return poses
-
-
-def centre_and_angle(start: Reals, via: Reals, end: Reals) -> tuple[Reals, Reals, float] | None:
-    """The circle through three points, from the first by the second to the third.
-
-    Parameters
-    ----------
-    start, via, end : (3,), m
-
-    Returns
-    -------
-    centre : (3,), m
-    normal : (3,), unit vector, about which the arc turns by the right-hand rule
-    angle : rad, 0 to a full turn. None for all three where the points are on a line, to ``ON_A_LINE``.
-    """
-    a, b = via - start, end - start
-    normal = np.cross(a, b)
-    size = float(np.linalg.norm(normal))
-    if size <= ON_A_LINE * max(float(a @ a), float(b @ b), 1e-12):
-        return None
-    # The circumcentre of a triangle with one corner at the origin and the others at a and b.
-    to_centre = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * size * size)
-    normal = normal / size
-    last = b - to_centre
-    # About this normal the arc meets the second point before the third, however far it turns.
-    angle = float(np.arctan2(normal @ np.cross(-to_centre, last), -to_centre @ last) % (2 * np.pi))
-    centre: Reals = start + to_centre
-    return centre, normal, angle
-
-
-def chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
-    """Lines in place of an arc.
-
-    Parameters
-    ----------
-    start, via, end : poses (4, 4), m
-    deviation : m, within which the lines stay of the arc
-
-    Returns
-    -------
-    poses : (n, 4, 4), after the start; at most ``MAX_LINES``, the last is the end. None where the points are on a line.
-    """
-    circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
-    if circle is None:
-        return None
-    centre, _, angle = circle
-    radius = float(np.linalg.norm(start[:3, 3] - centre))
-    # A chord over an angle w leaves its arc by radius (1 - cos(w / 2)).
-    widest = 2 * math.acos(max(1 - deviation / radius, 0.0)) if radius > 0 else angle
-    count = min(max(math.ceil(angle / max(widest, 1e-6)), 1), MAX_LINES)
-    found = arc_poses(start, via, end, np.arange(1, count + 1) / count)
-    if found is not None:
-        found[-1] = end
-    return found
-
-
-def arc_length(start: Reals, via: Reals, end: Reals) -> float | None:
-    """Length of the arc from a pose through a point to another.
-
-    Parameters
-    ----------
-    start, via, end : poses (4, 4), m, of which only the positions count
-
-    Returns
-    -------
-    length : m; None where the points are on a line
-    """
-    circle = centre_and_angle(start[:3, 3], via[:3, 3], end[:3, 3])
-    if circle is None:
-        return None
-    return float(np.linalg.norm(start[:3, 3] - circle[0])) * circle[2]
 
 
 Convention = Literal["kuka", "efort", "ur", "abb"]

@@ -10,9 +10,10 @@ import codecs
 import os
 import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from er3a.errors import InputError
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
@@ -45,6 +46,8 @@ class Lexicon:
     right : operators that stand before one operand, with the rank of what they take
     constants : names that are values, in capital letters
     folds : whether ``a`` and ``A`` are one name
+    fields : names that are never a module's own, such as those of coordinates
+    counts_down : whether a loop counts down by itself where its first value is the greater one
     """
 
     pattern: re.Pattern[str]
@@ -52,13 +55,25 @@ class Lexicon:
     right: Mapping[str, int]
     constants: Mapping[str, bool]
     folds: bool = False
+    fields: frozenset[str] = frozenset()
+    counts_down: bool = False
+
+
+Names = Mapping[str, str]
+"""Names of a module that others do not see, with those under which the program has them."""
+NO_NAMES: Names = {}
 
 
 class Words:
-    """The words of a statement, read one after another."""
+    """The words of a statement, read one after another.
 
-    def __init__(self, lexicon: Lexicon, text: str):
-        self.lexicon = lexicon
+    Parameters
+    ----------
+    names : other names that the program has for some
+    """
+
+    def __init__(self, lexicon: Lexicon, text: str, names: Names = NO_NAMES):
+        self.lexicon, self.text = lexicon, text
         self.kinds: list[str] = []
         self.texts: list[str] = []
         self.at, self._depth, self._length = 0, 0, 0
@@ -69,6 +84,15 @@ class Words:
             self.texts.append(match.group().upper() if folds and kind == "name" else match.group())
         self.kinds.append("end")
         self.texts.append("")
+        if names:
+            self.texts = [
+                word if before in (".", "\\") or word in lexicon.fields else names.get(word, word)
+                for before, word in zip(("", *self.texts), self.texts)
+            ]
+
+    def offset(self) -> int:
+        """Where in the text the next word begins."""
+        return [match.start() for match in self.lexicon.pattern.finditer(self.text)][self.at]
 
     @property
     def kind(self) -> str:
@@ -421,13 +445,28 @@ def data_file_of(path: Path, suffix: str) -> Path | None:
     -------
     path : None if there is none
     """
-    for name in (path.stem + suffix, path.stem + suffix.upper(), path.stem + suffix.capitalize()):
-        beside = path.with_name(name)
-        if beside.is_file():
-            return beside
-    meant = (path.stem + suffix).lower()
-    like = sorted(name for name in os.listdir(path.parent) if name.lower() == meant) if path.parent.is_dir() else []
-    return next((path.with_name(name) for name in like if path.with_name(name).is_file()), None)
+    wanted = path.stem + suffix
+    found = named_in(path.parent, wanted, lambda name: (not name.startswith(path.stem), name != wanted, name))
+    return found if found is not None and found.is_file() else None
+
+
+def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Path | None:
+    """What a folder holds under a name, however its letters are written.
+
+    Parameters
+    ----------
+    wanted : with the suffix
+    order : by which the first of several is taken
+
+    Returns
+    -------
+    path : None if there is none, and for a folder that may not be read
+    """
+    try:
+        held = sorted(os.listdir(folder), key=order)
+    except OSError:
+        return None
+    return next((folder / each for each in held if each.lower() == wanted.lower()), None)
 
 
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:

@@ -230,7 +230,12 @@ class Machine:
                     return
                 self.seen[state] = way.step
             begun = True
-            if not self._step(way):
+            goes_on = self._step(way)
+            if way.memory.outside:  # where the controller stops
+                beyond = instructions.Unknown(way.memory.outside, may_move=False, stops=True)
+                self._note(way, operation.place, beyond)
+                way.memory.outside = ""
+            if not goes_on:
                 return
 
     def _step(self, way: Way) -> bool:
@@ -239,8 +244,6 @@ class Machine:
         at, operation = frame.at, frame.routine.code[frame.at]
         self.entered.add(frame.routine.name)
         frame.at += 1
-        if beyond := _beyond_a_list(way.memory, operation):
-            self._note(way, operation.place, instructions.Unknown(beyond, may_move=False, stops=True))
         match operation:
             case syntax.Enter():
                 way.visits.pop(way.where, None)
@@ -374,9 +377,9 @@ class Machine:
         name = key or memory.shown(each.target)
         if self.dialect.is_signal(name):  # which others may set too
             return instructions.Output(name, syntax.shown(value))
-        if memory.outside(each.target):
-            memory.forget(root(name))
-        elif not self.dialect.reads_back(name):
+        if key is None and memory.outside:  # where the controller stops: nothing is set
+            return None
+        if not self.dialect.reads_back(name):
             memory.write(name, syntax.Unclear(name))
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default
@@ -384,7 +387,7 @@ class Machine:
         if self.dialect.named(name):
             of = memory.key(each.value) if isinstance(each.value, syntax.Element) else None
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
-        return None if self.dialect.is_followed(name) else instructions.Unknown(each.text, shapes=True)
+        return None if self.dialect.is_followed(name) else instructions.Unknown(each.text, False, shapes=True)
 
     def _branch(self, way: Way, frame: Frame, branch: syntax.Branch, at: int) -> bool:
         """Go on, on the side that the condition chooses, or on both."""
@@ -461,21 +464,14 @@ def _labels(routine: syntax.Routine) -> frozenset[int]:
     return frozenset((*jumps, *branches))
 
 
-def _names(expression: syntax.Expression | None) -> Iterator[str]:
-    """All variables in an expression."""
-    if isinstance(expression, syntax.Variable):
-        yield root(expression.name)
-    for each in syntax.inner(expression):
-        yield from _names(each)
-
-
 def _counts(program: syntax.Program) -> set[str]:
     """Variables that are computed from themselves, and on which nothing else depends, such as counts of parts."""
     found: set[str] = set()
     read = {parameter.name for routine in program.routines.values() for parameter in routine.parameters}
     for operation in program.operations():
         own = variable_of(operation.target) if isinstance(operation, syntax.Assign) else ""
-        names = {name for each in syntax.expressions_of(operation)[bool(own) :] for name in _names(each)}
+        inside = syntax.parts(operation.value if isinstance(operation, syntax.Assign) and own else operation)
+        names = {root(each.name) for each in inside if isinstance(each, syntax.Variable)}
         found |= names & {own}
         read |= names - {own}
     return found - read
@@ -505,21 +501,6 @@ def _is_new(memory: ProgramMemory, name: str) -> bool:
     """Whether a name has no variable yet, within a routine."""
     start = root(name)
     return start not in memory.shared and start not in memory.local and memory.local.get("%inside") is True
-
-
-def _beyond_a_list(memory: ProgramMemory, operation: syntax.Operation) -> str:
-    """The element that an operation names and its list has not, as text; empty for none."""
-    waiting = list(syntax.expressions_of(operation))
-    for name, _ in operation.settings if isinstance(operation, syntax.Move) else ():
-        of, _, index = name.rstrip("]").partition("[")
-        if index.isdecimal():  # of what holds for this motion alone
-            waiting.append(syntax.Element(syntax.Variable(of), (syntax.Constant(float(index)),)))
-    while waiting:
-        each = waiting.pop()
-        if found := memory.outside(each):
-            return found
-        waiting += syntax.inner(each)
-    return ""
 
 
 def _pause(memory: ProgramMemory, waiting: syntax.Waiting) -> instructions.Pause:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 from er3a.by_value import ByValue
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
@@ -440,60 +441,68 @@ class Program(ByValue):
             yield from routine.code
 
 
-def inner(expression: Expression | None) -> tuple[Expression, ...]:
-    """The expressions right below one.
+Each = Callable[[Expression], Expression]
+Held = TypeVar("Held", bound=Any)
+
+
+def parts(of: object) -> Iterator[Expression]:
+    """All expressions in an operation or an expression, itself first.
 
     Parameters
     ----------
-    expression : None has none
+    of : an operation, an expression, or a tuple of such; anything else holds none
 
     Returns
     -------
-    expressions : operands, indices, arguments or elements, in the order of the text
+    expressions : in the order of the text, however deep
     """
-    match expression:
-        case Member(of=of) | Unary(of=of):
-            return (of,)
-        case Element(of=of, indices=indices):
-            return (of, *indices)
-        case Invocation(arguments=arguments, keywords=keywords):
-            return (*(each for each in arguments if each is not None), *(each for _, each in keywords))
-        case Binary(left=left, right=right):
-            return (left, right)
-        case Aggregate(items=items):
-            return tuple(each for _, each in items)
-        case Listed(items=listed):
-            return listed
-        case _:
-            return ()
+    if isinstance(of, Expression):
+        yield of
+    if isinstance(of, tuple):
+        for each in of:
+            yield from parts(each)
+    elif isinstance(of, Expression | Operation) and not isinstance(of, Constant | Fixed):
+        for name in type(of).__slots__:
+            yield from parts(getattr(of, name))
 
 
-def expressions_of(operation: Operation) -> tuple[Expression, ...]:
-    """The expressions that an operation evaluates.
+def within(of: Held, each: Each) -> Held:
+    """An expression or operation with the expressions right below it replaced.
 
     Parameters
     ----------
-    operation : jumps and fixed instructions evaluate none
+    each : makes the replacement of one expression
 
     Returns
     -------
-    expressions : the outermost ones; for an assignment its target too
+    copy : itself where nothing is replaced
     """
-    match operation:
-        case Assign(target=target, value=value):
-            found: tuple[Expression | None, ...] = (target, value)
-        case Branch(condition=condition):
-            found = (condition,)
-        case Call(arguments=arguments, keywords=keywords):
-            found = (*arguments, *(each for _, each in keywords))
-        case Return(value=value):
-            found = (value,)
-        case Move(arguments=arguments, settings=settings):
-            found = (*arguments, *(each for _, each in settings))
-        case Waiting(of=of):
-            found = (of,)
-        case Doing(what=what):
-            found = inner(what)
-        case _:
-            found = ()
-    return tuple(each for each in found if each is not None)
+    changed = {name: _replaced(getattr(of, name), each) for name in type(of).__slots__}
+    return replace(of, **{name: new for name, new in changed.items() if new is not getattr(of, name)})
+
+
+def _replaced(value: object, each: Each) -> object:
+    if isinstance(value, Expression):
+        return each(value)
+    if isinstance(value, tuple):
+        found = tuple(_replaced(one, each) for one in value)
+        return value if all(map(operator.is_, found, value)) else found
+    return value
+
+
+def mapped(operation: Operation, each: Each) -> Operation:
+    """An operation with its expressions replaced.
+
+    Parameters
+    ----------
+    each : makes the replacement of one expression; of a target that is assigned to, and of a call that is carried out,
+        only of what is in it
+
+    Returns
+    -------
+    operation : a copy; one without expressions is returned as it is
+    """
+    own = (
+        operation.target if isinstance(operation, Assign) else operation.what if isinstance(operation, Doing) else None
+    )
+    return within(operation, lambda one: within(one, each) if one is own else each(one))

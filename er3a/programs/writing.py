@@ -10,24 +10,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import scipy
 
 from er3a.by_value import ByValue
-from er3a.errors import PoseError
-from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.forward import forward
-from er3a.kinematics.singularity import factors_where_defined
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, program_findings
-from er3a.programs.evaluation import same
+from er3a.programs.solving import Resolver, way_of
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
-
-STEP_M, STEP_RAD = 0.02, 0.1
-MAX_STEPS = 10_000  # on a way that no arm can take
-
-Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
-NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,168 +51,8 @@ class ReadyMotion:
         """Length of the tool point's way, m; for a joint motion of the straight line between its ends."""
         if self.pose is None or self.pose_before is None:
             return None
-        if self.motion.kind == "arc" and self.via is not None:
-            return instructions.arc_length(self.pose_before, self.via, self.pose)
-        return float(np.linalg.norm(self.pose[:3, 3] - self.pose_before[:3, 3]))
-
-
-class Resolver:
-    """Follows a sequence and knows where the arm is; joints are solved when they are needed, many at a time.
-
-    Parameters
-    ----------
-    robot : None if there is none; then joints come from joint targets alone, and poses from poses
-    start : (n,), rad, where the sequence starts
-    """
-
-    def __init__(self, robot: Robot | None, start: Reals | None):
-        self.arm = None if robot is None else robot.without_tool().replace(base=np.eye(4))
-        self.start = start
-        self.motions: list[tuple[instructions.ArmMotion, Reals | None]] = []  # with the pose before
-        self.pose: Reals | None = None
-        self._solved: list[Reals | None] = []
-
-    def ready(self, motion: instructions.ArmMotion) -> ReadyMotion:
-        """A motion with its start and end; the arm is at its end then.
-
-        Parameters
-        ----------
-        motion : the next of the sequence
-
-        Returns
-        -------
-        ready : poses in the motion's base for its tool, m; None where they can't be known. Joints are solved only when
-            they are asked for.
-        """
-        frames = (motion.tool, motion.base)
-        pose_before = self._pose_in(frames)
-        number = len(self.motions)
-        self.motions.append((motion, pose_before))
-        target = motion.target
-        if isinstance(target, instructions.PoseTarget):
-            self.pose = target.pose
-        else:
-            joints = self.joints_after(number) if isinstance(target, instructions.JointTarget) else None
-            self.pose = None if joints is None else self._forward(joints, frames)
-        via = motion.via.pose if isinstance(motion.via, instructions.PoseTarget) else None
-        if isinstance(motion.via, instructions.JointTarget):
-            via = self._forward(motion.via.joints, frames)
-        ready = ReadyMotion(motion, self, number, self.pose, pose_before, via)
-        if motion.angle is not None:
-            self.pose = None
-        return ready
-
-    def joints_after(self, number: int) -> Reals | None:
-        """Joints after a motion of the sequence.
-
-        Parameters
-        ----------
-        number : of the motion, from 0; -1 for the start
-
-        Returns
-        -------
-        q : (n,), rad; None where they are not known. Motions before it are solved first, because they decide the
-            branch.
-        """
-        if number < 0:
-            return self.start
-        motion, _ = self.motions[number]
-        target = motion.target
-        if isinstance(target, instructions.JointTarget) and motion.angle is None and not np.isnan(target.joints).any():
-            return target.joints
-        while len(self._solved) <= number:
-            before = self.joints_after(len(self._solved) - 1)
-            self._solved.append(self._end(*self.motions[len(self._solved)], before))
-        return self._solved[number]
-
-    def solve(
-        self, poses: Reals, frames: Frames, near: Reals | None, branch: instructions.MeantSolution | None = None
-    ) -> list[Reals | None]:
-        """Joints (n,) of poses (k, 4, 4) one after another, each nearest to those before and within the limits.
-
-        Of solutions on a ``branch`` only, where there are some.
-
-        The list ends after the first pose that has none, with None.
-        """
-        tool, base = frames
-        if self.arm is None or tool.pose is None or base.pose is None:
-            return [None]
-        reference = np.zeros(self.arm.joints) if near is None else near
-        chain: list[Reals | None] = []
-        try:
-            found = inverse_batch(self.arm, base.pose @ poses @ np.linalg.inv(tool.pose), reference)
-        except PoseError:
-            return [None]
-        for rows in np.where((found.solved & found.within_limits)[..., None], found.q, np.inf):
-            if branch is not None:
-                met = solutions_meant(branch, self.arm, rows) & np.isfinite(rows[:, 0])
-                rows = np.where(met[:, None], rows, np.inf) if met.any() else rows
-            away = np.abs(rows - reference).max(axis=1)
-            best = int(away.argmin())
-            if not np.isfinite(away[best]):
-                return [*chain, None]
-            reference = rows[best]
-            chain.append(reference)
-        return chain
-
-    def _end(self, motion: instructions.ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:
-        """Joints (n,) in rad at a motion's end; those of a line or arc come from following its way."""
-        target = motion.target
-        if motion.angle is not None or isinstance(target, instructions.UnresolvedTarget):
-            return None
-        if isinstance(target, instructions.JointTarget):
-            return None if before is None else np.where(np.isnan(target.joints), before, target.joints)
-        if target.joints is not None:
-            return target.joints
-        frames = (motion.tool, motion.base)
-        if motion.kind == "joint" or before is None or pose_before is None:
-            branch = target.branch if motion.kind == "joint" else None
-            near = before if target.near is None else target.near
-            return self.solve(target.pose[None], frames, near, branch)[-1]
-        return self.solve(_between(motion, pose_before), frames, before)[-1]
-
-    def _pose_in(self, frames: Frames) -> Reals | None:
-        """Where the tool is, in a base for a tool."""
-        if not self.motions:
-            return None if self.start is None else self._forward(self.start, frames)
-        last, _ = self.motions[-1]
-        if isinstance(last.target, instructions.JointTarget):
-            joints = self.joints_after(len(self.motions) - 1)
-            return None if joints is None else self._forward(joints, frames)
-        old, new = (last.tool.pose, last.base.pose), (frames[0].pose, frames[1].pose)
-        if self.pose is None or (same(last.tool, frames[0]) and same(last.base, frames[1])):
-            return self.pose
-        if old[0] is None or old[1] is None or new[0] is None or new[1] is None:
-            return None
-        found: Reals = np.linalg.inv(new[1]) @ old[1] @ self.pose @ np.linalg.inv(old[0]) @ new[0]
-        return found
-
-    def _forward(self, joints: Reals, frames: Frames) -> Reals | None:
-        tool, base = frames
-        if self.arm is None or tool.pose is None or base.pose is None:
-            return None
-        found: Reals = np.linalg.inv(base.pose) @ forward(self.arm, joints) @ tool.pose
-        return found
-
-
-def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Reals) -> Flags:
-    """Which of joint vectors (k, n) in rad are meant: (k,).
-
-    The wrist centre's sides are compared with those in the arm's zero pose; what has no side there, or has no such
-    sides at all, as an arm without a spherical wrist, is not checked.
-    """
-    met: Flags = np.asarray(((rows >= branch.ranges[:, 0]) & (rows <= branch.ranges[:, 1])).all(axis=1), np.bool_)
-    if branch.behind_axis_1 is None and branch.behind_lower_arm is None:
-        return met
-    zero = factors_where_defined(robot, np.zeros((1, robot.joints)))
-    found = factors_where_defined(robot, rows)
-    for behind, there, here in (
-        (branch.behind_axis_1, zero.shoulder[0], found.shoulder),
-        (branch.behind_lower_arm, zero.elbow[0], found.elbow),
-    ):
-        if behind is not None and abs(there) > NO_SIDE:
-            met = met & (((here * there < 0) == behind) | (np.abs(here) < NO_SIDE))
-    return met
+        way = way_of(self.pose_before, self.via if self.motion.kind == "arc" else None, self.pose)
+        return None if way is None else way.length
 
 
 def with_default_frames(instruction: instructions.Instruction, robot: Robot | None) -> instructions.Instruction:
@@ -246,26 +75,6 @@ def with_default_frames(instruction: instructions.Instruction, robot: Robot | No
     if not base.name and base.pose is None:
         base = instructions.NamedFrame("", np.eye(4))
     return replace(instruction, tool=tool, base=base)
-
-
-def _between(motion: instructions.ArmMotion, start: Reals) -> Reals:
-    """Poses (k, 4, 4) on the way and at its end, near enough to each other that the arm's branch is the same."""
-    assert isinstance(motion.target, instructions.PoseTarget)
-    end = motion.target.pose
-    turn = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-    way = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    count = int(min(max(way / STEP_M, float(np.linalg.norm(turn)) / STEP_RAD, 1), MAX_STEPS)) + 1
-    shares = np.arange(1, count + 1) / count
-    poses = None
-    if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget):
-        poses = instructions.arc_poses(start, motion.via.pose, end, shares)
-    if poses is None:
-        poses = np.tile(np.eye(4), (count, 1, 1))
-        poses[:, :3, 3] = start[:3, 3] + shares[:, None] * (end[:3, 3] - start[:3, 3])
-        turns = scipy.spatial.transform.Rotation.from_rotvec(shares[:, None] * turn).as_matrix()
-        poses[:, :3, :3] = turns @ start[:3, :3]
-    poses[-1] = end
-    return poses
 
 
 HEAD = "er3a: "
@@ -362,7 +171,7 @@ class Writer(ABC):
             too.
         """
         framed = [with_default_frames(each, self.robot) for each in self.listing.instructions]
-        ready = [self.resolver.ready(each) if isinstance(each, instructions.ArmMotion) else each for each in framed]
+        ready = [self._ready(each) if isinstance(each, instructions.ArmMotion) else each for each in framed]
         for i, instruction in enumerate(ready):
             if i == self.listing.repeats_from:
                 self.begin_loop()
@@ -374,6 +183,11 @@ class Writer(ABC):
         lines = [HEAD + line for line in (*self.options.head, *map(head_line, findings))]
         head = list(dict.fromkeys((*self.said, *lines)))
         return WrittenProgram(self.name, self.files(head), findings)
+
+    def _ready(self, motion: instructions.ArmMotion) -> ReadyMotion:
+        number = len(self.resolver.motions)
+        before, pose, via = self.resolver.ready(motion)
+        return ReadyMotion(motion, self.resolver, number, pose, before, via)
 
     @abstractmethod
     def files(self, head: list[str]) -> dict[str, str]:

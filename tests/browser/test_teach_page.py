@@ -34,7 +34,7 @@ from er3a.pipeline.teach.panel import WORDS
 from er3a.planning.commands import CommandSource
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
-from er3a.programs.writing import Resolver
+from er3a.programs.solving import Resolver
 from er3a.robots.joint_limits import meant
 from testing.arms import five_axis, gantry, make_arm, palletiser, pose_errors, scara
 from testing.small_study import ROOT
@@ -310,7 +310,10 @@ def test_way_points_become_a_path_file_and_a_program_that_er3a_reads(panel, tmp_
     assert {found.code for found in execution.program.findings} <= {"program_data_file_missing"}
     assert execution.complete
     resolver = Resolver(robot, None)
-    found = [resolver.ready(motion).joints for motion in execution.listing().motions]
+    motions = execution.listing().motions
+    for motion in motions:
+        resolver.ready(motion)
+    found = [resolver.joints_after(number) for number in range(len(motions))]
     np.testing.assert_allclose(np.degrees(found), kept, atol=1e-5)
     panel.open()
     assert len(panel.browser.find_elements(By.CSS_SELECTOR, "#points li")) == 2

@@ -374,3 +374,55 @@ def test_a_round_of_a_loop_that_turns_the_wrist_on_leaves_its_limits(tmp_path):
         turns.append(f"LIN {frame(turned)}")
     check = checked("LOOP\n" + "\n".join(turns) + "\nENDLOOP", tmp_path)
     assert {"above_limit", "below_limit"} & codes(check)
+
+
+MM = "PROC main()\nMoveL [[0.38,0.18,0.22],[0,1,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v200,fine,tool0;\nENDPROC\n"
+KRL_FAST = "DEF a( )\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n$VEL.CP={}\nLIN_REL {{Z -20}}\nEND\n"
+OTHER_UNITS = {
+    "deg": ("a.script", "movej([90,-90,45,-90,-90,0])\n"),
+    "mm": ("a.script", "movel(p[380,180,220,0,3.14,0])\n"),
+    "mm/s": ("a.src", KRL_FAST.format(200)),
+    "m": ("a.mod", MM),
+    "rad": ("a.src", "DEF a( )\nPTP {A1 0.4,A2 -0.43,A3 -0.37,A4 0,A5 -0.76,A6 -0.44}\nEND\n"),
+    "": ("b.src", KRL_FAST.format(0.2)),
+    "none": ("b.script", f"movej({HOME_TEXT})\n"),
+}
+
+
+@pytest.mark.parametrize("unit", OTHER_UNITS)
+def test_a_number_in_another_unit_is_said_to_be_in_it(unit, tmp_path):
+    name, text = OTHER_UNITS[unit]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    fast = ROBOT.replace(speed=np.radians([230.0, 200.0, 250.0, 320.0, 320.0, 420.0]))
+    found = check_program(read_program(tmp_path / name), fast, CheckOptions(start=HOME, measures=False))
+    units = {each.finding.unit for each in found.findings if each.finding.code == "suspect_number"}
+    assert units == {unit} - {"", "none"}
+
+
+@pytest.mark.parametrize(
+    ("cause", "code", "passes"),
+    [
+        ("$VEL_AXIS[7]=50", "program_not_understood", True),
+        ("$VEL_CP=0.5", "not_followed", False),
+        ("moves_anything()", "not_followed", False),
+    ],
+)
+def test_a_cause_is_one_finding_at_its_own_line(cause, code, passes, tmp_path):
+    text = (
+        f"DEF a( )\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\n{cause}\n$VEL_AXIS[1]=30\nPTP {axes(HOME)}\nPTP {{A1 5}}\nEND\n"
+    )
+    found = check_text(tmp_path, text, "a.src")
+    named = [(each.finding.code, each.place.line) for each in found.findings if each.level in ("caution", "fail")]
+    assert [each for each in named if each[0] != "way_not_known"] == [(code, 4)]
+    last = next(each for each in found.verdicts if each.line == 7)
+    assert (last.level == "pass") == (passes or cause == "moves_anything()")  # to where it is known to stand again
+
+
+@pytest.mark.parametrize("end", [0.3, -0.3, 1.5, -1.5])
+def test_turn_bits_say_nothing_of_a_joint_within_a_degree_of_0(end, tmp_path):
+    q = np.radians([20.0, -10.0, -10.0, end, -70.0, 10.0])
+    numbers = ",".join(f"{key} {value:.6f}" for key, value in zip("XYZABC", numbers_of(forward(ROBOT, q), "kuka")))
+    turn = sum(1 << i for i, value in enumerate(q) if (value < 0) != (i == 3))  # the other side of 0 for joint 4
+    text = f"DEF a( )\n$BASE=$NULLFRAME\nPTP {{{numbers},S 0,T {turn}}}\nEND\n"
+    found = check_text(tmp_path, text, "a.src")
+    assert any(each.finding.code == "configuration_not_met" for each in found.findings) == (abs(end) > 1)

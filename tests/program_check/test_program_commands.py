@@ -269,3 +269,19 @@ def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findin
     assert done.exit_code == 1
     assert reason in done.stderr
     assert "shapes are assumed" in done.stderr
+
+
+def test_a_long_line_is_cut_in_json_and_sarif_as_in_messages(tmp_path):
+    (tmp_path / "a.src").write_text(f"DEF a( )\nPTP {{A1 0,{'A' * 100_000} 0}}\nEND\n")
+    done = check(str(tmp_path / "a.src"), "--json", "--sarif", str(tmp_path / "a.sarif"))
+    assert done.exit_code == 1
+    assert len(done.stdout) + (tmp_path / "a.sarif").stat().st_size < 10_000
+
+
+def test_a_file_that_is_no_program_says_in_one_line_which_kinds_are_taken(tmp_path):
+    (tmp_path / "x.json").write_text('{"a": 1}')
+    done = check(str(tmp_path / "x.json"))
+    assert done.exit_code == 2
+    assert [
+        all(each in line for each in (".src", ".script", ".pgm", ".mod", ".csv")) for line in done.stdout.splitlines()
+    ] == [True]

@@ -12,7 +12,8 @@ from er3a.kinematics.forward import forward
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.program_findings import NothingMoves
-from er3a.programs.writing import Resolver, WriteOptions
+from er3a.programs.solving import Resolver
+from er3a.programs.writing import WriteOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "data/programs"
 TASKS = {"pick_place": ("er3a_c60", 8), "weld_seam": ("er3a_c60", 7), "palletise": ("er3_600", 36)}
@@ -26,8 +27,9 @@ def tool_points(path, robot):
     assert execution.program.findings == ()
     assert execution.complete
     resolver, points = Resolver(robot, None), []
-    for motion in execution.listing().motions:
-        q = resolver.ready(motion).joints
+    for number, motion in enumerate(execution.listing().motions):
+        resolver.ready(motion)
+        q = resolver.joints_after(number)
         assert q is not None
         assert ((q >= robot.lower) & (q <= robot.upper)).all()
         points.append(forward(robot, q)[:3, 3] * 1000)

@@ -31,7 +31,8 @@ from er3a.programs.machine import execute
 from er3a.programs.program_findings import ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.rapid.reader import MOTIONS
-from er3a.programs.writing import WriteOptions, solutions_meant
+from er3a.programs.solving import solutions_meant
+from er3a.programs.writing import WriteOptions
 
 ROBOT = load_robot("er3a_c60")
 NONE = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -104,7 +105,6 @@ POSES = {  # instructions, mm, quaternion (w first)
     "whole_pos": ("t:=p; t.trans:=[9,8,7]; MoveL t,@;", (9, 8, 7), (1, 0, 0, 0)),
     "sum_of_pos": ("t:=p; t.trans:=p.trans+grid{2,3}; MoveL t,@;", (106, 200, 300), (1, 0, 0, 0)),
     "times_pos": ("t:=p; t.trans:=0.5*p.trans; MoveL t,@;", (50, 100, 150), (1, 0, 0, 0)),
-    "cross": ("t:=p; t.trans:=[1,0,0]*[0,2,0]; MoveL t,@;", (0, 0, 2), (1, 0, 0, 0)),
     "whole_pos_and_component": ("t:=p; t.trans:=[9,8,7]; t.trans.z:=6; MoveL t,@;", (9, 8, 6), (1, 0, 0, 0)),
     "orientzyx": ("t:=p; t.rot:=OrientZYX(90,0,0); MoveL t,@;", (100, 200, 300), (HALF, 0, 0, HALF)),
     "orientzyx_order": (
@@ -112,7 +112,6 @@ POSES = {  # instructions, mm, quaternion (w first)
         (100, 200, 300),
         (0.5, -0.5, 0.5, 0.5),
     ),
-    "product_of_turns": ("t:=p; t.rot:=turned.rot*turned.rot; MoveL t,@;", (100, 200, 300), (0, 0, 0, 1)),
     "posemult": (
         "frame:=PoseMult(frame,frame); t:=p; t.trans:=frame.trans; t.rot:=frame.rot; MoveL t,@;",
         (10, 10, 0),

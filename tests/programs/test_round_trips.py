@@ -396,7 +396,7 @@ def test_poses_that_are_written_as_poses_need_no_inverse(monkeypatch):
     q, poses = wound_path(50)
     listing = listing_of(ToolTableCommand(poses, tuple(map(str, range(50))), 9.0, blend=0.001), ROBOT, q[0]).listing
     wanted = {language: write_program(listing, language, WriteOptions(ROBOT)).files for language in LANGUAGES[:2]}
-    monkeypatch.setattr("er3a.programs.writing.inverse_batch", None)
+    monkeypatch.setattr("er3a.programs.solving.inverse_batch", None)
     for language, files in wanted.items():
         assert write_program(listing, language, WriteOptions(ROBOT)).files == files
 

@@ -174,8 +174,7 @@ TEXTS = texts(
         ),
         "suspect_number": by(
             "kind",
-            metres="{text} may have been meant in metres: {usual}",
-            radians="{text} may have been meant in radians: {usual}",
+            unit="{text} looks like a number in {unit}; in the unit of this language that is {usual}",
             impossible_speed="{text} is faster than any point of the arm can be ({usual})",
             share="{text} of the joints' speed is more than there is, so that {usual} is taken",
             speed="{text} is more than ten times the program's usual {usual}",

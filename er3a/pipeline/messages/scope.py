@@ -99,6 +99,7 @@ TEXTS = texts(
         "assumed.friction": "joints have no friction",
         "assumed.wrist_limits": "wrist limits are unknown",
         "assumed.load": "tool and payload weigh nothing",
+        "assumed.open_space": "nothing stands around the arm",
         "assumed.mounting": "the base stands upright",
         "assumed.real_camera": "the camera is simulated",
         "assumed.joint_zeros": "joint zeros",

@@ -3,13 +3,12 @@ controller's archive, and the controller's $config.dat."""
 
 from __future__ import annotations
 
-import os
 import re
 from functools import cached_property
 from pathlib import Path
 
 from er3a.errors import InputError
-from er3a.programs.lexing import data_file_of, read_program_text
+from er3a.programs.lexing import data_file_of, named_in, read_program_text
 
 COMMENT = re.compile(r";[^\n]*")
 CALL = re.compile(r"\b([A-Za-z]\w*)\s*\(")
@@ -32,14 +31,6 @@ class ControllerFiles:
         self.path, self.known = path, known
         self._above = list(path.resolve().parents)[:DEEPEST]
 
-    def _named(self, folder: Path, name: str) -> Path | None:
-        """What a folder holds under a name, however its letters are written; nothing where it may not be read."""
-        try:
-            held = sorted(os.listdir(folder))
-        except OSError:
-            return None
-        return next((folder / each for each in held if each.lower() == name.lower()), None)
-
     @cached_property
     def _folders(self) -> list[Path]:
         """The program's folder, and all of the archive that it lies in."""
@@ -48,7 +39,7 @@ class ControllerFiles:
         return [self.path.parent, *(each for each in inside if each != self.path.parent.resolve())]
 
     def _is_archive(self, folder: Path) -> bool:
-        return self._named(folder, ARCHIVE) is not None and any(self._named(folder, each) for each in OF_ARCHIVE)
+        return named_in(folder, ARCHIVE) is not None and any(named_in(folder, each) for each in OF_ARCHIVE)
 
     @cached_property
     def _texts(self) -> dict[Path, str]:
@@ -91,9 +82,9 @@ class ControllerFiles:
         folders = [
             self.path.parent,
             *self._folders,
-            *filter(None, (self._named(each, "System") for each in self._above)),
+            *filter(None, (named_in(each, "System") for each in self._above)),
         ]
-        return next((found for each in folders if (found := self._named(each, "$config.dat")) is not None), None)
+        return next((found for each in folders if (found := named_in(each, "$config.dat")) is not None), None)
 
     @property
     def companions(self) -> tuple[Path, ...]:

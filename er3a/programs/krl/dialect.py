@@ -452,6 +452,9 @@ def keep_setting(memory: ProgramMemory, name: str, expression: syntax.Expression
         setting(memory, syntax.Unclear(name) if first is None else memory.value(first))
         return
     value = memory.value(expression)
+    variable, _, index = name.rstrip("]").partition("[")
+    if index.isdecimal():  # an element that the list may not have
+        memory.key(syntax.Element(syntax.Variable(variable), (syntax.Constant(float(index)),)))
     if name in ("$VEL_AXIS[1]", "$ACC_AXIS[1]"):
         _all_axes(memory, name[:-3], value)
         return

@@ -6,17 +6,26 @@ Lines that are not understood are kept; blocks and texts without an end are erro
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, block, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
 from er3a.programs.krl.controller_files import ControllerFiles
 from er3a.programs.krl.dialect import HARMLESS, OF_SETTINGS, POSITION_FIELDS, POSITION_KINDS
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
+from er3a.programs.lexing import (
+    NUMBER,
+    Lexicon,
+    MisreadError,
+    Names,
+    ProgramText,
+    Words,
+    data_file_of,
+    read_program_text,
+)
 
 KRL = Lexicon(
     re.compile(
@@ -35,21 +44,16 @@ KRL = Lexicon(
     right=dict.fromkeys(("NOT", "B_NOT", "+", "-"), 8),
     constants={"TRUE": True, "FALSE": False},
     folds=True,
+    fields=POSITION_FIELDS,
 )
-Names = Mapping[str, str]
-"""Names of a module that others do not see, with those under which the program has them."""
+BREAKS = re.compile(r"""(?P<comment>;[^\n]*)|(?P<text>"[^"\n]*")|(?P<bad>")|(?P<mark>\n)""")
 
 
 class KrlWords(Words):
     """Words of a line of KRL."""
 
     def __init__(self, text: str, names: Names):
-        super().__init__(KRL, text)
-        if names:
-            self.texts = [
-                word if word in POSITION_FIELDS or before == "." else names.get(word, word)
-                for before, word in zip(("", *self.texts), self.texts)
-            ]
+        super().__init__(KRL, text, names)
 
     def special(self) -> syntax.Expression | None:
         """Aggregates, enumerations; numbers by their bits, and the point that is to be taught, have no known value."""
@@ -287,7 +291,6 @@ HANDLERS: dict[str, Handler] = {
     **dict.fromkeys(("RESUME", "SPL", "SPL_REL", "SPLINE", "PTP_SPLINE", "ENDSPLINE"), _not_followed),
 }
 
-GLOBAL_NAME = re.compile(r"(?i)\bGLOBAL\b")
 PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 DECLARED = re.compile(r"(?im)^[ \t]*DECL[ \t]+(GLOBAL[ \t]+)?\w+[ \t]+([\w$]+)")
 ROUTINE = re.compile(r"(?im)^[ \t]*(GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+(?:\s*\[[^\]]*\])?)?[ \t]+(\w+)")
@@ -360,11 +363,9 @@ class _KrlReader:
             for a text without an end
         """
         builder = CodeBuilder("", (), Place(source.path, 1))
-        for number, line in enumerate(source.lines, 1):
-            place = Place(source.path, number)
-            text, _ = split_comment(line, place)
+        for place, text, is_comment in statements(source, BREAKS, _at_each_line):
             first = text.split(None, 1)[0].upper() if text else ""
-            if first and first not in ("DEFDAT", "ENDDAT") and not text.startswith("&"):
+            if not is_comment and first not in ("DEFDAT", "ENDDAT") and not text.startswith("&"):
                 _Statement(builder, place, text, self, inside_data=True)
         self.data += [each for each in builder.code if isinstance(each, syntax.Assign)]
 
@@ -373,25 +374,24 @@ class _KrlReader:
         routines: list[syntax.Routine] = []
         builder: CodeBuilder | None = None
         source, end = self.source, "END"
-        for number, line in enumerate(source.lines, 1):
-            place = Place(source.path, number)
-            text, comment = split_comment(line, place)
+        for place, text, is_comment in statements(source, BREAKS, _at_each_line):
             head = HEAD.match(text) if text[:1] in "DdGg" else None
-            if head is not None:
+            if is_comment:
+                if builder is not None and text and not text.upper().startswith("ENDFOLD"):
+                    builder.remark(place, text)
+            elif head is not None:
                 if builder is not None:
                     raise fault(builder.place, f"{builder.name} has no {end}", "Close it before the next begins")
                 builder = self._begin(head[1].upper(), head[2], place)
                 end = "ENDFCT" if head[1].upper() == "DEFFCT" else "END"
             elif builder is None:
-                if text and not text.startswith("&"):
+                if not text.startswith("&"):
                     raise fault(place, f"'{text[:40]}' is outside of any routine", "Begin with DEF NAME ( )")
             elif text.upper() == end:
                 routines.append(builder.routine(place))
                 builder = None
-            elif text:
+            else:
                 _Statement(builder, place, text, self, inside_data=False)
-            elif comment and not comment.upper().startswith("ENDFOLD"):
-                builder.remark(place, comment)
         if builder is not None:
             builder.routine(Place(source.path, len(source.lines)))
             raise fault(builder.place, f"{builder.name} has no {end}", f"Close it with {end}")
@@ -426,34 +426,8 @@ class _KrlReader:
         return builder
 
 
-def split_comment(line: str, place: Place) -> tuple[str, str]:
-    """A line without its comment, and the comment.
-
-    Parameters
-    ----------
-    line : a semicolon within quotes begins no comment
-    place : of the line, for the error
-
-    Returns
-    -------
-    text, comment : without surrounding blanks
-
-    Raises
-    ------
-    InputError
-        for a text in quotes without an end
-    """
-    text, _, comment = line.partition(";")
-    if '"' in text:
-        parts = line.split('"')
-        inside = next((i for i in range(0, len(parts), 2) if ";" in parts[i]), None)
-        if inside is None:
-            if len(parts) % 2 == 0:
-                raise fault(place, "a text has no end", 'Close it with "')
-            return line.strip(), ""
-        last, _, comment = parts[inside].partition(";")
-        text, comment = '"'.join((*parts[:inside], last)), '"'.join((comment, *parts[inside + 1 :]))
-    return text.strip(), comment.strip()
+def _at_each_line(text: str, mark: str) -> bool:
+    return True
 
 
 def companions(path: Path) -> tuple[Path, ...]:

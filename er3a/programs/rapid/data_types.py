@@ -288,17 +288,6 @@ def pose_record(T: Reals) -> Record:
     return Record("POSE", (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3]))))
 
 
-def moved_target(target: Record, T: Reals) -> Record:
-    """A robtarget with another pose.
-
-    Parameters
-    ----------
-    target : whose configuration and external axes stay
-    T : (4, 4), m, in the work object
-    """
-    return target.having("TRANS", pos_record(T[:3, 3])).having("ROT", orient_record(T[:3, :3]))
-
-
 QUARTER = math.pi / 2
 MIN_LOAD = 0.001
 """kg, of a tool whose mass is not known: tool0 and most templates have it (3 loaddata)."""

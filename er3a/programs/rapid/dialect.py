@@ -71,11 +71,11 @@ class RapidDialect(Dialect):
         return data_types.typed(value, kind)
 
     def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
-        """Sums of positions, a number times a position, products of turns.
+        """Sums of positions, and a number times a position.
 
         Returns
         -------
-        value : a pos in mm, or an orient; ``*`` of two positions is their cross product. None for other operands.
+        value : a pos in mm; None for other operands
 
         References
         ----------
@@ -83,13 +83,11 @@ class RapidDialect(Dialect):
         """
         a, b = data_types.plain(left, 3), data_types.plain(right, 3)
         scale = syntax.number(left) if a is None else syntax.number(right)
-        if a is not None and b is not None and sign in "+-*":
-            p, q = np.array(a), np.array(b)
-            return data_types.pos_record((p + q if sign == "+" else p - q if sign == "-" else np.cross(p, q)) / 1000)
+        if a is not None and b is not None and sign in "+-":
+            return data_types.pos_record(np.array(a) / 1000 + np.array(b) / (1000 if sign == "+" else -1000))
         if sign == "*" and scale is not None and (xyz := a or b) is not None:
             return data_types.pos_record(scale * np.array(xyz) / 1000)
-        turn, then = data_types.rotation_of(left), data_types.rotation_of(right)
-        return data_types.orient_record(turn @ then) if sign == "*" and turn is not None and then is not None else None
+        return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """The value of a function of RAPID: mathematics in degrees, positions, where the arm is.

@@ -7,27 +7,23 @@ records of the program's own are passed over. The grammar is that of ABB's *Tech
 
 from __future__ import annotations
 
-import bisect
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, fault, is_no_statement, linked, mapped, within
+from er3a.programs.code_builder import CodeBuilder, block, fault, is_no_statement, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, read_program_text
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Names, ProgramText, Words, read_program_text
 from er3a.programs.rapid import known_names
 from er3a.programs.rapid.data_types import starting
 
-PATTERN = re.compile(
-    rf"""(?P<comment>![^\n]*)|(?P<text>"(?:[^"\n]|"")*")|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
-    r"""|(?P<mark>:=|<>|<=|>=|\S)"""
-)
+TEXT = r'"(?:[^"\n]|"")*"'
 RAPID = Lexicon(
-    PATTERN,
+    re.compile(rf"""(?P<text>{TEXT})|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<mark>:=|<>|<=|>=|\S)"""),
     ranks={
         **dict.fromkeys(("OR", "XOR"), 1),
         "AND": 2,
@@ -38,48 +34,59 @@ RAPID = Lexicon(
     right={"NOT": 2, "+": 5, "-": 5},
     constants={"TRUE": True, "FALSE": False},
     folds=True,
+    counts_down=True,
 )
 """RAPID Reference Manual, 7.7 Priority between operators: NOT, OR and XOR bind least."""
-ENDS_TEXT = """
-ENDPROC ENDFUNC ENDTRAP ENDMODULE ENDRECORD ENDIF ENDWHILE ENDFOR ENDTEST ELSE ELSEIF ERROR UNDO BACKWARD CASE DEFAULT
-PROC FUNC TRAP MODULE
-"""
-ENDS = frozenset(ENDS_TEXT.split())
-"""Words that no instruction goes on beyond."""
+BREAKS = re.compile(
+    rf"""(?i)(?P<comment>![^\n]*)|(?P<text>{TEXT})|(?P<bad>")|(?P<line>\\\w+)"""
+    r"""|(?P<alone>\b(?:ELSE|ERROR|UNDO|BACKWARD|END(?:IF|FOR|WHILE|TEST|PROC|FUNC|TRAP|RECORD|MODULE))\b(?!\s*:=))"""
+    r"""|(?P<begin>\b(?:CASE|DEFAULT|ELSEIF|(?:LOCAL\s+)?(?:PROC|FUNC|TRAP|RECORD))\b(?!\s*:=))"""
+    r"""|(?P<mark>;|\b(?:THEN|DO)\b|\)|:(?!=)|\n)"""
+)
+HEAD = re.compile(
+    r"(?is)(?:(?:LOCAL\s+)?(?:(?:PROC|FUNC\s+\w+)\s+\w+\s*\(.*\)|(?:TRAP|RECORD)\s+\w+)|MODULE\s+\w+\s*(?:\(.*\))?"
+    r"|(?:CASE|DEFAULT)\b.*:|\w+\s*:)$"
+)
+"""Statements that end without a semicolon."""
+FOR = re.compile(r"(?i)FOR\s+(\w+)")
 DECLARED = ("VAR", "PERS", "CONST")
+ROUTINES = {
+    "PROC": ("ENDPROC", "ENDFUNC"),
+    "FUNC": ("ENDPROC", "ENDFUNC"),
+    "TRAP": ("ENDTRAP",),
+    "RECORD": ("ENDRECORD",),
+}
+"""The words that begin a part of a module, with those that end it."""
 HANDLERS = ("ERROR", "UNDO", "BACKWARD")
 MOTIONS = frozenset(("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO"))
 MAX_ELEMENTS = 1000
 Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
 """Arguments by place and by name."""
-
-
-@dataclass(frozen=True, slots=True)
-class Token:
-    """A word of a module's text."""
-
-    kind: str
-    text: str
-    raw: str
-    start: int
-    end: int
-    line: int
+BLOCKS = {
+    "IF": ("if", "THEN"),
+    "ELSEIF": ("elif", "THEN"),
+    "WHILE": ("while", "DO"),
+    "FOR": ("for", "FROM TO STEP DO"),
+    "TEST": ("switch", ""),
+    "CASE": ("case", ""),
+    "DEFAULT": ("default", ":"),
+    "RETURN": ("return", ""),
+    "GOTO": ("goto", ""),
+    **dict.fromkeys(("EXIT", "EXITCYCLE"), ("end", "")),
+    "ELSE": ("else", ""),
+    "ENDTEST": ("close switch", ""),
+    **{f"END{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR")},
+}
 
 
 class RapidWords(Words):
     """Words of an instruction of RAPID."""
 
-    def __init__(self, tokens: Iterable[Token]):
-        self.lexicon = RAPID
-        self.at, self._depth, self._length = 0, 0, 0
-        kept = [each for each in tokens if each.kind != "comment"]
-        self.kinds = [*(token.kind for token in kept), "end"]
-        self.texts = [*(token.text for token in kept), ""]
+    def __init__(self, text: str, names: Names):
+        super().__init__(RAPID, text, names)
 
     def special(self) -> syntax.Expression | None:
-        """Aggregates, texts, the target that only the pendant shows."""
-        if self.kind == "text":
-            return syntax.Constant(self.take()[1:-1])
+        """Aggregates, and the target that only the pendant shows."""
         if self.next == "*" and self.kind == "mark":
             return syntax.Opaque(self.take())
         if not self.accept("["):
@@ -163,8 +170,8 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     InputError
         for texts and blocks without an end
     """
-    readers = [_ModuleReader(read_program_text(path), path.stem.upper()) for path in modules_of(source.path)]
-    own = _ModuleReader(source, source.path.stem.upper())
+    readers = [_ModuleReader(read_program_text(path)) for path in modules_of(source.path)]
+    own = _ModuleReader(source)
     readers.append(own)
     data = [each for reader in readers for each in reader.data]
     by_name = linked(each for reader in readers for each in reader.routines)
@@ -191,492 +198,185 @@ def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) ->
     return free[0].name if free else ""
 
 
-def _tokens(source: ProgramText, module: str) -> list[Token]:
-    """The words of a module; what it declares LOCAL gets the module's name before its own."""
-    text = HEADER.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
-    breaks = [match.start() for match in re.finditer("\n", text)]
-    hidden = {name.upper(): f"{module}/{name.upper()}" for name in LOCAL.findall(text)}
-    found: list[Token] = []
-    for match in PATTERN.finditer(text):
-        kind, raw = match.lastgroup or "", match.group()
-        line = bisect.bisect_left(breaks, match.start()) + 1
-        if raw == '"':
-            raise fault(Place(source.path, line), "a text has no end", 'Close it with "')
-        word = raw.upper() if kind == "name" else raw
-        if kind == "name" and not (found and found[-1].text in (".", "\\")):
-            word = hidden.get(word, word)
-        found.append(Token(kind, word, raw, match.start(), match.end(), line))
-    return found
+def _is_over(text: str, mark: str) -> bool:
+    return mark not in (")", ":", "\n") or HEAD.match(text.lstrip() + mark.strip()) is not None
 
 
 class _ModuleReader:
-    """The words of one module, read one after another: its declarations and routines."""
+    """The statements of one module: its declarations and routines.
 
-    def __init__(self, source: ProgramText, module: str):
-        self.source, self.tokens, self.at = source, _tokens(source, module), 0
+    What the module declares LOCAL gets the module's name before its own, and a loop's counter a name of its own within
+    the loop, because it hides data of that name.
+    """
+
+    def __init__(self, source: ProgramText):
+        text = HEADER.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), source.text)
+        module = source.path.stem.upper()
+        self.names = {name.upper(): f"{module}/{name.upper()}" for name in LOCAL.findall(text)}
+        self.counters: list[tuple[str, str | None]] = []
         self.routines: list[syntax.Routine] = []
         self.data: list[syntax.Assign] = []
-        while (token := self.next()) is not None:
-            self._part(token)
+        self.builder: CodeBuilder | None = None
+        self.passing: tuple[str, ...] = ()  # words that end what is passed over
+        place = Place(source.path, 1)
+        for place, part, is_comment in statements(replace(source, text=text), BREAKS, _is_over):
+            if not is_comment:
+                self._part(place, part)
+            elif self.builder is not None and not self.passing:
+                self.builder.remark(place, part)
+        if self.builder is not None:
+            self.builder.routine(place)
+            raise fault(self.builder.place, f"{self.builder.name} has no ENDPROC", "Close it with ENDPROC or ENDFUNC")
+        if self.passing:
+            raise fault(place, f"there is no {self.passing[0]}", f"Close it with {self.passing[0]}")
 
-    def next(self, comments: bool = False) -> Token | None:
-        """The next word of the module, which is not passed.
-
-        Parameters
-        ----------
-        comments : whether a comment counts as a word; else comments before the word are passed
-
-        Returns
-        -------
-        token : None at the end of the text
-        """
-        while not comments and self.at < len(self.tokens) and self.tokens[self.at].kind == "comment":
-            self.at += 1
-        return self.tokens[self.at] if self.at < len(self.tokens) else None
-
-    def word(self) -> str:
-        """The next name, in capital letters; empty for anything else."""
-        token = self.next()
-        return token.text if token is not None and token.kind == "name" else ""
-
-    def take(self) -> str:
-        """The next name, which is passed."""
-        word = self.word()
-        self.at += 1
-        return word
-
-    def place(self) -> Place:
-        """The place of the next word."""
-        token = self.next() or (self.tokens[-1] if self.tokens else None)
-        return Place(self.source.path, token.line if token else 1)
-
-    def text(self, tokens: list[Token]) -> str:
-        """The text of words, in one line and without comments.
-
-        Parameters
-        ----------
-        tokens : that follow each other
-
-        Returns
-        -------
-        text : as it was written if it is on one line; else the words with one blank between them
-        """
-        if not tokens:
-            return ""
-        lines = self.source.text[tokens[0].start : tokens[-1].end].split("\n")
-        return lines[0] if len(lines) == 1 else " ".join(each.raw for each in tokens if each.kind != "comment")
-
-    def simple(self) -> list[Token]:
-        """The words of an instruction up to its semicolon, which is passed, or to a word that can't belong to it."""
-        self.next()
-        first = self.at
-        while self.at < len(self.tokens):
-            token = self.tokens[self.at]
-            if token.text == ";" and token.kind == "mark":
-                self.at += 1
-                return self.tokens[first : self.at - 1]
-            if token.kind == "name" and token.text in ENDS and self.at > first:
-                break
-            self.at += 1
-        return self.tokens[first : self.at]
-
-    def until(self, *words: str) -> list[Token]:
-        """The words up to one of some words, which is not passed.
-
-        Parameters
-        ----------
-        words : in capital letters
-
-        Returns
-        -------
-        tokens : all up to the end of the text if there is none
-        """
-        first = self.at
-        while self.at < len(self.tokens) and self.tokens[self.at].text not in words:
-            self.at += 1
-        return self.tokens[first : self.at]
-
-    def head(self, *words: str) -> list[Token]:
-        """The words up to one of some words, or a semicolon, which is passed.
-
-        Parameters
-        ----------
-        words : in capital letters, such as ``THEN``
-
-        Returns
-        -------
-        tokens : all up to the end of the text if there is none
-        """
-        found = self.until(*words, ";")
-        self.at += 1
-        return found
-
-    def _part(self, token: Token) -> None:
-        """A declaration or a routine; anything else is passed over."""
-        if token.text in ("MODULE", "ENDMODULE") and token.kind == "name":
-            self.at += 1
-            if token.text == "MODULE":
-                self.take()
-                if (after := self.next()) is not None and after.text == "(":
-                    self.head(")")
+    def _part(self, place: Place, text: str) -> None:
+        """A statement of the module, by its first word."""
+        words = RapidWords(text, self.names)
+        if words.next in ("LOCAL", "TASK"):
+            words.take()
+        word = words.next
+        if self.passing and word not in self.passing:
             return
-        first = self.at
-        while self.word() in ("LOCAL", "TASK"):
-            self.at += 1
-        word, place = self.word(), self.place()
-        if word in DECLARED:
-            builder = CodeBuilder("", (), place)
-            self.declaration(builder, local=False)
-            self.data += [each for each in builder.code if isinstance(each, syntax.Assign)]
-        elif word in ("PROC", "FUNC"):
-            self._routine(word)
-        else:
-            self.at = first
-            if word not in ("TRAP", "RECORD"):
-                self.simple()
-            elif not (self.until(f"END{word}") and self.take()):
-                raise fault(place, f"the {word} that begins here has no end", f"Close it with END{word}")
+        self.passing = ()
+        if word in ROUTINES and self.builder is not None:
+            raise fault(place, f"{word} stands within {self.builder.name}", "Close it with ENDPROC or ENDFUNC before")
+        if word in ("PROC", "FUNC"):
+            self._begin(place, words)
+        elif word in ROUTINES or (word in HANDLERS and self.builder is not None):
+            self.passing = ROUTINES.get(word, ROUTINES["PROC"])
+        elif word in ROUTINES["PROC"] and self.builder is not None:
+            self.routines.append(self.builder.routine(place))
+            self.builder = None
+        elif word in DECLARED:
+            builder = self.builder or CodeBuilder("", (), place)
+            _declare(builder, place, words, text, local=self.builder is not None)
+            if self.builder is None:
+                self.data += [each for each in builder.code if isinstance(each, syntax.Assign)]
+        elif self.builder is not None:
+            self._instruction(self.builder, place, text)
 
-    def declaration(self, builder: CodeBuilder, local: bool) -> None:
-        """Read a declaration, such as ``VAR num n{3} := [1, 2, 3];``, and add it to the code.
-
-        Parameters
-        ----------
-        local : whether it is a routine's own
-
-        Notes
-        -----
-        Without a value it holds what its type starts with, but for a PERS, whose value is in the controller. One that
-        is not understood is kept as unknown.
-        """
-        place, tokens = self.place(), self.simple()
-        words = RapidWords(tokens)
-        try:
-            elsewhere = words.take() == "PERS"  # where it has no value here
-            kind, name = words.name(), words.name()
-            initial = starting(kind)
-            for size in reversed(words.in_braces() if words.accept("{") else []):
-                kind += "[]"
-                count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
-                known = count is not None and 0 < count <= MAX_ELEMENTS
-                initial = (initial,) * int(count or 0) if known and initial is not None else None
-            value: syntax.Expression | None = words.expression() if words.accept(":=") else None
-            words.finish()
-        except MisreadError:
-            builder.unknown(place, self.text(tokens), may_move=False)
-            return
-        if value is None and initial is not None and not elsewhere:
-            value = syntax.Constant(initial)
-        builder.add(syntax.Assign(place, syntax.Variable(name), value, self.text(tokens), kind, local))
-
-    def _routine(self, word: str) -> None:
-        place = self.place()
-        self.at += 1
-        kind = self.take() if word == "FUNC" else ""
-        name = self.take()
-        opened = self.next()
-        if not name or opened is None or opened.text != "(":
-            raise fault(place, f"this head of a {word} can't be read", f"Write {word} name()")
-        self.at += 1
-        inside = self.until(")")
-        self.at += 1
-        parameters, kinds = _parameters(inside, place)
-        builder = CodeBuilder(name, tuple(parameters), place)
+    def _begin(self, place: Place, words: RapidWords) -> None:
+        """``PROC name(parameters)``, ``FUNC type name(parameters)``; a parameter that may be left out has its name."""
+        kind = words.name() if words.take() == "FUNC" else ""
+        name = words.name()
+        parameters: list[syntax.RoutineParameter] = []
+        kinds: list[str] = []
+        optional = False
+        given: list[str] = []
+        words.expect("(")
+        while words.kind != "end":
+            word = words.take()
+            if word not in (",", "\\", "|", ")"):
+                given += [word] if word not in "{}" else []
+                continue
+            names = [each for each in given if each != "*"]
+            if len(names) == 1:
+                raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
+            if names:
+                kinds.append(names[-2] + "[]" * given.count("*"))
+                out = names[0] in ("INOUT", "VAR", "PERS")
+                parameters.append(syntax.RoutineParameter(names[-1], out, named=optional))
+            optional, given = word != ",", []
+        self.builder = CodeBuilder(name, tuple(parameters), place)
         for parameter, its in zip([*parameters, syntax.RoutineParameter(syntax.RETURNED)], [*kinds, kind]):
             if its:
-                builder.add(syntax.Assign(place, syntax.Variable(parameter.name), None, "", its, local=True))
-        _BodyReader(self, builder).read(f"END{word}")
-        self.routines.append(builder.routine(self.place()))
-        self.at += 1
+                self.builder.add(syntax.Assign(place, syntax.Variable(parameter.name), None, "", its, local=True))
 
-
-def _parameters(tokens: list[Token], place: Place) -> tuple[list[syntax.RoutineParameter], list[str]]:
-    """Parameters with their types; one that may be left out is given by its name."""
-    found: list[syntax.RoutineParameter] = []
-    kinds: list[str] = []
-    optional = False
-    words: list[str] = []
-    for token in [*tokens, Token("mark", ",", ",", 0, 0, place.line)]:
-        if token.text not in (",", "\\", "|"):
-            words += [token.text] if token.kind == "name" or token.text == "*" else []
-            continue
-        names = [each for each in words if each != "*"]
-        if len(names) == 1:
-            raise fault(place, "a parameter has no type or no name", "Write PROC name(num n)")
-        if names:
-            kinds.append(names[-2] + "[]" * words.count("*"))
-            out = names[0] in ("INOUT", "VAR", "PERS")
-            found.append(syntax.RoutineParameter(names[-1], out, named=optional))
-        optional, words = token.text != ",", []
-    return found, kinds
-
-
-class _BodyReader:
-    """The instructions of one routine."""
-
-    def __init__(self, module: _ModuleReader, builder: CodeBuilder):
-        self.module, self.builder = module, builder
-
-    def read(self, end: str) -> None:
-        """Read a routine's instructions, and pass over its handlers (ERROR, UNDO, BACKWARD).
-
-        Parameters
-        ----------
-        end : the word that ends the routine, which is not passed
-
-        Raises
-        ------
-        InputError
-            if that word is missing, or a block in the routine has no end
-        """
-        self.instructions(end)
-        if self.module.word() in HANDLERS:
-            self.module.until(end)
-            if not self.module.word():
-                raise fault(self.builder.place, f"{self.builder.name} has no {end}", f"Close it with {end}")
-
-    def instructions(self, *ends: str) -> None:
-        """Read instructions up to a word that ends them, or a handler's, which is not passed.
-
-        Parameters
-        ----------
-        ends : in capital letters
-
-        Raises
-        ------
-        InputError
-            at the end of the text, or at the end of another block
-        """
-        module, builder = self.module, self.builder
-        while True:
-            token = module.next(comments=True)
-            if token is None:
-                raise fault(builder.place, f"{builder.name} has no {ends[0]}", f"Close it with {ends[0]}")
-            word = token.text if token.kind == "name" else ""
-            place = Place(module.source.path, token.line)
-            following = module.tokens[module.at + 1 : module.at + 2]
-            is_set = bool(following) and following[0].text == ":="
-            if token.kind == "comment":
-                builder.remark(place, token.raw[1:].strip())
-                module.at += 1
-            elif word in (*ends, *HANDLERS) and not is_set:
-                return
-            elif word in BLOCKS:
-                BLOCKS[word](self, place)
-            elif word in ENDS and not is_set:
-                raise fault(place, f"{word} stands within {builder.name}", f"Close it with {ends[0]} before")
-            elif word in DECLARED:
-                module.declaration(builder, local=True)
-            else:
-                self.instruction(place, module.simple())
-
-    def instruction(self, place: Place, tokens: list[Token]) -> None:
-        """Read one instruction; one that is not understood is kept as such, and what it assigns to becomes unclear.
-
-        Parameters
-        ----------
-        tokens : up to its semicolon
-
-        Raises
-        ------
-        InputError
-            if brackets are nested too deeply
-        """
-        text = self.module.text(tokens)
-        words = RapidWords(tokens)
-        if words.kind == "end":
-            return
+    def _instruction(self, builder: CodeBuilder, place: Place, text: str) -> None:
+        """An instruction; one that is not understood is kept as such, and what it assigns to becomes unclear."""
+        words = RapidWords(text, self.names)
+        counter = FOR.match(text)
+        if counter is not None:
+            name, own = counter[1].upper(), f"{counter[1].upper()}%{len(builder.code)}"
+            self.counters.append((name, self.names.get(name)))
+            builder.add(syntax.Assign(place, syntax.Variable(own), None, "", local=True))
+            words.texts[1] = own
         try:
-            self._instruction(place, words, text)
+            if words.next == "IF" and words.texts[-2] != "THEN":
+                words.take()
+                builder.open_if(place, words.expression(), text)
+                self._instruction(builder, place, text[words.offset() :])
+                builder.close("if", place)
+            elif not block(builder, words, place, text, BLOCKS):
+                _plain(builder, place, words, text)
         except MisreadError:
-            self.builder.unknown(place, text, stops=is_no_statement(text, calls_without_brackets=True))
+            builder.unknown(place, text, stops=is_no_statement(text, calls_without_brackets=True))
             if ":=" in words.texts and words.kinds[0] == "name":
-                self.builder.unclear(place, syntax.Variable(words.texts[0]), text)
+                builder.unclear(place, syntax.Variable(words.texts[0]), text)
         except RecursionError:
             raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+        if counter is not None:
+            self.names[name] = own
+        elif text.upper() == "ENDFOR":
+            name, before = self.counters.pop()
+            self.names.pop(name)
+            self.names |= {} if before is None else {name: before}
 
-    def condition(self, tokens: list[Token]) -> syntax.Expression:
-        """A condition, or another expression by itself.
 
-        Parameters
-        ----------
-        tokens : all of it
+def _declare(builder: CodeBuilder, place: Place, words: RapidWords, text: str, local: bool) -> None:
+    """A declaration, such as ``VAR num n{3} := [1, 2, 3];``.
 
-        Returns
-        -------
-        expression : :class:`Opaque` with its text if it is not understood
-        """
-        words = RapidWords(tokens)
-        try:
-            found = words.expression()
-            words.finish()
-        except MisreadError:
-            return syntax.Opaque(self.module.text(tokens))
-        return found
+    Without a value it holds what its type starts with, but for a PERS, whose value is in the controller. One that is
+    not understood is kept as unknown.
+    """
+    try:
+        elsewhere = words.take() == "PERS"  # where it has no value here
+        kind, name = words.name(), words.name()
+        initial = starting(kind)
+        for size in reversed(words.in_braces() if words.accept("{") else []):
+            kind += "[]"
+            count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
+            known = count is not None and 0 < count <= MAX_ELEMENTS
+            initial = (initial,) * int(count or 0) if known and initial is not None else None
+        value: syntax.Expression | None = words.expression() if words.accept(":=") else None
+        words.finish()
+    except MisreadError:
+        builder.unknown(place, text, may_move=False)
+        return
+    if value is None and initial is not None and not elsewhere:
+        value = syntax.Constant(initial)
+    builder.add(syntax.Assign(place, syntax.Variable(name), value, text, kind, local))
 
-    def close(self, place: Place, kind: str, end: str) -> None:
-        """End a block; its last word is passed.
 
-        Parameters
-        ----------
-        kind : the block's, as :class:`CodeBuilder` calls it
-        end : the word that must be there, such as ``ENDIF``
-
-        Raises
-        ------
-        InputError
-            if another word is there
-        """
-        if self.module.word() != end:
-            raise fault(place, f"the {end[3:]} that begins here has no end", f"Close it with {end}")
-        self.builder.close(kind, self.module.place())
-        self.module.at += 1
-
-    def _instruction(self, place: Place, words: RapidWords, text: str) -> None:
-        builder, first = self.builder, words.name()
-        if words.next in (":=", ".", "{"):
-            target = words.parts_of(syntax.Variable(first))
-            words.expect(":=")
-            value = words.expression()
-            words.finish()
-            builder.add(syntax.Assign(place, target, value, text))
-        elif first == "RETURN":
-            found = None if words.kind == "end" else words.expression()
-            words.finish()
-            builder.add(syntax.Return(place, found))
-        elif first in ("EXIT", "EXITCYCLE"):
-            words.finish()
-            builder.add(syntax.Return(place, ends=True))
-        elif first in COUNTED:
-            target = words.reference()
-            sign, amount = COUNTED[first]
-            by = words.expression() if words.accept(",") else syntax.Constant(amount)
-            words.finish()
-            builder.add(syntax.Assign(place, target, syntax.Binary(sign, target, by), text))
-        else:
-            self._called(place, first, words.arguments(""), text)
-
-    def _called(self, place: Place, name: str, given: Given, text: str) -> None:
-        """A call of a procedure, or an instruction of the controller."""
-        builder, (placed, named) = self.builder, given
-        if name in MOTIONS:
-            builder.add(syntax.Move(place, name, placed, text, (), named))
-        elif name == "WAITTIME" and placed:
-            builder.add(syntax.Waiting(place, "seconds", placed[0], text))
-        elif name == "STOP" and not placed:
-            builder.add(syntax.Waiting(place, "operator", None, text))
-        elif name in known_names.WAITS:
-            builder.add(syntax.Waiting(place, "condition", None, text))
-        else:
-            builder.add(syntax.Doing(place, syntax.Invocation(name, placed, named), text))
-        for key, each in named:
-            if key in known_names.CHANGING_OPTIONS:
-                builder.unclear(place, each, text)
+def _plain(builder: CodeBuilder, place: Place, words: RapidWords, text: str) -> None:
+    """An assignment, a call of a procedure, or an instruction of the controller."""
+    first = words.name()
+    if words.accept(":"):
+        builder.label(first)
+        return
+    if words.next in (":=", ".", "{"):
+        target = words.parts_of(syntax.Variable(first))
+        words.expect(":=")
+        value = words.expression()
+        words.finish()
+        builder.add(syntax.Assign(place, target, value, text))
+        return
+    if first in COUNTED:
+        target = words.reference()
+        sign, amount = COUNTED[first]
+        by = words.expression() if words.accept(",") else syntax.Constant(amount)
+        words.finish()
+        builder.add(syntax.Assign(place, target, syntax.Binary(sign, target, by), text))
+        return
+    placed, named = words.arguments("")
+    if first in MOTIONS:
+        builder.add(syntax.Move(place, first, placed, text, (), named))
+    elif first == "WAITTIME" and placed:
+        builder.add(syntax.Waiting(place, "seconds", placed[0], text))
+    elif first == "STOP" and not placed:
+        builder.add(syntax.Waiting(place, "operator", None, text))
+    elif first in known_names.WAITS:
+        builder.add(syntax.Waiting(place, "condition", None, text))
+    else:
+        builder.add(syntax.Doing(place, syntax.Invocation(first, placed, named), text))
+    for key, each in named:
+        if key in known_names.CHANGING_OPTIONS:
+            builder.unclear(place, each, text)
 
 
 COUNTED = {"INCR": ("+", 1), "DECR": ("-", 1), "ADD": ("+", 0), "CLEAR": ("*", 0)}
 """Instructions that change a number: by which operator, and with what if nothing else is given."""
-
-
-def _if(body: _BodyReader, place: Place) -> None:
-    """``IF condition THEN``, or ``IF condition instruction;``."""
-    module, builder = body.module, body.builder
-    start = module.at
-    module.at += 1
-    condition = module.until("THEN", ";")
-    if (token := module.next()) is not None and token.text == "THEN":
-        module.at += 1
-        builder.open_if(place, body.condition(condition), module.text(condition))
-        body.instructions("ENDIF", "ELSEIF", "ELSE")
-        while module.word() in ("ELSEIF", "ELSE"):
-            other = [] if module.take() == "ELSE" else module.head("THEN")
-            builder.next_arm(place, body.condition(other) if other else None, module.text(other))
-            body.instructions("ENDIF", "ELSEIF", "ELSE")
-        body.close(place, "if", "ENDIF")
-        return
-    module.at = start + 1
-    tokens = [each for each in module.simple() if each.kind != "comment"]
-    words = RapidWords(tokens)
-    try:
-        test = words.expression()
-    except MisreadError:
-        builder.unknown(place, module.text(tokens))
-        return
-    builder.open_if(place, test, module.text(tokens[: words.at]))
-    body.instruction(place, tokens[words.at :])
-    builder.close("if", place)
-
-
-def _while(body: _BodyReader, place: Place) -> None:
-    body.module.at += 1
-    condition = body.module.head("DO")
-    body.builder.open_while(place, body.condition(condition), body.module.text(condition))
-    body.instructions("ENDWHILE")
-    body.close(place, "while", "ENDWHILE")
-
-
-def _for(body: _BodyReader, place: Place) -> None:
-    """``FOR i FROM first TO last STEP step DO``; without a step it counts towards the last. The counter hides data of
-    its name in the loop alone."""
-    module, builder = body.module, body.builder
-    module.at += 1
-    tokens = module.head("DO")
-    words = RapidWords(tokens)
-    try:
-        name = words.name()
-        words.expect("FROM")
-        first = words.expression()
-        words.expect("TO")
-        last = words.expression()
-        step = words.expression() if words.accept("STEP") else None
-        words.finish()
-    except MisreadError as error:
-        raise fault(place, f"this FOR can't be read ({error})", "Write FOR i FROM 1 TO 9 DO") from None
-    if step is None and isinstance(first, syntax.Constant) and isinstance(last, syntax.Constant):
-        ends = syntax.number(first.value), syntax.number(last.value)
-        step = syntax.Constant(-1 if None not in ends and ends[0] > ends[1] else 1)  # type: ignore[operator]
-    before = len(builder.code)
-    counter = syntax.Variable(f"{name}%{before}")
-    builder.add(syntax.Assign(place, counter, None, "", local=True))
-    builder.open_for(place, counter.name, first, last, step, module.text(tokens))
-    inside = len(builder.code)
-    body.instructions("ENDFOR")
-
-    def each(expression: syntax.Expression) -> syntax.Expression:
-        return counter if expression == syntax.Variable(name) else within(expression, each)
-
-    for at in range(inside, len(builder.code)):
-        operation = mapped(builder.code[at], each)
-        if isinstance(operation, syntax.Assign):
-            operation = replace(operation, target=each(operation.target))
-        builder.code[at] = operation
-    body.close(place, "for", "ENDFOR")
-
-
-def _test(body: _BodyReader, place: Place) -> None:
-    """``TEST subject CASE 1, 2: ... DEFAULT: ... ENDTEST``."""
-    module = body.module
-    module.at += 1
-    asked = module.until("CASE", "DEFAULT", "ENDTEST")
-    body.builder.open_switch(place, body.condition(asked), f"TEST {module.text(asked)}")
-    while (word := module.word()) in ("CASE", "DEFAULT"):
-        at = module.place()
-        module.at += 1
-        tokens = module.head(":")
-        words = RapidWords(tokens)
-        values: list[syntax.Expression] = []
-        try:
-            while word == "CASE" and (not values or words.accept(",")):
-                values.append(words.expression())
-            words.finish()
-        except MisreadError as error:
-            raise fault(at, f"this CASE can't be read ({error})", "Write CASE 1, 2:") from None
-        body.builder.case(at, values or None, f"CASE {module.text(tokens)}")
-        body.instructions("CASE", "DEFAULT", "ENDTEST")
-    body.close(place, "switch", "ENDTEST")
-
-
-BLOCKS: dict[str, Callable[[_BodyReader, Place], None]] = {"IF": _if, "WHILE": _while, "FOR": _for, "TEST": _test}
 
 SUFFIXES = (".mod", ".prg", ".sys", ".modx", ".sysx")
 HEADER = re.compile(r"(?s)\A\s*%%%.*?%%%")

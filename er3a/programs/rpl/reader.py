@@ -11,7 +11,7 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, block, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, linked, statements
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
 
@@ -144,7 +144,10 @@ def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str)
         builder.add(syntax.Doing(place, left, text))
 
 
-BREAKS = re.compile(r"\(\*(?!\s*,)|//|[\"';\n]|\b(?:THEN|DO|ELSE|REPEAT|OF)\b")
+BREAKS = re.compile(
+    r"""(?P<comment>\(\*(?!\s*,)(?s:.*?)\*\)|//[^\n]*)|(?P<text>"[^"\n]*"|'[^'\n]*')|(?P<bad>\(\*(?!\s*,)|["'])"""
+    r"""|(?P<alone>\b(?:ELSE|REPEAT)\b)|(?P<mark>;|\b(?:THEN|DO|OF)\b)|(?P<line>\n)"""
+)
 CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
 VARIABLE = re.compile(
     r"\s*(Routine|Module|Input|Output|Global|Local)\s+(?:Var|Const|Retain|Persistent)\s+(\w+)\s+(\w+)"
@@ -164,11 +167,11 @@ def read_rpl(source: ProgramText) -> syntax.Program:
     """
     place = Place(source.path, 1)
     builder = CodeBuilder(MAIN, (), place)
-    for place, text, comment in _statements(source):
-        if comment:
+    for place, text, is_comment in statements(source, BREAKS, _ends):
+        if is_comment:
             builder.remark(place, text)
         else:
-            _statement(builder, place, text)
+            statement(builder, place, text)
     by_name, data = linked([builder.routine(place)]), tuple(_variables(source))
     return syntax.Program("rpl", source.path.stem, source.path, by_name, MAIN, data, lines=source.lines)
 
@@ -185,44 +188,23 @@ def _variables(source: ProgramText) -> Iterator[syntax.Assign]:
             yield syntax.Assign(Place(path, number), syntax.Variable(name), value, line.strip(), kind.upper())
 
 
-def _statements(source: ProgramText) -> Iterator[tuple[Place, str, bool]]:
-    """Statements and comments with their first line; the bool says that it is a comment."""
-    text, line, at, start = source.text, 1, 0, 0
-    first, parts = 1, list[str]()
-    while (found := BREAKS.search(text, at)) is not None:
-        mark = found.group()
-        end = found.end()
-        if mark == "\n":
-            line += 1
-            at = end
-            if not "".join((*parts, text[start:end])).strip():
-                start, first, parts = end, line, []
-            continue
-        if mark in ("(*", "//"):
-            close = text.find("*)" if mark == "(*" else "\n", end)
-            if close < 0 and mark == "(*":
-                raise fault(Place(source.path, line), "a comment has no end", "Close it with *)")
-            close = len(text) if close < 0 else close
-            yield Place(source.path, line), text[end:close].strip(), True
-            parts.append(text[start : found.start()])
-            line += text.count("\n", end, close)
-            at = start = min(close + (2 if mark == "(*" else 0), len(text))
-        elif mark in "\"'":
-            close = text.find(mark, end)
-            if close < 0 or "\n" in text[end:close]:
-                raise fault(Place(source.path, line), "a text has no end", f"Close it with {mark}")
-            at = close + 1
-        else:
-            parts.append(text[start : end - (mark == ";")])
-            yield Place(source.path, first), " ".join("".join(parts).split()), False
-            at = start = end
-            first, parts = line, []
-    rest = " ".join("".join((*parts, text[start:])).split())
-    if rest:
-        raise fault(Place(source.path, first), f"'{rest[:40]}' has no end", "End each statement with ;")
+def _ends(text: str, mark: str) -> bool:
+    return mark != ""
 
 
-def _statement(builder: CodeBuilder, place: Place, text: str) -> None:
+def statement(builder: CodeBuilder, place: Place, text: str) -> None:
+    """Read a statement; one that is not understood is kept as such.
+
+    Parameters
+    ----------
+    builder : takes the operations
+    text : without the semicolon
+
+    Raises
+    ------
+    InputError
+        where a block is ended that was not begun, and where brackets are nested too deeply
+    """
     if builder.inside("switch") and (label := CASE_LABEL.match(text)) is not None:
         values = [expression(part) for part in label[1].split(",")]
         builder.case(place, values, label[1])

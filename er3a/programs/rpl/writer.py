@@ -15,11 +15,14 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, chords, numbers_of
+from er3a.planning.sequences import Arc
+from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, numbers_of
 from er3a.programs.rpl.dialect import SPEED, ZONE
+from er3a.programs.solving import way_of
 from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, short, tool_speed
 
 DIGITS = 6
+MAX_LINES = 10_000  # for an arc
 PERCENTS = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 70, 75, 80, 90, 100)
 SPEEDS_MM_S = (5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000)
 ZONES_MM = (1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)
@@ -158,15 +161,15 @@ class RplWriter(Writer):
     def _arc(self, ready: ReadyMotion) -> None:
         """Lines near the arc, through the joints that the arm's table gives."""
         motion = ready.motion
-        poses = None
+        joints = None
         if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
-            poses = chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
-        frames = (motion.tool, motion.base)
-        joints = [None] if poses is None else self.resolver.solve(poses, frames, ready.joints_before)
-        targets = [_joints_text(each) for each in joints if each is not None]
-        if len(targets) < len(joints):
+            poses = _chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
+            frames = (motion.tool, motion.base)
+            joints = None if poses is None else self.resolver.along(poses, frames, ready.joints_before)
+        if joints is None:
             self.omit(motion)
             return
+        targets = list(map(_joints_text, joints))
         self.count["arcs"] += 1
         self.count["chords"] += len(targets)
         speed = self._speed(ready)
@@ -312,6 +315,17 @@ def _text(item: RplItem) -> str:
         case "end":
             return "END_WHILE;"
     return f"{values[0].rstrip(';')};"
+
+
+def _chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
+    """Ends (n, 4, 4) of lines that stay within a deviation (m) of an arc; None where the points are on a line."""
+    way = way_of(start, via, end)
+    if not isinstance(way, Arc):
+        return None
+    # A chord over an angle w leaves its arc by radius (1 - cos(w / 2)).
+    widest = 2 * math.acos(max(1 - deviation / way.radius, 0.0))
+    count = min(max(math.ceil(way.angle / max(widest, 1e-6)), 1), MAX_LINES)
+    return way.poses(np.arange(1, count + 1) / count)
 
 
 def _comment(text: str) -> str:

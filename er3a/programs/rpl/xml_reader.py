@@ -15,7 +15,7 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
-from er3a.programs.rpl.reader import WORD, expression, initial
+from er3a.programs.rpl.reader import expression, initial, statement
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -221,13 +221,19 @@ class _Pou:
                 builder.add(syntax.Fixed(place, Disabled(text_of(element))))
             elif switch != "false" or _is_strange(element):
                 builder.unread(place, f"{text_of(element)} {_all_text(element)}")
-            elif element.tag in ("while", "for"):
-                self._loop(builder, element, place, (*within, pou))
+            elif element.tag == "rem":
+                builder.remark(place, element.text_of("text"))
+            elif element.tag == "end_pro":
+                builder.add(syntax.Return(place, ends=True))
             else:
-                _element(builder, element, place)
+                statement(builder, place, text_of(element))
+            if element.child("pouref") is not None and element.tag in ("while", "for"):
+                self._inside(builder, element, place, (*within, pou))
+            elif element.tag == "wait" and (flag := element.text_of("var")):  # whether it came in time
+                builder.unclear(place, expression(flag), flag)
 
-    def _loop(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
-        """A loop, whose body is the nearest around it that has its name."""
+    def _inside(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
+        """A loop's body: the nearest around it that has its name."""
         name = element.text_of("pouref")
         places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
         body = next((each for each in places if each.tag == "Pou" and each.text_of("Name") == name), None)
@@ -235,15 +241,6 @@ class _Pou:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
         if body in within or len(within) > MAX_LOOPS:
             raise fault(place, f"the loop's body '{name}' holds the loop itself", "Give each loop its own <Pou>")
-        source = text_of(element)
-        if element.tag == "while":
-            builder.open_while(place, expression(element.text_of("cond")), source)
-        else:
-            first, last = (expression(element.text_of(tag)) for tag in ("from", "to"))
-            step = expression(element.text_of("by")) if element.child("by") is not None else None
-            if not WORD.match(counter := element.text_of("var")):
-                raise fault(place, f"'{counter}' is not a variable that a loop can count", "Name a variable in <var>")
-            builder.open_for(place, counter, first, last, step, source)
         self._body(builder, body, f"{place.element}/{name}", within)
         builder.close(element.tag, place)
 
@@ -257,34 +254,6 @@ def _is_strange(element: XmlNode) -> bool:
         or any(each.tag not in parts for each in inside)
         or any(each.attributes or (each.children and each.text) for each in (element, *inside))
     )
-
-
-def _element(builder: CodeBuilder, element: XmlNode, place: Place) -> None:
-    """An element other than a loop."""
-    source = text_of(element)
-    match element.tag:
-        case "mjoint" | "mlin":
-            texts = [element.text_of(tag) for tag in MOTION_PARTS]
-            given = tuple(expression(text) if text else None for text in texts)
-            builder.add(syntax.Move(place, element.tag.upper(), given, source))
-        case "set":
-            target = expression(element.text_of("dest"))
-            builder.add(syntax.Assign(place, target, expression(element.text_of("expr")), source))
-        case "wait":
-            condition = element.text_of("condition")
-            builder.add(syntax.Waiting(place, "condition", expression(condition), condition))
-            if flag := element.text_of("var"):  # whether it came in time
-                builder.unclear(place, expression(flag), source)
-        case "end_pro":
-            builder.add(syntax.Return(place, ends=True))
-        case "dwell":
-            builder.add(syntax.Waiting(place, "seconds", expression(element.text_of("expr")), source))
-        case "rem":
-            builder.remark(place, element.text_of("text"))
-        case _:
-            arguments = tuple(expression(each) if each else None for each in _arguments(element))
-            name = "".join(each.text_of("name") for each in element.all("subroutine"))
-            builder.add(syntax.Doing(place, syntax.Invocation(name or "?", arguments), source))
 
 
 def _arguments(call: XmlNode) -> list[str]:
@@ -309,8 +278,7 @@ def text_of(element: XmlNode) -> str:
     inner = element.text_of
     match element.tag:
         case "mjoint" | "mlin":
-            given = [part for tag in MOTION_PARTS if (part := inner(tag))]
-            return f"{element.tag.upper()}({', '.join(given)})"
+            return f"{element.tag.upper()}({', '.join(map(inner, MOTION_PARTS)).rstrip(', ')})"
         case "set":
             return f"{inner('dest')} := {inner('expr')}"
         case "wait":
@@ -320,12 +288,13 @@ def text_of(element: XmlNode) -> str:
         case "while":
             return f"WHILE {inner('cond')} DO"
         case "for":
-            return f"FOR {inner('var')} := {inner('from')} TO {inner('to')} DO"
+            step = f" BY {inner('by')}" if element.child("by") is not None else ""
+            return f"FOR {inner('var')} := {inner('from')} TO {inner('to')}{step} DO"
         case "rem":
             return f"(* {inner('text')} *)"
         case "call":
             name = "".join(each.text_of("name") for each in element.all("subroutine"))
-            return f"{name}({', '.join(filter(None, _arguments(element)))})"
+            return f"{name}({', '.join(_arguments(element))})"
     return f"<{element.tag}> {_all_text(element)}"[:200]
 
 

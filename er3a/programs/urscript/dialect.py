@@ -13,7 +13,7 @@ from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
 from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, unresolved
-from er3a.programs.urscript.reader import CHANGED, LIST_METHODS
+from er3a.programs.urscript.reader import LIST_METHODS
 from er3a.robots.masses import MassBody
 
 KINDS: dict[str, instructions.MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
@@ -104,7 +104,6 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     "r2d": ("r",),
 }
 """Parameters of the functions that are evaluated. A call that does not fit them is not understood."""
-LONGEST_LIST = 10_000
 PLAIN: dict[str, Callable[..., float]] = {
     **{name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "pow")},
     "floor": math.floor,
@@ -168,8 +167,6 @@ class UrScriptDialect(Dialect):
         if name == "struct":
             return syntax.Record(name, tuple(keywords.items()))
         unclear = syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
-        if name == CHANGED:
-            return _changed(values, unclear)
         placed = _placed(SIGNATURES.get(name), values, keywords)
         if placed is None:
             return unclear
@@ -361,16 +358,6 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> syntax.Valu
             return None
     seen = here.seen(tool, ROBOT_BASE, memory.cell.flange)
     return None if seen is None else _record(seen)
-
-
-def _changed(values: list[syntax.Value | None], unclear: syntax.Unclear) -> syntax.Value:
-    """A list after one of its methods, whose name is the second argument."""
-    found, name, *more = (syntax.Unclear("") if each is None else each for each in values)
-    if not isinstance(found, tuple) or len(found) >= LONGEST_LIST:
-        return unclear
-    if name == "append" and len(more) == 1:
-        return (*found, more[0])
-    return () if name == "clear" and not more else unclear
 
 
 def _of_values(name: str, values: list[syntax.Value]) -> syntax.Value | None:

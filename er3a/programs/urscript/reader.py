@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from er3a.errors import InputError
 from er3a.programs import syntax
-from er3a.programs.code_builder import CodeBuilder, block, fault, linked
+from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, MoreError, ProgramText, Words, as_number
 
@@ -35,11 +35,11 @@ UR = Lexicon(
 )
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
-CHANGED = "%changed"
-"""What a list is after a method changed it, as a function of itself, the method's name and its arguments."""
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
 
 
+TEXT = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
+BREAKS = re.compile(rf"""(?P<comment>#[^\n]*)|(?P<text>{TEXT.pattern})|(?P<bad>["'])|(?P<mark>\n)""")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
 STATEMENT = re.compile(
@@ -53,13 +53,12 @@ class UrWords(Words):
 
     def __init__(self, text: str):
         super().__init__(UR, text)
-        self.text = text
 
     def finish(self) -> None:
         """Nothing may follow but another statement: :class:`MoreError`."""
         self.accept(";")
         if self.kind != "end":
-            start = [match.start() for match in UR.pattern.finditer(self.text)][self.at]
+            start = self.offset()
             if STATEMENT.match(self.text, start):
                 raise MoreError(start)
         super().finish()
@@ -155,11 +154,11 @@ class _UrReader:
     def read(self) -> list[syntax.Routine]:
         """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
-        for place, text, comment in self._statements():
-            if text:
+        for place, text, is_comment in statements(self.source, BREAKS, _is_over):
+            if is_comment:
+                self.open[-1].remark(place, text)
+            else:
                 self._statement(place, text)
-            elif comment:
-                self.open[-1].remark(place, comment)
         if len(self.open) > 1:
             builder = self.open[-1]
             if builder.blocks:
@@ -176,27 +175,6 @@ class _UrReader:
             if starts:
                 top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
         return [*self.routines, top.routine(place)]
-
-    def _statements(self) -> Iterator[tuple[Place, str, str]]:
-        """Statements with their first line: lines are joined while a bracket is open, or after an operator."""
-        parts: list[str] = []
-        depth, first = 0, 0
-        for number, line in enumerate(self.source.lines, 1):
-            text, comment, change = _split(line, Place(self.source.path, number))
-            if not parts:
-                first = number
-            depth += change
-            place = Place(self.source.path, first)
-            goes_on = depth > 0 or (depth == 0 and bool(OPEN_END.search(text)) and number < len(self.source.lines))
-            if goes_on and number - first < LONGEST_STATEMENT:
-                parts.append(text)
-                continue
-            if depth != 0:
-                raise fault(place, "a bracket has no partner", "Close each bracket")
-            yield place, " ".join((*parts, text)).strip(), comment
-            parts = []
-        if depth > 0:
-            raise fault(Place(self.source.path, first), "a bracket has no end", "Close it")
 
     def _statement(self, place: Place, text: str) -> None:
         builder = self.open[-1]
@@ -268,36 +246,12 @@ class _UrReader:
             self.outermost.append(builder.name)
 
 
-def _split(line: str, place: Place) -> tuple[str, str, int]:
-    """A line without its comment, the comment, and by how many brackets it opens more than it closes."""
-    kept, comment = line, ""
-    if '"' in line or "'" in line:
-        kept, comment, bare = _outside_texts(line, place)
-    else:
-        at = line.find("#")
-        if at >= 0:
-            kept, comment = line[:at], line[at + 1 :]
-        bare = kept
-    opened = bare.count("(") + bare.count("[") - bare.count(")") - bare.count("]")
-    return kept.strip(), comment.strip(), opened
-
-
-def _outside_texts(line: str, place: Place) -> tuple[str, str, str]:
-    quote = ""
-    bare: list[str] = []
-    for at, letter in enumerate(line):
-        if quote:
-            if letter == quote:
-                quote = ""
-        elif letter in "\"'":
-            quote = letter
-        elif letter == "#":
-            return line[:at], line[at + 1 :], "".join(bare)
-        else:
-            bare.append(letter)
-    if quote:
-        raise fault(place, "a text has no end", f"Close it with {quote}")
-    return line, "", "".join(bare)
+def _is_over(text: str, mark: str) -> bool:
+    """Whether a statement ends with its line: not while a bracket is open, or after an operator."""
+    bare = TEXT.sub("T", text)
+    depth = sum(map(bare.count, "([")) - sum(map(bare.count, ")]"))
+    goes_on = depth > 0 or (depth == 0 and mark != "" and OPEN_END.search(bare.rstrip()) is not None)
+    return not goes_on or (mark != "" and text.count("\n") >= LONGEST_STATEMENT)
 
 
 BLOCKS = {
@@ -344,24 +298,10 @@ def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: s
     name, _, method = call.function.partition(".")
     if method not in LIST_METHODS:
         return False
-    builder.add(
-        syntax.Assign(
-            place,
-            syntax.Variable(name),
-            syntax.Invocation(CHANGED, (syntax.Variable(name), syntax.Constant(method), *call.arguments)),
-            text,
-        )
-    )
+    builder.unclear(place, syntax.Variable(name), text)
     return True
 
 
 def _called(operation: syntax.Operation) -> Iterator[str]:
     """Functions that an operation calls."""
-    waiting = [*syntax.expressions_of(operation)]
-    if isinstance(operation, syntax.Doing):
-        waiting = [operation.what]
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, syntax.Invocation):
-            yield each.function
-        waiting += syntax.inner(each)
+    return (each.function for each in syntax.parts(operation) if isinstance(each, syntax.Invocation))

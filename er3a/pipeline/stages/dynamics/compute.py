@@ -549,6 +549,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         assumed=(
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),
+            *(() if study.scene(name, "trajectory") or not paths else (Open("open_space"),)),
             *_assumed(robot, unknown),
         ),
     )

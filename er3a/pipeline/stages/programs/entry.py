@@ -23,7 +23,7 @@ class ProgramsSettings(StrictModel):
     tool_speed_mm_s: Annotated[float, Field(gt=0, le=10_000)] = 250
     tool_acceleration_mm_s2: Annotated[float, Field(gt=0, le=100_000)] = 2000
     joint_speed_percent: Annotated[float, Field(gt=0, le=100)] = 10
-    most_steps: Annotated[int, Field(ge=100, le=100_000_000)] = 300_000
+    most_steps: Annotated[int, Field(ge=100, le=100_000_000)] = 500_000
     most_branches: Annotated[int, Field(ge=1, le=100_000)] = 64
     loop_rounds: Annotated[int, Field(ge=1, le=1_000_000)] = 100
 
