@@ -27,7 +27,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
-from er3a.pipeline.messages.scope import assumed_text, say_reserved
+from er3a.pipeline.messages.scope import assumed_text, never_text, say_reserved
 from er3a.pipeline.messages.scope import missed_text as missed_of_check
 from er3a.pipeline.messages.validation import (
     CONVENTIONS,
@@ -267,6 +267,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={stage.name: stage.question for stage in STAGES.values()},
         shown_figures=SHOWN_FIGURES,
         run_words=MAY_RUN,
+        never=never_text("trajectory"),
         conventions=CONVENTIONS,
         most_faults=MAX_FAULTS,
         sweeps=sweep_sections(study, results, outdated),
