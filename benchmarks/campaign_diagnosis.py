@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from er3a import load_references, load_robot
-from er3a.diagnosis import faults
 from er3a.diagnosis.ranking import case_of, rank, usable
 from er3a.pipeline.messages.diagnosis import both
 from testing.evidence import sized
@@ -107,21 +106,21 @@ def by(key: Callable[[Outcome], str], found: Sequence[Outcome]) -> list[str]:
 
 
 FAMILIES: dict[str, tuple[type, ...]] = {
-    "unit": (faults.WrongUnit,),
-    "alpha sign": (faults.WrongAlphaSign,),
-    "alpha": (faults.WrongAlpha,),
-    "swap": (faults.SwappedEntries,),
-    "rows": (faults.SwappedRows,),
-    "limits": (faults.SwappedLimits, faults.WrongLimits, faults.WrongLimit),
-    "shift": (faults.ShiftedRows,),
-    "offset": (faults.WrongOffset,),
-    "direction": (faults.ReversedDirection,),
-    "convention": (faults.WrongConvention,),
-    "length": (faults.WrongLength,),
-    "scale": (faults.WrongScale,),
-    "base": (faults.BaseElsewhere,),
-    "flange": (faults.FlangeElsewhere,),
-    "ground": (faults.CountedFromGround,),
+    "unit": ("wrong_unit",),
+    "alpha sign": ("wrong_alpha_sign",),
+    "alpha": ("wrong_alpha",),
+    "swap": ("swapped_entries",),
+    "rows": ("swapped_rows",),
+    "limits": ("swapped_limits", "wrong_limits", "wrong_limit"),
+    "shift": ("shifted_rows",),
+    "offset": ("wrong_offset",),
+    "direction": ("reversed_direction",),
+    "convention": ("wrong_convention",),
+    "length": ("wrong_length",),
+    "scale": ("wrong_scale",),
+    "base": ("base_elsewhere",),
+    "flange": ("flange_elsewhere",),
+    "ground": ("counted_from_ground",),
 }
 
 

@@ -13,10 +13,7 @@ How objects print in Python: a few lines of text, or a table in a notebook.
 An object prints as a :class:`Sheet` of codes and numbers, because the library contains no sentences. A sheet is always
 short, whatever the size of the object.
 
-Findings: codes with typed parameters. Their sentences are made in ``er3a.pipeline.messages``.
-
-All fields of a :class:`Finding` except ``code`` are its parameters, plain or findings themselves, with the unit in the
-name. Several kinds of finding in one place are a union. Code decides by type or code, never by a sentence.
+Coded values (:class:`Coded`): their texts are made in ``er3a.pipeline.messages``, as those of findings.
 """
 
 from __future__ import annotations
@@ -31,7 +28,7 @@ from html import escape
 from inspect import get_annotations
 from itertools import islice
 from types import MethodType
-from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar, dataclass_transform
 
 import numpy as np
 
@@ -55,7 +52,7 @@ class ByValue:
         return same(self, other)
 
     def __hash__(self) -> int:
-        return _crude_hash(self)
+        return crude_hash(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         kind, parts = type(self), fields(self)  # type: ignore[arg-type]
@@ -122,7 +119,7 @@ def _same_arrays(one: Any, other: Any) -> bool:
     return bool(np.array_equal(one, other, equal_nan=one.dtype.kind in "fc"))
 
 
-def _crude_hash(value: Any) -> int:
+def crude_hash(value: Any) -> int:
     """A hash that is equal where values are the same: of arrays and lists by their size and what they begin with."""
     if isinstance(value, np.ndarray):
         first = value.ravel()[:_HASHED].tolist() if value.dtype.kind in "biuf" else ()
@@ -132,9 +129,9 @@ def _crude_hash(value: Any) -> int:
     if isinstance(value, MethodType):
         return hash(value.__func__)
     if isinstance(value, list | tuple):
-        return hash((len(value), *map(_crude_hash, value[:_HASHED])))
+        return hash((len(value), *map(crude_hash, value[:_HASHED])))
     if is_dataclass(value) and not isinstance(value, type):
-        return hash((type(value), *(_crude_hash(getattr(value, part.name)) for part in fields(value) if part.compare)))
+        return hash((type(value), *(crude_hash(getattr(value, part.name)) for part in fields(value) if part.compare)))
     return hash(value) if value == value else 0
 
 
@@ -213,7 +210,10 @@ def shortly(value: Any) -> str:
     if isinstance(value, float):
         return ABSENT if math.isnan(value) else f"{round(value, 9) + 0.0:.6g}"
     if is_dataclass(value) and not isinstance(value, type) and hasattr(value, "code"):
-        values = [f"{each.name}={shortly(getattr(value, each.name))}" for each in fields(value) if each.name != "code"]
+        params = getattr(value, "params", None)
+        if params is None:
+            params = {each.name: getattr(value, each.name) for each in fields(value) if each.name != "code"}
+        values = [f"{name}={shortly(part)}" for name, part in params.items()]
         return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
     if isinstance(value, tuple | list):
         return _cut(", ".join(shortly(each) for each in islice(value, MAX_ROWS)) or ABSENT)
@@ -258,20 +258,29 @@ def _cut(text: str) -> str:
     return text if len(text) <= MAX_LETTERS else text[: MAX_LETTERS - 3] + "..."
 
 
-@dataclass_transform(frozen_default=True)
-class Finding:
-    """Base of findings. Each subclass becomes a frozen dataclass.
+KINDS: dict[str, type[Any]] = {}
+"""Classes of coded values, by their codes."""
 
-    The last field of each is its ``code``, the stable identifier that summaries hold: the name of the class in lower
-    case with underscores (``WrongUnit``: "wrong_unit"), unless ``class AllSafe(Finding, code="trajectory.safe")`` gives
-    another. ``code=""`` marks a base that only holds shared fields.
+
+@dataclass_transform(frozen_default=True)
+class Coded:
+    """Base of coded values that are data of their own: subjects of references, pairs of bodies, parts of a table.
+
+    What was found is a :class:`er3a.finding.Finding`. Each subclass becomes a frozen dataclass. Its last field is its
+    ``code``, the stable identifier that summaries hold: the name of the class in lower case with underscores, unless
+    ``class WholeGroup(Coded, code="group")`` gives another. ``code=""`` marks a base that only holds shared fields.
     """
 
     code: ClassVar[str]
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
     def __init_subclass__(cls, code: str | None = None) -> None:
         if code != "":
             cls.code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
             cls.__annotations__ = get_annotations(cls) | {"code": Literal[cls.code]}
+            KINDS[cls.code] = cls
         dataclass(frozen=True)(cls)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from er3a.by_value import Finding
+from er3a.finding import AnyFinding
 
 
 class Er3aError(Exception):
@@ -102,7 +102,7 @@ class PathError(Er3aError, ValueError):
 class NotWristPartitionedError(Er3aError):
     """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
 
-    def __init__(self, robot: str, property_missing: Finding):
+    def __init__(self, robot: str, property_missing: AnyFinding):
         self.robot, self.property_missing = robot, property_missing
         super().__init__(
             f"{robot}: no closed-form inverse ({property_missing.code.replace('_', ' ')}); it needs parallel axes 2 "

@@ -18,7 +18,6 @@ from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import scaled_jacobian
 from er3a.pipeline.new_study.arms import arm_of
 from er3a.pipeline.new_study.write import write_study
-from er3a.pipeline.results import NotComputed
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
@@ -120,7 +119,7 @@ def small_study(robot_file: Path, folder: Path) -> tuple[dict[str, str], list[st
                 run.compute(stage.name, study, name, results)
             verdict = json.loads((results / "summary.json").read_text(encoding="utf-8"))["verdict"]
             verdicts[stage.name] = verdict["status"]
-            if verdict["status"] == "not_computed" and verdict["code"] == NotComputed.code:
+            if verdict["status"] == "not_computed" and verdict["code"] == "stage.not_computed":
                 broken.append(f"{stage.name}: {verdict['params']['reason'][:100]}")
             if "report" in stage.views:
                 try:

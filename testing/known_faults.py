@@ -9,21 +9,10 @@ import numpy as np
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
-from er3a.diagnosis.faults import (
-    SIDES,
-    Fault,
-    Faults,
-    LengthColumn,
-    ReversedDirection,
-    WrongLength,
-    WrongLimit,
-    WrongScale,
-    entry_of,
-    repairs_of,
-    wrong_number,
-)
+from er3a.diagnosis.faults import SIDES, Fault, Faults, LengthColumn, entry_of, repairs_of, wrong_number
 from er3a.diagnosis.fitting import ANGLES, MEETS, minimise_max, moved
 from er3a.diagnosis.ranking import Case, Ranking, rank, usable
+from er3a.finding import fact
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
@@ -78,10 +67,10 @@ def mutations_of(robot: Robot) -> Iterator[Mutation]:
         for j in range(right.a.shape[-1]):
             length = float(getattr(right, column)[0, j])
             for wrong in ((0.0,) if length else ()) + tuple(length + by for by in WRONG_BY_M):
-                fault = WrongLength(j + 1, column, wrong * MM, length * MM)
+                fault = fact("wrong_length", joint=j + 1, column=column, given_mm=wrong * MM, fits_mm=length * MM)
                 yield Mutation((fault,), right.with_column(column, [j], np.full((1, 1), wrong)))
     for scale in SCALES:
-        yield Mutation((WrongScale(1 / scale),), replace(right, a=right.a * scale, d=right.d * scale))
+        yield Mutation((fact("wrong_scale", factor=1 / scale),), replace(right, a=right.a * scale, d=right.d * scale))
 
 
 def noisy(references: Sequence[Reference], noise_mm: float, random: np.random.Generator) -> tuple[Reference, ...]:
@@ -233,8 +222,14 @@ class ScannedEntry:
         given = fits + by if self.side else -fits
         changed = tables.with_column(column, [self.joint], np.full((1, 1), given))
         if self.side:
-            return WrongLimit(joint, self.side, float(np.degrees(given)), float(np.degrees(fits))), changed
-        return ReversedDirection(joint), changed
+            return fact(
+                "wrong_limit",
+                joint=joint,
+                side=self.side,
+                given_deg=float(np.degrees(given)),
+                fits_deg=float(np.degrees(fits)),
+            ), changed
+        return fact("reversed_direction", joint=joint), changed
 
 
 def entries_of(case: Case) -> list[ScannedEntry]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import texts
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
@@ -21,13 +21,13 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 ROBOT = "er3_600"
 
 
-class Hollow(Finding, code="made.hollow"):
+class Hollow(Coded, code="made.hollow"):
     """A finding of the stage below."""
 
     volume_m3: float
 
 
-class Solid(Finding, code="made.solid"):
+class Solid(Coded, code="made.solid"):
     """Another, which may hold one."""
 
     apart_from: Hollow | None

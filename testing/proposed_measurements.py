@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from er3a.identifiability.proposals import LookAtMotion, MeasureLength, Proposal, ReadLimit, TimeJoint
+from er3a.finding import is_one
+from er3a.identifiability.proposals import Proposal
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference
@@ -21,14 +22,14 @@ def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Referenc
     subject, quantity, group = _about(proposal)
     expected = float(predict(arm, [_plain(quantity, subject, group)])[0])
     width = COARSE_DEG
-    if isinstance(proposal, LookAtMotion):
+    if is_one(proposal, "look_at_motion"):
         if expected > 90.0 and isinstance(quantity, SeenMotion):
             quantity = replace(quantity, seen=opposite(proposal.seen))
             subject = replace(cast(MotionOfJoint, subject), seen=quantity.seen)
         expected = 0.0
-    elif isinstance(proposal, MeasureLength):
+    elif is_one(proposal, "measure_length"):
         width = proposal.half_width_mm
-    elif isinstance(proposal, TimeJoint):
+    elif is_one(proposal, "time_joint"):
         width = proposal.half_width_deg_s
     else:
         width = proposal.half_width_deg
@@ -45,12 +46,12 @@ def opposite(seen: Seen) -> Seen:
 
 def _about(proposal: Proposal) -> tuple[ReferenceSubject, Quantity, str]:
     joint = proposal.joint
-    if isinstance(proposal, LookAtMotion):
+    if is_one(proposal, "look_at_motion"):
         motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)
         return MotionOfJoint(joint, proposal.point, proposal.seen), motion, "key_poses"
-    if isinstance(proposal, ReadLimit):
+    if is_one(proposal, "read_limit"):
         return JointLimit(joint, proposal.side), Limit(joint, proposal.side), "limits"
-    if isinstance(proposal, TimeJoint):
+    if is_one(proposal, "time_joint"):
         return JointSpeed(joint), Speed(joint), "speeds"
     return EntryOfTable(proposal.column, joint), TableEntry(proposal.column, joint), "axes"
 

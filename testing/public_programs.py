@@ -17,9 +17,9 @@ import yaml
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
+from er3a.finding import is_one
 from er3a.pipeline.program_reports import MOST_ROWS, CheckedFile, lines_of
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, check_program
-from er3a.program_check.program_check_findings import NotFollowed
 from er3a.programs.languages import read_program
 
 NOT_IN_THE_FILE = frozenset(
@@ -83,7 +83,7 @@ def outcome(folder: Path, file: Path, robot: str) -> Outcome:
     clean = [each for each in given if each.level in ("pass", "note")]
     passed = [each for each in given if each in clean or _only_advised(at.get(each.place, []), each.followed)]
     codes = Counter(
-        f"{one.finding.code}{':' + one.finding.reason if isinstance(one.finding, NotFollowed) else ''} {one.level}"
+        f"{one.finding.code}{':' + one.finding.reason if one.finding.code == 'not_followed' else ''} {one.level}"
         for each in check.verdicts
         for one in at.get(each.place, [])
         if one.level not in ("note", "pass")
@@ -99,7 +99,7 @@ def _only_advised(found: list[LocatedFinding], followed: bool) -> bool:
 
 
 def _elsewhere(each: LocatedFinding) -> bool:
-    return isinstance(each.finding, NotFollowed) and each.finding.reason in NOT_IN_THE_FILE
+    return is_one(each.finding, "not_followed") and each.finding.reason in NOT_IN_THE_FILE
 
 
 def summary(found: list[Outcome]) -> str:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from er3a.errors import ResultError, WriteError
 from er3a.files.kept_files import half_written, sha256, write_atomically
 from er3a.files.robot_library import ROBOTS
+from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.results import (
@@ -29,7 +30,6 @@ from er3a.pipeline.results import (
     FORMAT_VERSION,
     AbsentResults,
     Figure,
-    NotComputed,
     Summary,
     Verdict,
     check_results,
@@ -100,11 +100,11 @@ def test_results_come_back_as_written(tmp_path, study):
 
 
 def test_a_stage_that_was_not_computed_has_a_reason_and_empty_tables(tmp_path, study):
-    absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("no wrist")), ()))
+    absent = AbsentResults(Summary(Verdict("not_computed", fact("stage.not_computed", reason="no wrist")), ()))
     write_results(tmp_path, study, "er3_600", STAGE, absent)
     stored = read_stage(tmp_path, STAGE)
     assert isinstance(stored.results, AbsentResults)
-    assert stored.results.summary.verdict == Verdict("not_computed", NotComputed("no wrist"))
+    assert stored.results.summary.verdict == Verdict("not_computed", fact("stage.not_computed", reason="no wrist"))
     assert pd.read_parquet(tmp_path / "rows.parquet").empty
     check_results(tmp_path)
 

@@ -48,15 +48,7 @@ from er3a.calibration.fit import (
     without_scale,
 )
 from er3a.calibration.observations import Measurement, PointObservations, Touched, observed
-from er3a.calibration.outcomes import (
-    CalibrationError,
-    FixedName,
-    LevelName,
-    MorePositions,
-    MoreTouches,
-    NoCorrectionFits,
-    NoPositions,
-)
+from er3a.calibration.outcomes import CalibrationError, FixedName, LevelName
 from er3a.calibration.parameters import (
     DEPENDENT,
     LEVELS,
@@ -78,7 +70,8 @@ from er3a.calibration.terms import (
     places_of,
 )
 from er3a.comparison.entries import TOOL_COLUMNS, Entry
-from er3a.diagnosis.faults import Faults, SwappedLimits, WrongLimits, repairs_of
+from er3a.diagnosis.faults import Faults, repairs_of
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.reference import INTERVAL_95
@@ -118,7 +111,7 @@ class Level:
     name: LevelName
     parameters: tuple[Entry, ...]
     subspace: Subspace
-    more: MorePositions | MoreTouches | None
+    more: Finding | None
     scale: Entry | None = None
     left: tuple[Entry, ...] = ()
 
@@ -153,14 +146,14 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
         if even the lengths ask for more
     """
     if not len(observations):
-        raise CalibrationError(NoPositions(), "there are no positions of single points to calibrate from")
+        raise CalibrationError(fact("no_positions"), "there are no positions of single points to calibrate from")
     placed = placements_of(observations.free)
     robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations)
     left = left_of_touched(robot, observations)
     spare = len(observations) - observations.dropped
     rich = _rich(robot, observations)
-    more: list[MorePositions | MoreTouches] = []
+    more: list[Finding] = []
     every: list[Entry] = []
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
@@ -171,13 +164,13 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
                 more.append(_what_more(name, parameters, (here, best), observations))
-            if (settled or isinstance(more[-1], MoreTouches)) and spare > len(here.kept) > 0:
-                what = next((each for each in more if isinstance(each, MoreTouches)), more[-1] if more else None)
+            if (settled or is_one(more[-1], "more_touches")) and spare > len(here.kept) > 0:
+                what = next((each for each in more if is_one(each, "more_touches")), more[-1] if more else None)
                 left_out_of_it = tuple(each for each in every if each not in parameters)
                 return Level(name, parameters, here, what, scale, left_out_of_it)
     if not more[-1].determinable:
         raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
-    lack = "numbers" if isinstance(more[-1], MoreTouches) else "positions"
+    lack = "numbers" if is_one(more[-1], "more_touches") else "positions"
     problem = f"{len(observations)} coordinates determine too little; {lack} to be added: {more[-1].missing} at least"
     raise CalibrationError(more[-1], problem)
 
@@ -199,23 +192,24 @@ def _what_more(
     parameters: tuple[Entry, ...],
     subspaces: tuple[Subspace, Subspace],
     observations: PointObservations,
-) -> MorePositions | MoreTouches:
+) -> Finding:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
     if observations.all_touched:
         return _what_touches(len(here.kept), max(len(best.kept), len(here.kept)), observations)
-    return MorePositions(
+    return fact(
+        "more_positions",
         coordinates=len(observations),
         poses=observations.poses,
         determined=len(here.kept),
         determinable=len(best.kept),
-        level=level,
+        fitted=level,
         missing=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
         entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
     )
 
 
-def _what_touches(settled: int, best: int, observations: PointObservations) -> MoreTouches:
+def _what_touches(settled: int, best: int, observations: PointObservations) -> Finding:
     """Number of poses needed at each place to determine ``best`` numbers, with one to spare."""
     things = observations.things()
     numbers = sum(each.numbers for each in things)
@@ -224,7 +218,15 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> M
         own = [thing for thing in things if thing.kind == kind]
         whole = missing + sum(thing.numbers for thing in own)
         each.append((kind, len(own), max(thing.unknown for thing in own) - (-whole // (own[0].coordinates * len(own)))))
-    return MoreTouches(observations.poses, numbers, settled, best, missing, tuple(each))
+    return fact(
+        "more_touches",
+        poses=observations.poses,
+        numbers=numbers,
+        determined=settled,
+        determinable=best,
+        missing=missing,
+        each=tuple(each),
+    )
 
 
 def _rich(robot: Robot, observations: PointObservations) -> PointObservations:
@@ -366,10 +368,10 @@ class Calibration(ByValue, Displayed):
     rms_before_mm: float
     rms_after_mm: float
     scatter: float
-    more: MorePositions | MoreTouches | None
+    more: Finding | None
     repeated: int = 0
     freedom: int = FEW_SPARE
-    wrong: outcomes.FarFromTable | None = None
+    wrong: Finding | None = None
     deviation_mm: float | None = None
     outliers: tuple[Outlier, ...] = ()
     ratios: tuple[TermEstimate, ...] = ()
@@ -392,7 +394,7 @@ class Calibration(ByValue, Displayed):
     @property
     def scale_is_assumed(self) -> bool:
         """Whether lengths were measured, whose scale counts as exact; else the longest of the table keeps its value."""
-        return not any(isinstance(why, outcomes.SetsScale) for why in self.held)
+        return not any(is_one(why, "sets_scale") for why in self.held)
 
     @property
     def conclusion(self) -> outcomes.CalibrationConclusion:
@@ -400,11 +402,11 @@ class Calibration(ByValue, Displayed):
         if self.wrong:
             return self.wrong
         if not self.fits:
-            return outcomes.Misfit(self.level, self.rms_before_mm, self.rms_after_mm)
+            return fact("misfit", fitted=self.level, rms_before_mm=self.rms_before_mm, rms_after_mm=self.rms_after_mm)
         beyond = tuple(each.name for each in self.estimates if abs(each.correction) > each.half_width)
         if beyond and len(self.open) < len(self.estimates):
-            return outcomes.CorrectionsFound(beyond)
-        return outcomes.NoCorrectionFound(len(self.estimates), self.open)
+            return fact("corrections_found", entries=beyond)
+        return fact("no_correction_found", intervals=len(self.estimates), open=self.open)
 
     @property
     def model(self) -> CorrectedModel:
@@ -589,7 +591,7 @@ def _fitted(robot: Robot, level: Level, observations: PointObservations) -> Fit:
     try:
         return fit(robot, level.kept, observations)
     except CalibrationError as error:
-        if not (level.left and level.more and isinstance(error.finding, NoCorrectionFits)):
+        if not (level.left and level.more and is_one(error.finding, "no_correction_fits")):
             raise
         problem = f"{observations.poses} poses settle too little of the table to fit it"
         raise CalibrationError(level.more, problem) from None
@@ -694,7 +696,7 @@ def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
     )
 
 
-def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> outcomes.FarFromTable | None:
+def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> Finding | None:
     """Why measurements and table can't belong together: what fits with one mistake undone is named; corrections or
     residuals far beyond those of arms and trackers are an error of some other kind."""
     far = _far_off(robot, found.estimates)
@@ -705,7 +707,7 @@ def _wrong(robot: Robot, observations: PointObservations, found: Calibration) ->
         robot, [each.parameter for each in found.estimates], observations, AS_GOOD * found.rms_after_mm
     )
     if swapped or faults or far or too_much:
-        return outcomes.FarFromTable(far, found.rms_after_mm, swapped, faults)
+        return fact("far_from_table", entries=far, rest_mm=found.rms_after_mm, swapped=swapped, faults=faults)
     return None
 
 
@@ -756,7 +758,7 @@ def _likeliest_mistakes(
             candidates.append(((first + 1, second + 1), (), robot, seen))
     for repair in repairs_of(tables_of(robot)):
         table = repair.apply(tables_of(robot))
-        if not isinstance(repair.fault, WrongLimits | SwappedLimits):
+        if not is_one(repair.fault, "wrong_limits", "swapped_limits"):
             candidates.append((None, (repair.fault,), robot_of(table, 0, robot), observations))
 
     def left(arm: Robot, seen: PointObservations) -> float:
@@ -773,13 +775,15 @@ def _rms(values: Reals) -> float:
 def _explained(robot: Robot, every: PointObservations, error: CalibrationError) -> CalibrationError:
     """An error that no corrections fit, with the mistake that explains it, if one does."""
     finding = error.finding
-    if not isinstance(finding, NoCorrectionFits):
+    if not is_one(finding, "no_correction_fits"):
         return error
     kept = choose_level(robot, every.merged()).kept
     swapped, faults = _mistakes_named(robot, kept, every, finding.rest_mm)
     if not (swapped or faults):
         return error
-    return CalibrationError(outcomes.FarFromTable((), finding.rest_mm, swapped, faults), str(error))
+    return CalibrationError(
+        fact("far_from_table", entries=(), rest_mm=finding.rest_mm, swapped=swapped, faults=faults), str(error)
+    )
 
 
 def _without_outliers(robot: Robot, every: PointObservations) -> Flags:

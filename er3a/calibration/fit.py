@@ -19,15 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.calibration.observations import PointObservations
-from er3a.calibration.outcomes import (
-    CalibrationError,
-    Held,
-    MovesNothing,
-    NoCorrectionFits,
-    NotToldApart,
-    PlacementName,
-    SetsScale,
-)
+from er3a.calibration.outcomes import CalibrationError, Held, PlacementName
 from er3a.calibration.parameters import (
     DEPENDENT,
     corrected,
@@ -37,6 +29,7 @@ from er3a.calibration.parameters import (
 )
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import Entry
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
@@ -142,7 +135,7 @@ def subspace(
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
-        nothing = MovesNothing(parameters[k].name)
+        nothing = fact("moves_nothing", entry=parameters[k].name)
         held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
@@ -238,10 +231,10 @@ def held_with(scale: Entry | None) -> tuple[Held, ...]:
     -------
     held : empty if nothing sets the scale
     """
-    return (MovesNothing(TURNS_ALL.name), SetsScale(scale.name)) if scale else ()
+    return (fact("moves_nothing", entry=TURNS_ALL.name), fact("sets_scale", entry=scale.name)) if scale else ()
 
 
-def _confounded_with(robot: Robot, parameters: Sequence[Entry], k: int, kept: list[int], J: Reals) -> NotToldApart:
+def _confounded_with(robot: Robot, parameters: Sequence[Entry], k: int, kept: list[int], J: Reals) -> Finding:
     """Which entries act on the measured points as entry ``k`` does."""
     share = np.linalg.lstsq(J[:, kept], J[:, k], rcond=None)[0] * np.linalg.norm(J[:, kept], axis=0)
     partners = [parameters[i] for i, part in zip(kept, share) if abs(part) > DEPENDENT * np.linalg.norm(J[:, k])]
@@ -250,7 +243,9 @@ def _confounded_with(robot: Robot, parameters: Sequence[Entry], k: int, kept: li
         if parameters[k].column == "d" and {parameters[k].joint, partners[-1].joint} == set(joints)
     ]  # fmt: skip
     entries = (parameters[k].name, *(partner.name for partner in partners))
-    return NotToldApart(entries, between[0] if between and len(partners) == 1 else None)
+    return fact(
+        "not_told_apart", entries=entries, parallel_joints=between[0] if between and len(partners) == 1 else None
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -546,7 +541,7 @@ def _fit(
             )
     rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
     raise CalibrationError(
-        NoCorrectionFits(most_steps, rest_mm),
+        fact("no_correction_fits", steps=most_steps, rest_mm=rest_mm),
         f"no corrections make the table fit: after {most_steps} steps the positions are still {rest_mm:.3g} mm off. "
         "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
     )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from er3a.by_value import Finding
-from er3a.diagnosis.faults import Faults
 from er3a.errors import Er3aError
+from er3a.finding import Finding
 
 LevelName = Literal["lengths", "lengths_and_offsets", "all_entries"]
 """Which entries are estimated: lengths that aren't 0, joint offsets besides, or all."""
@@ -22,97 +21,10 @@ TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
 may have made it, or because a load would have to lift the arm."""
 
 
-class MovesNothing(Finding):
-    """An entry moves none of the measured points."""
-
-    entry: str
+Held = Finding
 
 
-class NotToldApart(Finding):
-    """Entries have the same effect on the measured points; ``parallel_joints``: joints whose parallel axes cause it."""
-
-    entries: tuple[str, ...]
-    parallel_joints: tuple[int, int] | None
-
-
-class SetsScale(Finding):
-    """No length was measured, so the longest keeps its value and the others are relative to it."""
-
-    entry: str
-
-
-Held = MovesNothing | NotToldApart | SetsScale
-
-
-class NoPositions(Finding):
-    """There are no positions of single points."""
-
-
-class MorePositions(Finding):
-    """A level needs more positions.
-
-    Attributes
-    ----------
-    coordinates, poses : how many were measured
-    determined, determinable : entries of the level that they determine, and that positions of these points ever can
-    level : the level that is out of reach
-    missing : how many more positions it takes
-    entries : those that aren't determined
-    """
-
-    coordinates: int
-    poses: int
-    determined: int
-    determinable: int
-    level: LevelName
-    missing: int
-    entries: tuple[str, ...]
-
-
-class MoreTouches(Finding):
-    """Places or planes are touched at too few poses.
-
-    Attributes
-    ----------
-    poses, numbers : how many poses there are, and independent numbers that they give
-    determined, determinable : entries that they settle, and that such poses can settle
-    missing : how many more numbers it takes
-    each : of each kind how many there are, and how many poses of each it takes if each has as many
-    """
-
-    poses: int
-    numbers: int
-    determined: int
-    determinable: int
-    missing: int
-    each: tuple[tuple[str, int, int], ...]
-
-
-class NoCorrectionFits(Finding):
-    """The iteration does not converge: the table has a gross fault or is another arm's."""
-
-    steps: int
-    rest_mm: float
-
-
-class FarFromTable(Finding):
-    """Corrections, or what they leave, are far beyond what building and measuring an arm leave.
-
-    Attributes
-    ----------
-    entries : of the table, whose corrections are far too large
-    rest_mm : root mean square of what remains
-    swapped : joints whose columns are swapped, if that explains it
-    faults : of the table, one of which explains it; all that do equally well
-    """
-
-    entries: tuple[str, ...]
-    rest_mm: float
-    swapped: tuple[int, int] | None = None
-    faults: Faults = ()
-
-
-NotCalibrated = NoPositions | MorePositions | MoreTouches | NoCorrectionFits | FarFromTable
+NotCalibrated = Finding
 
 
 class CalibrationError(Er3aError):
@@ -123,25 +35,4 @@ class CalibrationError(Er3aError):
         super().__init__(problem)
 
 
-class Misfit(Finding):
-    """No corrections bring the table within three times the uncertainty of the positions."""
-
-    level: LevelName
-    rms_before_mm: float
-    rms_after_mm: float
-
-
-class CorrectionsFound(Finding):
-    """Entries whose 95 % interval does not contain 0."""
-
-    entries: tuple[str, ...]
-
-
-class NoCorrectionFound(Finding):
-    """All 95 % intervals hold 0; those of ``open`` entries are wider than what a table could be wrong by."""
-
-    intervals: int
-    open: tuple[str, ...] = ()
-
-
-CalibrationConclusion = FarFromTable | Misfit | CorrectionsFound | NoCorrectionFound
+CalibrationConclusion = Finding

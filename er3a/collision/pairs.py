@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 
 BASE = 0  # number of the fixed link
 TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
@@ -26,7 +26,7 @@ class TwoBodies(ABC):
         return "/".join(self.names)
 
 
-class LinkPair(TwoBodies, Finding):
+class LinkPair(TwoBodies, Coded):
     """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
 
     first: int
@@ -38,7 +38,7 @@ class LinkPair(TwoBodies, Finding):
         return link_label(self.first), link_label(self.second)
 
 
-class LinkAndSolid(TwoBodies, Finding):
+class LinkAndSolid(TwoBodies, Coded):
     """A link and a solid of the scene, by its name."""
 
     link: int
@@ -50,7 +50,7 @@ class LinkAndSolid(TwoBodies, Finding):
         return link_label(self.link), self.solid
 
 
-class CarriedAndLink(TwoBodies, Finding):
+class CarriedAndLink(TwoBodies, Coded):
     """What the tool carries, by its name, and a link."""
 
     carried: str
@@ -62,7 +62,7 @@ class CarriedAndLink(TwoBodies, Finding):
         return link_label(self.link), self.carried
 
 
-class CarriedAndSolid(TwoBodies, Finding):
+class CarriedAndSolid(TwoBodies, Coded):
     """What the tool carries and a solid of the scene, by their names."""
 
     carried: str
@@ -75,46 +75,6 @@ class CarriedAndSolid(TwoBodies, Finding):
 
 
 Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
-
-
-class PairOverlaps(Finding):
-    """Two bodies overlap, by a depth."""
-
-    pair: Pair
-    depth_mm: float
-
-
-class PairTooNear(Finding):
-    """Two bodies come nearer to each other than the margin that is to be kept."""
-
-    pair: Pair
-    clearance_mm: float
-    margin_mm: float
-
-
-class PairsUnexamined(Finding):
-    """Pairs whose collisions were not looked at, because their shapes overlap in all joint vectors tried
-    and so can't be right."""
-
-    pairs: tuple[Pair, ...]
-
-
-class ShapesAssumed(Finding):
-    """No document that verdicts rest on gives the shapes of an arm's links: what is said of collisions rests on
-    assumed ones.
-
-    Attributes
-    ----------
-    given : whether the robot's file gives shapes, inferred or claimed; else they were guessed from its table
-    margin_mm : within which of assumed shapes nothing is settled
-    near : what comes so near to them without touching, by name
-    partial : whether a document gives them, but for some links only in part
-    """
-
-    given: bool
-    margin_mm: float
-    near: tuple[str, ...] = ()
-    partial: bool = False
 
 
 def link_label(number: int) -> str:

@@ -28,9 +28,10 @@ from scipy.spatial import ConvexHull, QhullError
 
 from er3a.collision.convex import cylinder_points, distances_from_hull
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
-from er3a.collision.pairs import BASE, ShapesAssumed, link_label
+from er3a.collision.pairs import BASE, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.collision.triangles import TriangleTree, depths_inside, outer_corners, tree_of, trees_of
+from er3a.finding import Finding, fact
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
@@ -251,7 +252,7 @@ def _size(robot: Robot) -> float:
     return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
 
 
-def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> ShapesAssumed | None:
+def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> Finding | None:
     """The remark on collisions where the arm's shapes are assumed.
 
     Parameters
@@ -268,7 +269,7 @@ def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float |
         return None
     near = tuple(name for name, smallest in clearances.items() if smallest is not None and 0 <= smallest < margin)
     partial = shapes.grade not in ASSUMED_GRADES
-    return ShapesAssumed(shapes.given, 1000 * margin, near, partial)
+    return fact("shapes_assumed", given=shapes.given, margin_mm=1000 * margin, near=near, partial=partial)
 
 
 def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:

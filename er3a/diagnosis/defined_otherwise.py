@@ -27,21 +27,9 @@ from er3a.comparison.mechanism import (
     mechanism_of,
     turn_of,
 )
-from er3a.diagnosis.faults import (
-    SIDES,
-    BaseElsewhere,
-    CountedFromGround,
-    Fault,
-    Faults,
-    FlangeElsewhere,
-    ReversedDirection,
-    WrongLimit,
-    WrongOffset,
-    limit_stated,
-    rounded,
-    wrong_number,
-)
+from er3a.diagnosis.faults import SIDES, Fault, Faults, limit_stated, rounded, wrong_number
 from er3a.diagnosis.fitting import MEETS, lowered
+from er3a.finding import fact
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
@@ -135,7 +123,7 @@ def counted_from_ground(
         parallel = [k for k in range(joint) if abs(axes[k] @ axes[joint]) > PARALLEL]
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
             for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
-                fault = CountedFromGround(joint + 1, tuple(k + 1 for k in along), sign)
+                fault = fact("counted_from_ground", joint=joint + 1, along=tuple(k + 1 for k in along), sign=sign)
                 own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), MEETS)
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
                 off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
@@ -247,7 +235,7 @@ def _with_limits(given: Robot, found: Conventions, references: Sequence[Referenc
         if stated is not None:
             ends[joint] = math.radians(stated)
             if not assumed:
-                faults.append(WrongLimit(joint + 1, side, own, stated))
+                faults.append(fact("wrong_limit", joint=joint + 1, side=side, given_deg=own, fits_deg=stated))
     return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
 
 
@@ -374,16 +362,22 @@ def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:
     moved = wrap_to_pi(found.offset - given.offset)
     for k in range(given.joints):
         if found.direction[k] != given.direction[k]:
-            faults.append(ReversedDirection(k + 1))
+            faults.append(fact("reversed_direction", joint=k + 1))
         if abs(moved[k]) > tolerances.angle:
             fits = float(np.round(np.degrees(wrap_to_pi(found.offset[k : k + 1]))[0], 6))
-            faults.append(WrongOffset(k + 1, float(np.degrees(given.offset[k])), fits))
+            faults.append(
+                fact("wrong_offset", joint=k + 1, given_deg=float(np.degrees(given.offset[k])), fits_deg=fits)
+            )
     base = found.base @ np.linalg.inv(given.base)
     if np.linalg.norm(base[:3, 3]) > tolerances.length or turn_of(base) > tolerances.angle:
-        faults.append(BaseElsewhere(_shift(base), float(np.round(np.degrees(turn_of(base)), 4))))
+        faults.append(
+            fact("base_elsewhere", shift_mm=_shift(base), turn_deg=float(np.round(np.degrees(turn_of(base)), 4)))
+        )
     flange = np.linalg.inv(given.flange) @ found.flange
     if np.linalg.norm(flange[:3, 3]) > tolerances.length or turn_of(flange) > tolerances.angle:
-        faults.append(FlangeElsewhere(_shift(flange), float(np.round(np.degrees(turn_of(flange)), 4))))
+        faults.append(
+            fact("flange_elsewhere", shift_mm=_shift(flange), turn_deg=float(np.round(np.degrees(turn_of(flange)), 4)))
+        )
     return tuple(faults)
 
 

@@ -14,6 +14,7 @@ from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counte
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import ANGLES, MEETS, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
+from er3a.finding import fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables, search
@@ -181,7 +182,7 @@ class Diagnosis(ByValue, Displayed):
     @property
     def names_fault(self) -> bool:
         """Whether the best hypothesis explains all or most of the disagreement."""
-        return isinstance(self.conclusion, conclusions.MostLikelyFault | conclusions.MainFault)
+        return is_one(self.conclusion, "named", "mostly")
 
     def sheet(self) -> Sheet:
         """What the notebook shows: the conclusion, and a row for each hypothesis.
@@ -268,11 +269,11 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     """
     stated = usable(references)
     if not stated:
-        return Diagnosis(conclusions.NothingToRestOn(), 0, 0, ())
+        return Diagnosis(fact("no_reference"), 0, 0, ())
     case = case_of(robot, stated)
     ranking = rank_case(case)
     if not ranking:
-        return Diagnosis(conclusions.NothingToExplain(len(stated)), len(stated), 0, ())
+        return Diagnosis(fact("met", references=len(stated)), len(stated), 0, ())
     hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
@@ -333,11 +334,25 @@ def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, other
 
 def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusions.Conclusion | None:
     """What the best hypothesis amounts to; None if it explains neither all nor most."""
-    figures = best.residual_before, best.residual_after, best.unit
+    before, after, unit = best.residual_before, best.residual_after, best.unit
     if best.explains:
-        return conclusions.MostLikelyFault(best.faults, *figures, alternatives)
+        return fact(
+            "named",
+            faults=best.faults,
+            residual_before=before,
+            residual_after=after,
+            unit=unit,
+            alternatives=alternatives,
+        )
     if best.residual_after < MOSTLY * best.residual_before:
-        return conclusions.MainFault(best.faults, *figures, alternatives)
+        return fact(
+            "mostly",
+            faults=best.faults,
+            residual_before=before,
+            residual_after=after,
+            unit=unit,
+            alternatives=alternatives,
+        )
     return None
 
 
@@ -346,11 +361,24 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
     if not hypotheses:
         relative = np.nan_to_num(np.abs(ranking.before) / case.uncertainty, nan=np.inf)
         missed = int((relative > MEETS).sum())
-        return conclusions.NoFaultStandsOut(missed, len(relative), float(relative.max()), tried)
+        return fact(
+            "no_fault_stands_out",
+            missed=missed,
+            references=len(relative),
+            half_widths=float(relative.max()),
+            tried=tried,
+        )
     best = hypotheses[0]
-    figures = best.residual_before, best.residual_after, best.unit
+    before, after, unit = best.residual_before, best.residual_after, best.unit
     named = _concluded(best, best.indistinguishable_from)
-    return named or conclusions.NoFewFaultsExplain(tried, *figures, _best_left(ranking, best.unit))
+    return named or fact(
+        "unexplained",
+        tried=tried,
+        residual_before=before,
+        residual_after=after,
+        unit=unit,
+        least=_best_left(ranking, unit),
+    )
 
 
 def _best_left(ranking: Ranking, unit: Unit) -> float:

@@ -11,8 +11,8 @@ from typing import Literal, cast
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.comparison.entries import LENGTHS, Entry
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, LimitExcess, Side, value_at
@@ -24,153 +24,11 @@ LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
 LengthColumn = Literal["a", "d"]
 
 
-class WrongUnit(Finding):
-    """Entries were read in the wrong unit."""
-
-    entries: Entries
-    misread: Misread
-
-
-class WrongAlphaSign(Finding):
-    """A joint's alpha has the wrong sign."""
-
-    joint: int
-    given_deg: float
-    fits_deg: float
-
-
-class WrongAlpha(Finding):
-    """A joint's alpha is missing (given as 0) or wrong."""
-
-    joint: int
-    given_deg: float
-    fits_deg: float
-
-
-class SwappedEntries(Finding):
-    """a and d are swapped, of one joint or, if None, of all."""
-
-    joint: int | None
-
-
-class SwappedRows(Finding):
-    """Two rows of the table are swapped."""
-
-    first: int
-    second: int
-
-
-class SwappedLimits(Finding):
-    """The limits of two joints are swapped."""
-
-    first: int
-    second: int
-
-
-class ShiftedRows(Finding):
-    """A column, or all rows, are shifted by one joint."""
-
-    entries: Literal["rows", "a", "alpha", "d"]
-    toward: Literal["down", "up"]
-
-
-class WrongOffset(Finding):
-    """A joint's offset is missing (given as 0) or wrong."""
-
-    joint: int
-    given_deg: float
-    fits_deg: float
-
-
-class ReversedDirection(Finding):
-    """A joint turns in the other direction."""
-
-    joint: int
-
-
-class WrongConvention(Finding):
-    """The table was read in the other Denavit-Hartenberg convention; ``read_as`` is the one that it was read in."""
-
-    read_as: Literal["standard", "modified"]
-
-
-class WrongLimits(Finding):
-    """The limits of one joint, or of all if None, are crossed or have wrong signs."""
-
-    joint: int | None
-    fault: LimitFault
-
-
-class WrongLimit(Finding):
-    """One of a joint's two limits is wrong."""
-
-    joint: int
-    side: Side
-    given_deg: float
-    fits_deg: float
-
-
-class WrongLength(Finding):
-    """A length is missing (given as 0) or wrong."""
-
-    joint: int
-    column: LengthColumn
-    given_mm: float
-    fits_mm: float
-
-
-class WrongScale(Finding):
-    """All lengths are wrong by a common factor."""
-
-    factor: float
-
-
-class BaseElsewhere(Finding):
-    """The references' base is elsewhere: ``shift_mm`` and ``turn_deg`` are the arm's in the base's frame."""
-
-    shift_mm: tuple[float, float, float]
-    turn_deg: float
-
-
-class FlangeElsewhere(Finding):
-    """The references' flange is elsewhere than the table's: ``shift_mm`` and ``turn_deg`` in the flange's frame."""
-
-    shift_mm: tuple[float, float, float]
-    turn_deg: float = 0.0
-
-
-class CountedFromGround(Finding):
-    """The references count a joint from the ground, as arms with a linkage are sold: the table's joint is theirs plus
-    (``sign`` 1) or minus the sum of the joints ``along``."""
-
-    joint: int
-    along: tuple[int, ...]
-    sign: Literal[1, -1]
-
-
-Fault = (
-    WrongUnit
-    | WrongAlphaSign
-    | WrongAlpha
-    | SwappedEntries
-    | SwappedRows
-    | SwappedLimits
-    | ShiftedRows
-    | WrongOffset
-    | ReversedDirection
-    | WrongConvention
-    | WrongLimits
-    | WrongLimit
-    | WrongLength
-    | WrongScale
-    | BaseElsewhere
-    | FlangeElsewhere
-    | CountedFromGround
-)
+Fault = Finding
 Faults = tuple[Fault, ...]
 """One fault, or two; of conventions (zeros, directions, base, flange, what joints are counted from) any number."""
 
-CONVENTIONS = WrongOffset, ReversedDirection, BaseElsewhere, FlangeElsewhere, CountedFromGround
+CONVENTIONS = "wrong_offset", "reversed_direction", "base_elsewhere", "flange_elsewhere", "counted_from_ground"
 """What can be chosen without changing the arm."""
 
 
@@ -187,10 +45,14 @@ def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
     """
     given, fits = (float(value * entry.in_unit) for value in (given, fits))
     if entry.column == "scale":
-        return WrongScale(fits)
+        return fact("wrong_scale", factor=fits)
     if entry.column in LENGTHS:
-        return WrongLength(entry.joint, cast(LengthColumn, entry.column), given, fits)
-    return (WrongAlpha if entry.column == "alpha" else WrongOffset)(entry.joint, given, fits)
+        return fact(
+            "wrong_length", joint=entry.joint, column=cast(LengthColumn, entry.column), given_mm=given, fits_mm=fits
+        )
+    return fact(
+        "wrong_alpha" if entry.column == "alpha" else "wrong_offset", joint=entry.joint, given_deg=given, fits_deg=fits
+    )
 
 
 def rounded(fault: Fault) -> Fault:
@@ -204,12 +66,12 @@ def rounded(fault: Fault) -> Fault:
     -------
     fault : unchanged if it has no such numbers; the scale's factor to six digits
     """
-    if isinstance(fault, WrongLength):
-        return replace(fault, given_mm=_digits(fault.given_mm, 6), fits_mm=_digits(fault.fits_mm, 4))
-    if isinstance(fault, WrongOffset | WrongAlpha | WrongAlphaSign | WrongLimit):
-        return replace(fault, given_deg=_digits(fault.given_deg, 6), fits_deg=_digits(fault.fits_deg, 4))
-    if isinstance(fault, WrongScale):
-        return WrongScale(_digits(fault.factor, 6))
+    if is_one(fault, "wrong_length"):
+        return fault.but(given_mm=_digits(fault.given_mm, 6), fits_mm=_digits(fault.fits_mm, 4))
+    if is_one(fault, "wrong_offset", "wrong_alpha", "wrong_alpha_sign", "wrong_limit"):
+        return fault.but(given_deg=_digits(fault.given_deg, 6), fits_deg=_digits(fault.fits_deg, 4))
+    if is_one(fault, "wrong_scale"):
+        return fact("wrong_scale", factor=_digits(fault.factor, 6))
     return fault
 
 
@@ -225,17 +87,17 @@ def entry_of(fault: Fault) -> str | None:
     name : such as ``d4``, ``alpha3`` or ``lower2``; None if it is in several
     """
     match fault:
-        case WrongLength(joint, column):
+        case Finding(code="wrong_length", joint=joint, column=column):
             return f"{column}{joint}"
-        case WrongOffset(joint):
+        case Finding(code="wrong_offset", joint=joint):
             return f"offset{joint}"
-        case WrongAlpha(joint) | WrongAlphaSign(joint):
+        case Finding(code="wrong_alpha", joint=joint) | Finding(code="wrong_alpha_sign", joint=joint):
             return f"alpha{joint}"
-        case ReversedDirection(joint):
+        case Finding(code="reversed_direction", joint=joint):
             return f"direction{joint}"
-        case WrongLimit(joint, side):
+        case Finding(code="wrong_limit", joint=joint, side=side):
             return f"{side}{joint}"
-        case WrongLimits(int(joint), "lower_sign" | "upper_sign" as sign):
+        case Finding(code="wrong_limits", joint=int(joint), fault="lower_sign" | "upper_sign" as sign):
             return f"{sign.removesuffix('_sign')}{joint}"
     return None
 
@@ -298,12 +160,15 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
     candidates = [
         *limit_repairs(given, references),
         *_units(),
-        *(Repair(WrongAlphaSign(j + 1, alpha, -alpha), _negated("alpha", j)) for j, alpha in enumerate(alphas)),
+        *(
+            Repair(fact("wrong_alpha_sign", joint=j + 1, given_deg=alpha, fits_deg=-alpha), _negated("alpha", j))
+            for j, alpha in enumerate(alphas)
+        ),
         *_swaps(joints),
         *_offsets(given, joints),
-        *(Repair(ReversedDirection(j + 1), _negated("direction", j)) for j in joints),
+        *(Repair(fact("reversed_direction", joint=j + 1), _negated("direction", j)) for j in joints),
         Repair(
-            WrongConvention("modified" if given.modified[0] else "standard"),
+            fact("wrong_convention", read_as="modified" if given.modified[0] else "standard"),
             lambda tables: replace(tables, modified=~tables.modified),
         ),
         *_limits(joints),
@@ -328,7 +193,7 @@ def limit_repairs(given: Tables, references: Sequence[Reference]) -> list[Repair
             now = float(np.degrees(getattr(given, side)[0, joint]))
             fits = limit_stated(joint, side, now, references)
             if fits is not None:
-                fault = WrongLimit(joint + 1, side, now, fits)
+                fault = fact("wrong_limit", joint=joint + 1, side=side, given_deg=now, fits_deg=fits)
                 found.append(Repair(fault, _set(side, joint, np.radians(fits)), free=True))
     return found
 
@@ -389,7 +254,7 @@ _MISREAD_ANGLES: tuple[tuple[float, Misread], ...] = (
 
 def _units() -> list[Repair]:
     return [
-        Repair(WrongUnit(entries, misread), _scaled(columns, factor))
+        Repair(fact("wrong_unit", entries=entries, misread=misread), _scaled(columns, factor))
         for places, misreadings in ((_LENGTHS, _MISREAD_LENGTHS), (_ANGLES, _MISREAD_ANGLES))
         for entries, columns in places
         for factor, misread in misreadings
@@ -413,16 +278,20 @@ _SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] 
 
 
 def _swaps(joints: range) -> list[Repair]:
-    found = [Repair(SwappedEntries(j + 1), _columns_swapped([j])) for j in joints]
-    found.append(Repair(SwappedEntries(None), _columns_swapped(list(joints))))
+    found = [Repair(fact("swapped_entries", joint=j + 1), _columns_swapped([j])) for j in joints]
+    found.append(Repair(fact("swapped_entries", joint=None), _columns_swapped(list(joints))))
     for i, j in combinations(joints, 2):
         order = list(joints)
         order[i], order[j] = j, i
-        found.append(Repair(SwappedRows(i + 1, j + 1), _reordered(("a", "alpha", "d"), order)))
-        found.append(Repair(SwappedLimits(i + 1, j + 1), _reordered(("lower", "upper"), order)))
+        found.append(Repair(fact("swapped_rows", first=i + 1, second=j + 1), _reordered(("a", "alpha", "d"), order)))
+        found.append(Repair(fact("swapped_limits", first=i + 1, second=j + 1), _reordered(("lower", "upper"), order)))
     for entries, columns in _SHIFTS:
-        found.append(Repair(ShiftedRows(entries, "down"), _reordered(columns, list(np.roll(joints, -1)))))
-        found.append(Repair(ShiftedRows(entries, "up"), _reordered(columns, list(np.roll(joints, 1)))))
+        found.append(
+            Repair(fact("shifted_rows", entries=entries, toward="down"), _reordered(columns, list(np.roll(joints, -1))))
+        )
+        found.append(
+            Repair(fact("shifted_rows", entries=entries, toward="up"), _reordered(columns, list(np.roll(joints, 1))))
+        )
     return found
 
 
@@ -443,7 +312,12 @@ def _offsets(given: Tables, joints: range) -> list[Repair]:
         for step in (90.0, -90.0, 180.0):
             after = (before + step + 180.0) % 360.0 - 180.0 or 0.0
             after = 180.0 if after == -180.0 else after
-            found.append(Repair(WrongOffset(j + 1, before, after), _offset_moved(j, np.radians(step))))
+            found.append(
+                Repair(
+                    fact("wrong_offset", joint=j + 1, given_deg=before, fits_deg=after),
+                    _offset_moved(j, np.radians(step)),
+                )
+            )
     return found
 
 
@@ -462,7 +336,7 @@ _LIMIT_FAULTS: tuple[tuple[LimitFault, Callable[[Reals, Reals], tuple[Reals, Rea
 def _limits(joints: range) -> list[Repair]:
     places: list[tuple[list[int], int | None]] = [([j], j + 1) for j in joints]
     return [
-        Repair(WrongLimits(joint, fault), _limits_changed(changed, change))
+        Repair(fact("wrong_limits", joint=joint, fault=fault), _limits_changed(changed, change))
         for changed, joint in (*places, (list(joints), None))
         for fault, change in _LIMIT_FAULTS
     ]

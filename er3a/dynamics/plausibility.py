@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.dynamics.arm_model import WATER, LinkShape, drives_of, link_shapes
+from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import MassBody, NoBody, about, no_body, six_moments
+from er3a.robots.masses import MassBody, about, no_body, six_moments
 from er3a.robots.robot import Robot
 
 LIGHTEST, HEAVIEST = 100.0, 12_000.0
@@ -27,83 +27,7 @@ WEIGHT_RATIO = 0.15  # of the stated weight, by which the sum of the links may d
 PARALLEL_RATIO = 2.0  # of the inertia that the shape would have: more is too much
 
 
-class ImpossibleInertia(Finding):
-    """Numbers that no rigid body can have."""
-
-    link: int
-    why: NoBody
-
-
-class MissingLink(Finding):
-    """A link that a joint moves has no mass; ``singular``: and its joint no rotor, so that accelerations are NaN."""
-
-    link: int
-    singular: bool
-
-
-class PointMass(Finding):
-    """A link has a mass and no inertia."""
-
-    link: int
-
-
-class InertiaWithoutMass(Finding):
-    """A link has an inertia and no mass, as sums of parameters that were identified together do."""
-
-    link: int
-
-
-class CentreOutside(Finding):
-    """A centre of mass is outside the link's shape."""
-
-    link: int
-    outside_mm: float
-
-
-class UnlikelyDensity(Finding):
-    """A link's mass, filled into its shape, has a density that no link has: grams for kg, or the other way."""
-
-    link: int
-    mass_kg: float
-    density_kg_m3: float
-
-
-class UnlikelyInertia(Finding):
-    """A link's radius of gyration does not fit its shape's: kg mm^2 or mm^4 for kg m^2."""
-
-    link: int
-    gyration_mm: float
-    shape_mm: float
-
-
-class AboutOrigin(Finding):
-    """An inertia fits the link's shape far better as one about the frame's origin than about the centre of mass."""
-
-    link: int
-    given_kg_m2: float
-    about_centre_kg_m2: float
-    shape_kg_m2: float
-
-
-class SumOffWeight(Finding):
-    """The links' masses do not make the weight that the manufacturer states."""
-
-    sum_kg: float
-    weight_kg: float
-    complete: bool
-
-
-MassFinding = (
-    ImpossibleInertia
-    | MissingLink
-    | PointMass
-    | InertiaWithoutMass
-    | CentreOutside
-    | UnlikelyDensity
-    | UnlikelyInertia
-    | AboutOrigin
-    | SumOffWeight
-)
+MassFinding = Finding
 
 
 def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
@@ -128,16 +52,16 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
             rotor = moved_by_one and link > 0 and armature[link - 1] > 0
             # A massless link with mass beyond it is no singular joint: what it carries has inertia about its axis.
             carries = any(has_mass(robot.masses.body(k)) for k in range(link + 1, robot.rows + 1))
-            found += [MissingLink(link, not rotor and not carries)] if link else []
+            found += [fact("missing_link", link=link, singular=not rotor and not carries)] if link else []
         elif problem := no_body(body):
-            found.append(ImpossibleInertia(link, problem))
+            found.append(fact("impossible_inertia", link=link, why=problem))
         elif body.mass == 0:
-            found.append(InertiaWithoutMass(link))
+            found.append(fact("inertia_without_mass", link=link))
         elif not any(body.inertia):
-            found.append(PointMass(link))
+            found.append(fact("point_mass", link=link))
         elif link in shapes:
             found += _against_shape(link, body, shapes[link], beyond)
-    return (*found, *_against_weight(robot, any(isinstance(each, MissingLink) for each in found)))
+    return (*found, *_against_weight(robot, any(is_one(each, "missing_link") for each in found)))
 
 
 def has_mass(body: MassBody | None) -> bool:
@@ -160,11 +84,11 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
     found: list[MassFinding] = []
     density = WATER * body.mass / water.mass
     if not LIGHTEST / slack <= density <= HEAVIEST * slack:
-        found.append(UnlikelyDensity(link, body.mass, density))
+        found.append(fact("unlikely_density", link=link, mass_kg=body.mass, density_kg_m3=density))
     centre = np.array(body.centre)
     outside = shape.outside(centre)
     if outside > (size if shape.guessed else BEYOND_SHAPE):
-        found.append(CentreOutside(link, 1000 * outside))
+        found.append(fact("centre_outside", link=link, outside_mm=1000 * outside))
     own, expected = _gyration(body.inertia_matrix, body.mass), _gyration(water.inertia_matrix, water.mass)
     less = body.inertia_matrix - body.mass * about(centre)
     at_centre = MassBody(body.mass, body.centre, six_moments(less))
@@ -176,9 +100,17 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
         and no_body(at_centre) is None
         and rest < PARALLEL_RATIO * expected_trace
     ):
-        found.append(AboutOrigin(link, given / 2, rest / 2, expected_trace / 2))
+        found.append(
+            fact(
+                "about_origin",
+                link=link,
+                given_kg_m2=given / 2,
+                about_centre_kg_m2=rest / 2,
+                shape_kg_m2=expected_trace / 2,
+            )
+        )
     elif not NARROWEST_RATIO / slack <= own / expected <= WIDEST_RATIO * slack:
-        found.append(UnlikelyInertia(link, 1000 * own, 1000 * expected))
+        found.append(fact("unlikely_inertia", link=link, gyration_mm=1000 * own, shape_mm=1000 * expected))
     return found
 
 
@@ -189,7 +121,7 @@ def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
         return []
     complete = not incomplete and robot.masses.body(0) is not None
     off = total > weight * (1 + WEIGHT_RATIO) or (complete and total < weight * (1 - WEIGHT_RATIO))
-    return [SumOffWeight(total, weight, complete)] if off else []
+    return [fact("sum_off_weight", sum_kg=total, weight_kg=weight, complete=complete)] if off else []
 
 
 def _gyration(tensor: Reals, mass: float) -> float:

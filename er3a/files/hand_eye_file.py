@@ -35,13 +35,14 @@ from er3a.files.units import (
     refuse_radians,
 )
 from er3a.files.yaml_file import InputFile, StrictModel, load
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
 from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot
-from er3a.vision.boards import Board, BoardlessImage, BoardNotFoundError, BoardViews, Camera, board_views
+from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet
 
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -169,7 +170,7 @@ class SeenImages:
 
     names: tuple[str, ...]
     views: BoardViews
-    boardless: tuple[BoardlessImage, ...]
+    boardless: tuple[Finding, ...]
 
 
 class HandEyeFile(InputFile):
@@ -413,7 +414,10 @@ def _targets_of_images(
             table, "column image", problem, "Check pattern, squares and dictionary, or the images"
         ) from None
     shown = tuple(str(rows[number]["image"]) for number in views.numbers)
-    boardless = tuple(BoardlessImage(names[k], str(rows[k]["image"]), corners) for k, corners in views.without)
+    boardless = tuple(
+        fact("boardless_image", sample=names[k], image=str(rows[k]["image"]), corners=corners)
+        for k, corners in views.without
+    )
     return SeenImages(shown, views, boardless)
 
 

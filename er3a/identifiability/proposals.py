@@ -7,22 +7,22 @@ open entries. A length or an angle is measured directly, as finely as its tolera
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.comparison.entries import LENGTHS, Entry, shifted
 from er3a.diagnosis.faults import SIDES
 from er3a.diagnosis.fitting import ANGLES
+from er3a.finding import Finding, fact
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import predict_tables
-from er3a.references.quantities import FRAME_OF_POINT, Point, Pose, Side
-from er3a.references.seen import SEEN, Manner, Seen, SeenMotion
+from er3a.references.quantities import FRAME_OF_POINT, Point, Pose
+from er3a.references.seen import SEEN, Manner, SeenMotion
 from er3a.robots.robot import Robot
 
 PLAIN_DEG = 50.0  # of the direction that is named, within which a motion is plain to see
@@ -38,52 +38,7 @@ OBSERVATIONS: tuple[tuple[Point, Manner], ...] = (
 )
 
 
-class LookAtMotion(Finding):
-    """Jog a joint in + from a pose and look where to a point or the tool goes; ``seen`` is what the table says."""
-
-    entry: str
-    joint: int
-    point: Point
-    pose_deg: Pose
-    seen: Seen
-
-
-class ReadLimit(Finding):
-    """Jog a joint to its limit and read its angle."""
-
-    entry: str
-    joint: int
-    side: Side
-    half_width_deg: float
-
-
-class TimeJoint(Finding):
-    """Time a joint's turn at full speed."""
-
-    entry: str
-    joint: int
-    half_width_deg_s: float
-
-
-class MeasureAngle(Finding):
-    """Measure an angle of the table: between two axes, or at the zero mark."""
-
-    entry: str
-    column: Literal["alpha", "offset"]
-    joint: int
-    half_width_deg: float
-
-
-class MeasureLength(Finding):
-    """Measure a length of the table, between two axes or along one."""
-
-    entry: str
-    column: Literal["a", "d"]
-    joint: int
-    half_width_mm: float
-
-
-Proposal = LookAtMotion | ReadLimit | TimeJoint | MeasureAngle | MeasureLength
+Proposal = Finding
 
 
 def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
@@ -115,15 +70,27 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
     if entry.column == "direction":
         return _look(evidence, entry)
     if entry.column in SIDES:
-        return ReadLimit(name, j, cast(Any, entry.column), LIMIT_DEG)
+        return fact("read_limit", entry=name, joint=j, side=cast(Any, entry.column), half_width_deg=LIMIT_DEG)
     if entry.column == "speed":
-        return TimeJoint(name, j, round(SPEED_SHARE * entry.value(evidence.robot), 3))
+        return fact(
+            "time_joint", entry=name, joint=j, half_width_deg_s=round(SPEED_SHARE * entry.value(evidence.robot), 3)
+        )
     if entry.column in LENGTHS:
-        return MeasureLength(
-            name, cast(Any, entry.column), j, min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm)
+        return fact(
+            "measure_length",
+            entry=name,
+            column=cast(Any, entry.column),
+            joint=j,
+            half_width_mm=min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm),
         )
     if entry.column in ANGLES:
-        return MeasureAngle(name, cast(Any, entry.column), j, _fine_enough(evidence, entry, tool))
+        return fact(
+            "measure_angle",
+            entry=name,
+            column=cast(Any, entry.column),
+            joint=j,
+            half_width_deg=_fine_enough(evidence, entry, tool),
+        )
     return None
 
 
@@ -138,7 +105,7 @@ def _fine_enough(evidence: Evidence, entry: Entry, tool: ToolRange) -> float:
     return float(round(np.floor(exact / digit + 1e-9) * digit, 9))
 
 
-def _look(evidence: Evidence, entry: Entry) -> LookAtMotion | None:
+def _look(evidence: Evidence, entry: Entry) -> Finding | None:
     """What to look at to determine a joint's direction, independent of other open entries."""
     robot = evidence.robot
     others = [each for each in evidence.allowed if entry.name not in each.names]
@@ -156,7 +123,14 @@ def _look(evidence: Evidence, entry: Entry) -> LookAtMotion | None:
             plain = values[:unaffected, best].max() < PLAIN_DEG
             turned = (values[unaffected:, best] > 180.0 - PLAIN_DEG).all()
             if plain and turned:
-                return LookAtMotion(entry.name, entry.joint, point, pose, motions[best].seen)
+                return fact(
+                    "look_at_motion",
+                    entry=entry.name,
+                    joint=entry.joint,
+                    point=point,
+                    pose_deg=pose,
+                    seen=motions[best].seen,
+                )
     return None
 
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.comparison.entries import Entry, shifted
-from er3a.diagnosis.conclusions import Conclusion, NoFaultStandsOut, NoFewFaultsExplain
+from er3a.diagnosis.conclusions import Conclusion
 from er3a.diagnosis.ranking import rank
+from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import rotation_angle
 from er3a.identifiability.entries import continuous_of, document_of, entries_of
 from er3a.identifiability.feasible import MET
@@ -28,42 +28,6 @@ QUARTERS = (-1, 1, 2)
 MAX_FAULTS = 2
 
 
-class NotTheRobotDescribed(Finding):
-    """No one or two corrections make the table the robot that other documents describe.
-
-    Attributes
-    ----------
-    against : titles of these documents
-    mismatch_mm : the largest difference to them in a position, as the table is
-    left_mm : what the best of one or two corrections leaves of it
-    tried : how many were
-    """
-
-    against: tuple[str, ...]
-    mismatch_mm: float
-    left_mm: float
-    tried: int
-
-
-class InconsistentWithOwnText(Finding):
-    """A table does not agree with what its own author says beside it.
-
-    Attributes
-    ----------
-    entry, given, needed, unit : the one change by a quarter or half turn, or of a sign, that makes it agree; None if
-        there is none
-    against : titles of the author's other documents
-    missed : how many of their statements it misses
-    """
-
-    entry: str | None
-    given: float | None
-    needed: float | None
-    unit: str
-    against: tuple[str, ...]
-    missed: int
-
-
 def is_unexplained(conclusion: Conclusion | None) -> bool:
     """Whether references are missed by a table, and nothing explains it.
 
@@ -75,7 +39,7 @@ def is_unexplained(conclusion: Conclusion | None) -> bool:
     -------
     unexplained : neither by one or two faults nor by any zeros, directions, base and flange; False without a diagnosis
     """
-    return isinstance(conclusion, NoFaultStandsOut | NoFewFaultsExplain)
+    return is_one(conclusion, "no_fault_stands_out", "unexplained")
 
 
 def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bool:
@@ -93,7 +57,7 @@ def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bo
     return failed > total / 2 and is_unexplained(conclusion)
 
 
-def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRobotDescribed | None:
+def not_the_robot_described(robot: Robot, references: ReferenceSet) -> Finding | None:
     """Whether trusted documents of another origin describe another robot.
 
     Parameters
@@ -122,10 +86,16 @@ def not_the_robot_described(robot: Robot, references: ReferenceSet) -> NotTheRob
     if left.min() <= allowed * np.sqrt(3):
         return None
     named = dict.fromkeys(title_of(reference.document, references.documents) for reference in ranking.references)
-    return NotTheRobotDescribed(tuple(named), float(before), float(left.min()), int(few.sum()))
+    return fact(
+        "not_the_robot_described",
+        against=tuple(named),
+        mismatch_mm=float(before),
+        left_mm=float(left.min()),
+        tried=int(few.sum()),
+    )
 
 
-def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> InconsistentWithOwnText | None:
+def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Finding | None:
     """Whether a table misses what its own publisher claims in other words.
 
     Parameters
@@ -152,9 +122,19 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Incons
     named = tuple(dict.fromkeys(title_of(reference.document, references.documents) for reference in own))
     entry, table = _one_change(robot, asked)
     if entry is None or table is None:
-        return InconsistentWithOwnText(None, None, None, "", named, missed)
+        return fact(
+            "inconsistent_with_own_text", entry=None, given=None, needed=None, unit="", against=named, missed=missed
+        )
     needed = float(getattr(table, entry.column)[0, entry.joint - 1] * entry.in_unit)
-    return InconsistentWithOwnText(entry.name, entry.value(robot), round(needed, 9), entry.unit, named, missed)
+    return fact(
+        "inconsistent_with_own_text",
+        entry=entry.name,
+        given=entry.value(robot),
+        needed=round(needed, 9),
+        unit=entry.unit,
+        against=named,
+        missed=missed,
+    )
 
 
 def _one_change(robot: Robot, asked: Asked) -> tuple[Entry | None, Tables | None]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
+from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
@@ -128,8 +129,10 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
     kept, certain = np.isfinite(rows[:, 0]), not failing.any()
     if len(q) and not kept.any():
         position, rotation, _ = misses(robot, T, q)
-        nearest = solutions.NearestMiss(float(position.min() * 1000), float(np.degrees(rotation.min())))
-        unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(nearest)),)
+        nearest = fact(
+            "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
+        )
+        unsolved = (solutions.PoseUnsolved(0, fact("no_solution_of_class", miss=nearest)),)
     q, branch = rows[kept], branch[kept]
     if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
         away = max_joint_move(q, own)
@@ -201,8 +204,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
-            miss = solutions.NearestMiss(position * 1000, float(np.degrees(rotation)))
-            unsolved = (solutions.PoseUnsolved(0, solutions.NoSolutionOfClass(miss)),)
+            miss = fact("nearest_miss", position_mm=position * 1000, rotation_deg=float(np.degrees(rotation)))
+            unsolved = (solutions.PoseUnsolved(0, fact("no_solution_of_class", miss=miss)),)
     method = solutions.ByClass(solver.code, certain, bool(solutions.slot_labels(robot)))
     return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
 
@@ -374,9 +377,9 @@ def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
     """The reason behind a slot's fault, with its gap in mm or deg."""
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:
-        return solutions.WristTiltsTooLittle(float(np.degrees(gap)))
+        return fact("wrist_tilts_too_little", missing_deg=float(np.degrees(gap)))
     if fault == OFF_AXIS:
-        return solutions.WristTooNearAxis1(gap * 1000)
+        return fact("wrist_too_near_axis_1", gap_mm=gap * 1000)
     if fault == TOO_FAR:
-        return solutions.WristTooFar(gap * 1000, arm.wrist_reach * 1000)
-    return solutions.WristTooNear(gap * 1000, abs(arm.upper_arm_length - arm.forearm_length) * 1000)
+        return fact("wrist_too_far", gap_mm=gap * 1000, reach_mm=arm.wrist_reach * 1000)
+    return fact("wrist_too_near", gap_mm=gap * 1000, least_mm=abs(arm.upper_arm_length - arm.forearm_length) * 1000)

@@ -32,20 +32,11 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.errors import Er3aError, PoseError, ShapeError
+from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts
 from er3a.kinematics.forward import checked_joints, jacobian
-from er3a.kinematics.solutions import (
-    BadGuess,
-    Iteration,
-    LimitBound,
-    NearestMiss,
-    NotFound,
-    PoseUnsolved,
-    SingularEnd,
-    Solutions,
-    Unreachable,
-)
+from er3a.kinematics.solutions import Iteration, NotFound, PoseUnsolved, Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel, parallel_for
@@ -715,23 +706,27 @@ class _Search:
         -------
         why : another start, the limits, a singular end, or no reach
         """
-        miss = NearestMiss(float(error[0] * 1000), float(np.degrees(error[1])))
+        miss = fact("nearest_miss", position_mm=float(error[0] * 1000), rotation_deg=float(np.degrees(error[1])))
         if restarts < DIAGNOSIS_RESTARTS:
             _, _, starts = self.run(T[None], q[None], respect, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
-                return BadGuess(miss, "other_starts")
+                return fact("bad_guess", miss=miss, solved_by="other_starts")
         if respect:
             free, _, starts = self.run(T[None], q[None], False, DIAGNOSIS_RESTARTS, 1)
             if starts[0]:
                 exceeded = limits_exceeded(self.robot, nearest_equivalent(self.robot, free[0], q))
-                return LimitBound(miss, exceeded) if exceeded else BadGuess(miss, "without_limits")
+                return (
+                    fact("limit_bound", miss=miss, exceeded=exceeded)
+                    if exceeded
+                    else fact("bad_guess", miss=miss, solved_by="without_limits")
+                )
         length = arm_length(self.robot)
         J = jacobian(self.robot, q)
         J[:3] /= length
         singular = np.linalg.svd(J[self.mask > 0], compute_uv=False)[-1] < RANK
         if singular and max(error[0] / length, error[1]) < NEARLY:
-            return SingularEnd(miss)
-        return Unreachable(miss)
+            return fact("singular", miss=miss)
+        return fact("unreachable", miss=miss)
 
 
 def _checked_mask(mask: Reals | None) -> Reals:

@@ -18,7 +18,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue, Displayed, Finding, Sheet, shortly
+from er3a.by_value import ByValue, Coded, Displayed, Sheet, shortly
+from er3a.finding import Finding
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
@@ -34,7 +35,7 @@ from er3a.kinematics.wrist_partitioned import (
     wrist_partitioned_arm,
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.robots.joint_limits import LimitsExceeded, but_for_turns, joint_columns, limits_exceeded, shown
+from er3a.robots.joint_limits import but_for_turns, joint_columns, limits_exceeded, shown
 from er3a.robots.robot import Robot, derived
 
 Side = Literal["front", "back"]
@@ -111,27 +112,27 @@ def _outward(slot: int) -> float:
 Label = BranchLabel | SlotName | Literal["found_arm"]
 
 
-class ClosedForm(Finding):
+class ClosedForm(Coded):
     """All solutions, by the closed form."""
 
     arm_class: Literal["spherical_wrist"] = "spherical_wrist"
 
 
-class DependentJoints(Finding):
+class DependentJoints(Coded):
     """The arm has fewer degrees of freedom than joints (six at most), for example two parallel slides.
 
     Each pose within reach has infinitely many solutions.
     """
 
 
-class Iteration(Finding):
+class Iteration(Coded):
     """Solutions by iteration from random starts, which may miss some; ``lacking`` where the arm has no closed form."""
 
     starts: int
     lacking: ClosedFormMissing | DependentJoints | None = None
 
 
-class ByClass(Finding):
+class ByClass(Coded):
     """All solutions of an arm without spherical wrist, by the solver of its class.
 
     Attributes
@@ -164,83 +165,18 @@ def in_doubt(method: Method) -> Method:
     return replace(method, certain=False) if isinstance(method, ByClass) else method
 
 
-class WristTiltsTooLittle(Finding):
-    """The wrist would have to tilt further than it can."""
-
-    missing_deg: float
+OutOfReach = Finding
+NotFound = Finding
 
 
-class WristTooNearAxis1(Finding, code="wrist_too_near_axis_1"):
-    """The wrist centre would be nearer to axis 1 than the arm's sideways offset lets it come."""
-
-    gap_mm: float
-
-
-class WristTooFar(Finding):
-    """The wrist centre would be farther from axis 2 than the stretched arm reaches."""
-
-    gap_mm: float
-    reach_mm: float
-
-
-class WristTooNear(Finding):
-    """The wrist centre would be nearer to axis 2 than the folded arm reaches."""
-
-    gap_mm: float
-    least_mm: float
-
-
-class NearestMiss(Finding):
-    """By how much the nearest arm that a search found misses the pose."""
-
-    position_mm: float
-    rotation_deg: float
-
-
-class BadGuess(Finding):
-    """The iteration failed from its start; from others, or without limits, an arm within the limits was found."""
-
-    miss: NearestMiss
-    solved_by: Literal["other_starts", "without_limits"]
-
-
-class LimitBound(Finding):
-    """Arms were found only outside the limits."""
-
-    miss: NearestMiss
-    exceeded: LimitsExceeded
-
-
-class SingularEnd(Finding, code="singular"):
-    """The iteration creeps towards a singular arm, where it ends."""
-
-    miss: NearestMiss
-
-
-class Unreachable(Finding):
-    """No start leads to the pose."""
-
-    miss: NearestMiss
-
-
-class NoSolutionOfClass(Finding):
-    """The solver of the arm's class has no solution; the nearest arm that a search found misses by so much."""
-
-    miss: NearestMiss
-
-
-OutOfReach = WristTiltsTooLittle | WristTooNearAxis1 | WristTooFar | WristTooNear
-NotFound = BadGuess | LimitBound | SingularEnd | Unreachable | NoSolutionOfClass
-
-
-class SideUnsolved(Finding):
+class SideUnsolved(Coded):
     """Why no branch exists with the wrist in front of axis 1, or reached over the head (back)."""
 
     side: Literal["front", "back"]
     why: OutOfReach
 
 
-class PoseUnsolved(Finding):
+class PoseUnsolved(Coded):
     """Why a pose has no solution by the arm's class, or iteration found none; numbered as the poses lie in memory."""
 
     pose: int

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import Finding
 from er3a.errors import NotWristPartitionedError
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import Vector, signed_angle, unsigned_angle, wrap_to_pi
 from er3a.kinematics import closed_form
@@ -26,51 +26,7 @@ from er3a.robots.robot import Robot, derived
 PARALLEL = 1e-9  # rad
 
 
-class NotSixTurning(Finding, code="not_six_turning_joints"):
-    """The arm has another number of joints than six, or one of them slides."""
-
-    joints: int
-    sliding: int
-
-
-class CoupledWrist(Finding):
-    """The coupling is none of whole turns among the first three joints."""
-
-
-class CoupledJoints(Finding):
-    """Joints depend on one another: they are coupled, or sums of them are limited."""
-
-
-class ElbowAxesNotParallel(Finding):
-    """Axes 2 and 3 are not parallel."""
-
-
-class NeighboursParallel(Finding, code="neighbouring_axes_parallel"):
-    """Two neighbouring axes are parallel that must not be."""
-
-    first: int
-    second: int
-
-
-class NoWristCentre(Finding, code="no_common_point_of_axes_4_5_6"):
-    """Axes 4, 5 and 6 miss a common point."""
-
-    miss_mm: float
-
-
-class NoArmLength(Finding, code="upper_arm_or_forearm_without_length"):
-    """The upper arm or the forearm has no length."""
-
-
-ClosedFormMissing = (
-    NotSixTurning
-    | CoupledWrist
-    | CoupledJoints
-    | ElbowAxesNotParallel
-    | NeighboursParallel
-    | NoWristCentre
-    | NoArmLength
-)
+ClosedFormMissing = Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +101,9 @@ def wrist_partition_missing(robot: Robot) -> ClosedFormMissing | None:
 def _recognised(robot: Robot) -> WristPartitionedArm | ClosedFormMissing:
     """The arm, or what it lacks."""
     if robot.rows != 6 or robot.joints != 6 or robot.sliding.any():
-        return NotSixTurning(robot.joints, int(robot.sliding.sum()))
+        return fact("not_six_turning_joints", joints=robot.joints, sliding=int(robot.sliding.sum()))
     if robot.coupling is not None and not _couples_the_arm_alone(robot.coupling):
-        return CoupledWrist()
+        return fact("coupled_wrist")
     return recognised(*axes_at_zero_theta(robot))
 
 
@@ -164,17 +120,17 @@ def recognised(axes: Reals, points: Reals, T_base_tool: Reals) -> WristPartition
     arm : or what it lacks; axes are parallel to 1e-9 rad and meet to 1e-9 m
     """
     if np.linalg.norm(np.cross(axes[1], axes[2])) > PARALLEL:
-        return ElbowAxesNotParallel()
+        return fact("elbow_axes_not_parallel")
     for i, j in ((0, 1), (3, 4), (4, 5)):
         if np.linalg.norm(np.cross(axes[i], axes[j])) < PARALLEL:
-            return NeighboursParallel(i + 1, j + 1)
+            return fact("neighbouring_axes_parallel", first=i + 1, second=j + 1)
     wrist, miss = meeting_point(axes[3:], points[3:])
     if miss > closed_form.BOUNDARY_M:
-        return NoWristCentre(miss * 1000)
+        return fact("no_common_point_of_axes_4_5_6", miss_mm=miss * 1000)
     across = np.eye(3) - np.outer(axes[1], axes[1])
     upper_arm, forearm = across @ (points[2] - points[1]), across @ (wrist - points[2])
     if min(np.linalg.norm(upper_arm), np.linalg.norm(forearm)) < closed_form.BOUNDARY_M:
-        return NoArmLength()
+        return fact("upper_arm_or_forearm_without_length")
     return WristPartitionedArm(
         axes=axes,
         points=points,

@@ -27,6 +27,7 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.programs import remedy, say
@@ -53,7 +54,7 @@ from er3a.program_check.check_program import (
     assumed_limits,
     check_program,
 )
-from er3a.program_check.program_check_findings import RANKS, Level, NotFollowed, worst_of
+from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
 from er3a.programs.program_findings import WriteFinding
@@ -195,7 +196,7 @@ def _causes(findings: Iterable[LocatedFinding]) -> list[list[LocatedFinding]]:
     rows: dict[tuple[Any, ...], list[LocatedFinding]] = defaultdict(list)
     for each in findings:
         if each.level != "note":
-            asked = each.level == "caution" and isinstance(each.finding, NOT_FOLLOWED)  # what an input answers
+            asked = each.level == "caution" and is_one(each.finding, *NOT_FOLLOWED)  # what an input answers
             parts = [getattr(each.finding, name, "") for name in ("reason", "joint", "type", "kind", "name")]
             rows[not asked, -RANKS[each.level], each.place.file, each.finding.code, *map(str, parts)].append(each)
     return [rows[key] for key in sorted(rows, key=lambda key: key[:2])]
@@ -205,10 +206,10 @@ def _cause_line(row: list[LocatedFinding]) -> str:
     first = row[0]
     said = [say(each.finding) for each in row]
     text = said[0]
-    if isinstance(first.finding, NotFollowed) and len(row) > 1:
-        names = list(dict.fromkeys(each.finding.text for each in row if isinstance(each.finding, NotFollowed)))
+    if is_one(first.finding, "not_followed") and len(row) > 1:
+        names = list(dict.fromkeys(each.finding.text for each in row if is_one(each.finding, "not_followed")))
         more = "" if len(names) <= MOST_TEXTS else f" and {len(names) - MOST_TEXTS} more"
-        text = say(NotFollowed(", ".join(names[:MOST_TEXTS]) + more, first.finding.reason))
+        text = say(fact("not_followed", text=", ".join(names[:MOST_TEXTS]) + more, reason=first.finding.reason))
     elif len(set(said)) > 1:
         text += f", and {len(set(said)) - 1} like it"
     lines = _line_ranges(each.place.line for each in row)
@@ -422,7 +423,9 @@ def _place_record(place: Place) -> dict[str, Any]:
 
 
 def _finding_record(each: LocatedFinding) -> dict[str, Any]:
-    params = {key: value for key, value in plain(each.finding).items() if key not in ("place", "code")}
+    record = plain(each.finding)
+    own = record["params"] if isinstance(each.finding, Finding) else record
+    params = {key: value for key, value in own.items() if key not in ("place", "code")}
     return {
         **_place_record(each.place),
         "level": each.level,

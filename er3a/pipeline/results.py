@@ -20,18 +20,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
 
-import numpy as np
 from pydantic import ValidationError
 
-from er3a.by_value import ByValue, Finding
-from er3a.collision.pairs import ShapesAssumed
+from er3a.by_value import KINDS, ByValue, Coded
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
+from er3a.finding import AnyFinding, Finding, plain
+from er3a.finding import Finding as Found
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.language import N_
 from er3a.pipeline.scope import Check, Coverage, Open
@@ -52,7 +52,7 @@ CHECKSUMS = "SHA256SUMS"
 
 Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
 Foundation = Literal[Status, "unsettled"]  # a caution about a table of which independent documents settle no entry
-FindingT = TypeVar("FindingT", bound=Finding)
+FindingT = TypeVar("FindingT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,11 @@ class Verdict(Generic[FindingT]):
 
     status: Status
     finding: FindingT
-    shapes: ShapesAssumed | None = None
+    shapes: Finding | None = None
     missed: tuple[Coverage, ...] = ()
 
     @property
-    def findings(self) -> tuple[FindingT | NotChecked | ShapesAssumed, ...]:
+    def findings(self) -> tuple[FindingT | NotChecked | Finding, ...]:
         """What it found, then what was not checked and what was assumed, each a sentence."""
         named = tuple(each for each in self.missed if each.gaps)
         missed = (NotChecked(named),) if named and self.status == "caution" else ()
@@ -87,7 +87,7 @@ class Verdict(Generic[FindingT]):
         """
         return self._lowered(bool(missed), missed=missed)
 
-    def with_assumed_shapes(self, shapes: ShapesAssumed | None) -> Verdict[FindingT]:
+    def with_assumed_shapes(self, shapes: Finding | None) -> Verdict[FindingT]:
         """The verdict where shapes of the arm are assumed.
 
         Parameters
@@ -122,7 +122,7 @@ class Figure:
     of: int | None = None
 
 
-class NotChecked(Finding):
+class NotChecked(Coded):
     """What was to be checked and was not, or not all of it: no verdict passes without it."""
 
     checks: tuple[Coverage, ...]
@@ -220,12 +220,6 @@ class Stored(ByValue, Generic[ResultsT]):
         return folder if folder and is_computed(folder) else None
 
 
-class NotComputed(Finding, code="stage.not_computed"):
-    """A stage could not be computed for a robot."""
-
-    reason: str
-
-
 class AbsentResults(Results[Summary]):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
@@ -281,17 +275,10 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         name: read_foundation(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
-        absent = AbsentResults(Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ()))
+        absent = AbsentResults(Summary(Verdict("not_computed", Found(**_stored_finding(record["verdict"]))), ()))
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
     return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
-
-
-def _reason_of_absence(verdict: dict[str, Any], stage: Stage) -> Finding:
-    known: tuple[type[Finding], ...] = (NotComputed, *stage.absences)
-    kinds: dict[str, Any] = {kind.code: kind for kind in known}
-    found: Finding = adapter(kinds[verdict["code"]]).validate_python(verdict["params"])
-    return found
 
 
 def is_computed(folder: Path) -> bool:
@@ -407,7 +394,7 @@ def read_scope(folder: Path, stage: Stage) -> Summary:
     """
     record = _record(folder)
     if record["verdict"]["status"] == "not_computed":
-        return Summary(Verdict("not_computed", _reason_of_absence(record["verdict"], stage)), ())
+        return Summary(Verdict("not_computed", Found(**_stored_finding(record["verdict"]))), ())
     summary: Summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
     return summary
 
@@ -544,32 +531,18 @@ def summary_type(kind: type[Results[Any]]) -> type[Summary]:
     raise TypeError(f"{kind.__name__} does not say what its summary is")
 
 
-def plain(value: Any) -> Any:
-    """A value as JSON has it.
-
-    Parameters
-    ----------
-    value : dataclasses, dicts, lists, arrays and numpy's numbers, however deep
-
-    Returns
-    -------
-    value : dicts, lists and plain values; a NaN stays
-    """
-    if is_dataclass(value) and not isinstance(value, type):
-        return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
-    if isinstance(value, dict):
-        return {key: plain(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def _verdict_record(verdict: Verdict[Any]) -> dict[str, Any]:
-    params = plain(verdict.finding)
+    found = plain(verdict.finding)
+    code = found.pop("code")
+    params = found.get("params", {}) if isinstance(verdict.finding, Found) else found
     more = {key: plain(value) for key in BESIDE if (value := getattr(verdict, key))}
-    return {"status": verdict.status, "code": params.pop("code"), "params": params, **more}
+    return {"status": verdict.status, "code": code, "params": params, **more}
+
+
+def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:
+    """A verdict's finding as its class takes it: a coded value's own fields, or a finding's code and parameters."""
+    code, params = verdict["code"], verdict["params"]
+    return params | {"code": code} if code in KINDS else {"code": code, "params": params}
 
 
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
@@ -577,7 +550,7 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
     verdict = own.get("verdict")
     try:
         if isinstance(verdict, dict):
-            finding = verdict["params"] | {"code": verdict["code"]}
+            finding = _stored_finding(verdict)
             more = {key: verdict[key] for key in BESIDE if key in verdict}
             own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
         of_stage: Any = summary_type(kind)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from er3a.by_value import ByValue
+from er3a.finding import plain
 from er3a.numerics.si_units import filled, split_unit, unit_text
 
 if TYPE_CHECKING:
@@ -446,7 +447,7 @@ def _coded(findings: NDArray[Any]) -> NDArray[Any]:
     texts: dict[int, str | None] = {id(None): None}
     for finding in findings:
         if id(finding) not in texts:
-            texts[id(finding)] = json.dumps({"code": finding.code} | asdict(finding), ensure_ascii=False)
+            texts[id(finding)] = json.dumps(plain(finding), ensure_ascii=False)
     return np.array([texts[id(finding)] for finding in findings], object)
 
 

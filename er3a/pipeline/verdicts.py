@@ -18,7 +18,7 @@ from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.messages.say import joined, say_all, sentence
 from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text, say_reserved
-from er3a.pipeline.results import NotComputed, Status, changed_since, is_computed, read_scope, read_status
+from er3a.pipeline.results import Status, changed_since, is_computed, read_scope, read_status
 from er3a.pipeline.scope import Coverage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -69,7 +69,7 @@ class StageVerdict:
     @property
     def broken(self) -> bool:
         """Whether the stage could not be computed although it applies to the robot."""
-        return self.status == "not_computed" and self.code == NotComputed.code
+        return self.status == "not_computed" and self.code == "stage.not_computed"
 
     @property
     def is_skipped(self) -> bool:

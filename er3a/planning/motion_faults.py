@@ -17,15 +17,14 @@ from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
+from er3a.finding import AnyFinding, Finding, fact, is_one
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.solutions import Unsolved
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, evaluated, interpolated
-from er3a.robots.joint_limits import CombinationExceeded, SlideExceeded
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
@@ -77,23 +76,7 @@ def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, fl
     return kept
 
 
-class AboveLimit(Finding):
-    """A joint (from 1) goes beyond its upper limit."""
-
-    joint: int
-    reached_deg: float
-    limit_deg: float
-
-
-class BelowLimit(Finding):
-    """A joint (from 1) goes beyond its lower limit."""
-
-    joint: int
-    reached_deg: float
-    limit_deg: float
-
-
-class NeededSpeed(Finding, code=""):
+class NeededSpeed(Coded, code=""):
     """A speed that a joint (from 1) would need, beyond its limit."""
 
     joint: int
@@ -115,7 +98,7 @@ class TooFastIfAssumed(NeededSpeed):
     """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
 
 
-class NeededAcceleration(Finding, code=""):
+class NeededAcceleration(Coded, code=""):
     """An acceleration that a joint (from 1) would need, beyond its limit."""
 
     joint: int
@@ -137,7 +120,7 @@ class AccelerationTooGreatIfAssumed(NeededAcceleration):
     """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
 
 
-class JerkTooGreat(Finding):
+class JerkTooGreat(Coded):
     """A joint (from 1) would need a jerk beyond its limit (mm if it ``slides``); None where its acceleration steps."""
 
     joint: int
@@ -154,14 +137,8 @@ class JerkTooGreat(Finding):
 RateCause = TooFast | TooFastIfAssumed | AccelerationTooGreat | AccelerationTooGreatIfAssumed | JerkTooGreat
 
 
-class PathOutOfReach(Finding, code="out_of_reach"):
-    """No branch reaches the pose; per side of the arm, why."""
-
-    reasons: tuple[Unsolved, ...]
-
-
 OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
-CauseT = TypeVar("CauseT", bound=Finding)
+CauseT = TypeVar("CauseT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
@@ -229,7 +206,7 @@ def rate_interval(
     return Interval(start, end, cause, worst)
 
 
-LimitCause = AboveLimit | BelowLimit | SlideExceeded | CombinationExceeded
+LimitCause = Finding
 
 
 def joints_of(cause: LimitCause) -> tuple[int, ...]:
@@ -243,7 +220,7 @@ def joints_of(cause: LimitCause) -> tuple[int, ...]:
     -------
     joints : numbers from 1
     """
-    return cause.joints if isinstance(cause, CombinationExceeded) else (cause.joint,)
+    return cause.joints if is_one(cause, "combination_exceeded") else (cause.joint,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,13 +266,29 @@ class LimitSide:
         reached, bound = scale * self.sign * most, scale * self.limit
         if len(used) != 1 or self.factors[used[0]] != 1:
             joints, factors = (used + 1).tolist(), self.factors[used].tolist()
-            return CombinationExceeded(
-                tuple(joints), tuple(factors), side, reached, abs(reached - bound), bound, slides
+            return fact(
+                "combination_exceeded",
+                joints=tuple(joints),
+                factors=tuple(factors),
+                side=side,
+                value=reached,
+                excess=abs(reached - bound),
+                limit=bound,
+                sliding=slides,
             )
         joint = int(used[0]) + 1
         if slides:
-            return SlideExceeded(joint, side, reached, abs(reached - bound), bound)
-        return (AboveLimit if self.sign > 0 else BelowLimit)(joint, reached, bound)
+            return fact(
+                "slide_exceeded",
+                joint=joint,
+                side=side,
+                position_mm=reached,
+                excess_mm=abs(reached - bound),
+                limit_mm=bound,
+            )
+        return fact(
+            "above_limit" if self.sign > 0 else "below_limit", joint=joint, reached_deg=reached, limit_deg=bound
+        )
 
 
 def limit_sides(robot: Robot) -> list[LimitSide]:
@@ -320,7 +313,7 @@ def limit_sides(robot: Robot) -> list[LimitSide]:
     ]
 
 
-def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReach]]:
+def unreachable(robot: Robot, followed: Followed) -> list[Interval[Finding]]:
     """Where no branch of the closed form reaches the pose, with the distance missing at the worst grid point.
 
     Parameters
@@ -337,7 +330,7 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[PathOutOfReac
         poses = followed.line.poses(followed.progress[first:last])
         gap = solve_slots(robot, poses, np.zeros((len(poses), 6)))[2]
         worst = int(np.argmax(gap.min(axis=1)))
-        cause = PathOutOfReach(inverse(robot, poses[worst]).unsolved)
+        cause = fact("out_of_reach", reasons=inverse(robot, poses[worst]).unsolved)
         found.append(Interval(float(followed.t[first]), float(followed.t[last - 1]), cause))
     return found
 

@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 import scipy
 
-from er3a.by_value import ByValue, Finding
+from er3a.by_value import ByValue
 from er3a.errors import Er3aError
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.motion_faults import OVER, RateLimit
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
@@ -39,19 +40,7 @@ STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
-class MustStandStill(Finding):
-    """The arm would have to stop on the path."""
-
-
-class NoTimeLawFound(Finding):
-    """The time-optimal parametrisation found no time law under the joints' limits."""
-
-
-class ToppraMissing(Finding):
-    """The library that finds time laws is not installed."""
-
-
-NoTimeLaw = MustStandStill | NoTimeLawFound | ToppraMissing
+NoTimeLaw = Finding
 
 
 class TimingError(Er3aError):
@@ -394,7 +383,7 @@ def toppra_library() -> Any:
             import toppra.constraint.linear_constraint
             import toppra.interpolator
     except ModuleNotFoundError:
-        raise TimingError(ToppraMissing()) from None
+        raise TimingError(fact("toppra_missing")) from None
     return toppra
 
 
@@ -460,8 +449,8 @@ def solved(path: Any, s: Reals, constraints: list[Any]) -> tuple[Reals, Reals]:
     solver = toppra_library().algorithm.TOPPRA(constraints, path, gridpoints=s, solver_wrapper="seidel")
     _, speed, _ = solver.compute_parameterization(0, 0)
     if speed is None or not np.isfinite(speed).all():
-        raise TimingError(NoTimeLawFound())
+        raise TimingError(fact("no_time_law_found"))
     between = (speed[:-1] + speed[1:]) / 2
     if (between <= 0).any():
-        raise TimingError(MustStandStill())
+        raise TimingError(fact("must_stand_still"))
     return np.asarray(speed, float), np.concatenate([[0.0], np.cumsum(np.diff(s) / between)])

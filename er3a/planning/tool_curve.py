@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import WIDE_STEP, Followed, follow
 from er3a.planning.motion_faults import Interval
@@ -35,10 +35,6 @@ SAME_TIME = 1e-9  # share of the duration
 CLOSE = np.array([1e-9, 1e-8, 1e-7])[:, None]  # rad, rad/s, rad/s^2; relative where a rate is greater than 1
 MAX_PIECES = 20_000  # that are tried
 MAX_ROUNDS = 3
-
-
-class Undecided(Finding):
-    """Between poses solved, a path of the tool is not known to be followed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +75,7 @@ def follow_as_curve(
     return followed, curve
 
 
-def open_stretches(curve: PiecewiseMotion) -> list[Interval[Undecided]]:
+def open_stretches(curve: PiecewiseMotion) -> list[Interval[Finding]]:
     """The gaps of a curve: where the closed form could not be met, or does not reach.
 
     Parameters
@@ -91,7 +87,7 @@ def open_stretches(curve: PiecewiseMotion) -> list[Interval[Undecided]]:
     intervals : from start to end of each gap, s
     """
     times = curve.times.tolist()
-    return [Interval(times[a], times[b], Undecided()) for a, b in runs(np.isnan(curve.velocity[:, 0, 0]))]
+    return [Interval(times[a], times[b], fact("undecided")) for a, b in runs(np.isnan(curve.velocity[:, 0, 0]))]
 
 
 def curve_of(followed: Followed) -> tuple[PiecewiseMotion, Reals]:

@@ -25,19 +25,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps
 from er3a.collision.shapes import link_frames
 from er3a.errors import PathError
+from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.planning.motion_faults import limit_intervals
 from er3a.planning.piecewise import PiecewiseMotion
 from er3a.planning.profiles import FromRestToRest, Rates
 from er3a.planning.sequences import JointSequence, joint_sequence
-from er3a.planning.timing import JointLimits, Timed, TimingError, ToppraMissing, fastest, joined, standing
-from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded
+from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, joined, standing
+from er3a.robots.joint_limits import limits_exceeded
 from er3a.robots.robot import Robot
 
 ROUNDS = 4000
@@ -56,43 +55,7 @@ MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
-class PlannerMissing(Finding):
-    """The library that plans is not installed."""
-
-
-class NothingMeasured(Finding):
-    """Without distances nothing can be planned."""
-
-
-class EndOverlaps(Finding):
-    """At the start (or the end) something overlaps."""
-
-    end: Literal["start", "end"]
-    overlap: PairOverlaps
-
-
-class EndOutsideLimits(Finding):
-    """At the start (or the end) joints are outside their limits."""
-
-    end: Literal["start", "end"]
-    limits: LimitsExceeded
-
-
-class EndUnreached(Finding):
-    """No joint angles within the limits reach the start (or the end)."""
-
-    end: Literal["start", "end"]
-
-
-class NoneFound(Finding):
-    """No path was found within this number of rounds; one may exist."""
-
-    rounds: int
-
-
-NoWayAround = (
-    PlannerMissing | ToppraMissing | NothingMeasured | EndOverlaps | EndOutsideLimits | EndUnreached | NoneFound
-)
+NoWayAround = Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,13 +107,13 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
     RRT-Connect [1]_ as OMPL has it [2]_.
     """
     if task.bodies is None:
-        return NothingMeasured()
+        return fact("nothing_measured")
     clear = _clear_at_ends(task, task.bodies, start, end)
     if not isinstance(clear, float):
         return clear
     depth = min(task.tolerance, SPARE * clear)
     if np.abs(end - start).max() < STILL:
-        return _proven(task, np.stack([start, end]), standing(start, 1.0), depth) or NoneFound(0)
+        return _proven(task, np.stack([start, end]), standing(start, 1.0), depth) or fact("none_found", rounds=0)
     rounds = 0
     for attempt, margin in enumerate(MARGINS):
         moves = _Moves(task.robot, task.bodies, min(task.tolerance + margin, 0.5 * clear))
@@ -161,29 +124,31 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWa
             rounds += task.rounds
         if corners is None:
             continue
-        if isinstance(corners, PlannerMissing):
+        if isinstance(corners, Finding):
             return corners
         corners = _shortened(moves, corners, np.random.default_rng([task.seed, STREAM, attempt]))
         for motion in _timed(task, corners):
-            if isinstance(motion, ToppraMissing):
+            if isinstance(motion, Finding):
                 return motion
             if found := _proven(task, corners, motion, depth):
                 return found
-    return NoneFound(rounds)
+    return fact("none_found", rounds=rounds)
 
 
-def _clear_at_ends(
-    task: PlanningTask, bodies: Bodies, start: Reals, end: Reals
-) -> float | EndOutsideLimits | EndOverlaps:
+def _clear_at_ends(task: PlanningTask, bodies: Bodies, start: Reals, end: Reals) -> float | Finding:
     """The smaller clearance (m) of the two ends (n,); which of them can't be one, and why."""
     ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
     for name, q in ends:
         if outside := limits_exceeded(task.robot, q):
-            return EndOutsideLimits(name, outside)
+            return fact("end_outside_limits", end=name, limits=outside)
     clear, pairs = bodies.min_distance(np.stack([start, end]))
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
-            return EndOverlaps(name, PairOverlaps(bodies.pairs[pair], -float(distance) * 1000))
+            return fact(
+                "end_overlaps",
+                end=name,
+                overlap=fact("pair_overlaps", pair=bodies.pairs[pair], depth_mm=-float(distance) * 1000),
+            )
     return float(clear.min())
 
 
@@ -241,8 +206,8 @@ def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | N
         (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
     )
     if not len(starts) or not len(ends):
-        return EndUnreached("end" if len(starts) else "start")
-    found: WayAround | NoWayAround = NoneFound(0)
+        return fact("end_unreached", end="end" if len(starts) else "start")
+    found: WayAround | NoWayAround = fact("none_found", rounds=0)
     for _, i, j in pairs[:MAX_PAIRS]:
         found = way_around(task, starts[i], ends[j])
         if isinstance(found, WayAround):
@@ -304,7 +269,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
     try:
         from ompl import base, geometric, util
     except ImportError:
-        return PlannerMissing()
+        return fact("planner_missing")
     util.noOutputHandler()
     util.RNG.setSeed(1 + (task.seed * len(MARGINS) + attempt) % (2**31 - 1))
     n, robot = len(start), task.robot
@@ -379,7 +344,7 @@ def _between(corners: Reals, lengths: Reals, at: float) -> Reals:
     return np.array([np.interp(at, lengths, column) for column in corners.T])
 
 
-def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing]:
+def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | Finding]:
     """The path with corners rounded less and less, timed under the limits."""
     sides = np.abs(np.diff(corners, axis=0)).max(axis=1)
     for share in ROUNDINGS if len(corners) > 2 else (0.0,):
@@ -390,7 +355,7 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | ToppraMissing
         except PathError:
             continue
         except TimingError as error:
-            if isinstance(error.finding, ToppraMissing):
+            if is_one(error.finding, "toppra_missing"):
                 yield error.finding
 
 

@@ -16,10 +16,11 @@ from typing import Literal
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE, PairsUnexamined, ShapesAssumed
+from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import has_bare_tool, shapes_assumed
 from er3a.errors import InputError
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import USUAL_NEAR, NearSingular
 from er3a.numerics.arrays import Reals
@@ -180,7 +181,7 @@ class ProgramCheck(ByValue):
     main: tuple[int, ...]
     cycle: CycleTime
     checked: tuple[Check, ...]
-    shapes: ShapesAssumed | None = None
+    shapes: Finding | None = None
 
     @property
     def arms(self) -> tuple[tuple[str, Robot], ...]:
@@ -286,24 +287,29 @@ def _located(
         step = execution.steps[number]
         for finding, moment in motion.findings.items():
             # What follows from an instruction that is named at its own line is no second question.
-            told = isinstance(finding, found_in.NotFollowed) and finding.text in named
+            told = is_one(finding, "not_followed") and finding.text in named
             level: found_in.Level = "note" if told else motion.level_of(finding)
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     for step in execution.steps:
         if isinstance(what := step.instruction, Unknown):
             reason: found_in.NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
-            text = NotUnderstood(what.text, step.place) if what.stops else found_in.NotFollowed(what.text, reason)
+            text = (
+                NotUnderstood(what.text, step.place)
+                if what.stops
+                else fact("not_followed", text=what.text, reason=reason)
+            )
             found.append(LocatedFinding("fail" if what.stops else "caution", text, step.place, step.calls))
     found += [
-        LocatedFinding("caution", found_in.NotFollowed("", each.kind), each.place)
+        LocatedFinding("caution", fact("not_followed", text="", reason=each.kind), each.place)
         for each in execution.endings
         if each.kind != "end" and each.kind != "joins"
     ]
     found += [
-        LocatedFinding("note", found_in.NotFollowed(text, "unreached"), place) for place, text in _unreached(execution)
+        LocatedFinding("note", fact("not_followed", text=text, reason="unreached"), place)
+        for place, text in _unreached(execution)
     ]
     if obstacles is not None and obstacles.bodies.in_error:
-        found.append(LocatedFinding("caution", PairsUnexamined(obstacles.bodies.in_error), top))
+        found.append(LocatedFinding("caution", fact("pairs_unexamined", pairs=obstacles.bodies.in_error), top))
     found += [*_loads(execution, robot), *_not_set(execution)]
     found += [
         LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
@@ -328,7 +334,7 @@ def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
         others = [each.finding for each in same if isinstance(each.finding, found_in.MotionCollides)]
         found = first.finding.with_touches_of(others)
     elif (at_mm := getattr(first.finding, "at_mm", None)) is not None:
-        found = replace(found, at_mm=at_mm)  # type: ignore[call-arg]
+        found = found.but(at_mm=at_mm)
     return replace(first, finding=found, times=len(same))
 
 
@@ -341,7 +347,9 @@ def _loads(execution: Execution, robot: Robot) -> Iterator[LocatedFinding]:
             continue
         seen.add(load)
         if load.mass is not None and load.mass > wrist.payload:
-            yield LocatedFinding("fail", found_in.LoadAbovePayload(load.mass, wrist.payload), step.place, step.calls)
+            yield LocatedFinding(
+                "fail", fact("load_above_payload", mass_kg=load.mass, payload_kg=wrist.payload), step.place, step.calls
+            )
 
 
 def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
@@ -353,7 +361,7 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
         if not (what.tool.own and what.base.own):
             kind: Literal["tool", "base", "both"] = "both" if not (what.tool.own or what.base.own) else "base"
             kind = "tool" if what.base.own else kind
-            yield LocatedFinding("note", found_in.FramesFromRobotFile(kind), step.place, step.calls)
+            yield LocatedFinding("note", fact("frames_from_robot_file", kind=kind), step.place, step.calls)
             return
 
 
@@ -388,7 +396,7 @@ def _motion_texts(program: Program) -> list[tuple[Place, str]]:
     return list(dict.fromkeys(found))
 
 
-NOT_FOLLOWED = (found_in.NotFollowed, found_in.StartNotKnown, found_in.ConfigurationGuessed)
+NOT_FOLLOWED = ("not_followed", "way_not_known", "configuration_guessed")
 
 
 def _verdicts(
@@ -407,7 +415,7 @@ def _verdicts(
     lost = set(execution.open)
     for each in located:
         levels[each.place].append(each.level)
-        if isinstance(each.finding, NOT_FOLLOWED):
+        if is_one(each.finding, *NOT_FOLLOWED):
             lost.add(each.place)
     nowhere = {place for place, _ in _unreached(execution)}
     found = []
@@ -521,7 +529,7 @@ def parts_of(check: ProgramCheck, robot: Robot, source: CommandSource) -> tuple[
     """
     groups: list[list[tuple[Place, CheckedMotion]]] = []
     rest = {each.place: each.line for each in check.verdicts}
-    rest |= {each.place: each.place.line for each in check.findings if isinstance(each.finding, found_in.NotFollowed)}
+    rest |= {each.place: each.place.line for each in check.findings if is_one(each.finding, "not_followed")}
     joined, times = True, Counter(id(motion) for motion in check.motions.values())
     for number in check.main:
         step, motion = check.execution.steps[number], check.motions.get(number)

@@ -14,6 +14,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.errors import PoseError
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
@@ -320,7 +321,7 @@ def joint_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: C
 
 def tool_path(
     arm: Robot, motion: ArmMotion, start: Reals, end: Reals, via: Reals | None, rules: CheckRules
-) -> MotionPath | found_in.NotFollowed | None:
+) -> MotionPath | Finding | None:
     """The way of a line or arc, followed from given joints.
 
     Parameters
@@ -335,16 +336,16 @@ def tool_path(
     """
     way = way_of(forward(arm, start), via, end)
     if way is None:
-        return found_in.NotFollowed(motion.form, "too_far" if via is None else "not_understood")
+        return fact("not_followed", text=motion.form, reason="too_far" if via is None else "not_understood")
     length, turned = way.length, way.turned
     if max(length, TURN_LENGTH * turned) < NO_WAY:
         return None
     if arm.joints > MOST_JOINTS:
-        return found_in.NotFollowed(motion.form, "redundant")
+        return fact("not_followed", text=motion.form, reason="redundant")
     if way.half_turn:
-        return found_in.NotFollowed(motion.form, "half_turn")
+        return fact("not_followed", text=motion.form, reason="half_turn")
     if motion.with_path and turned > SLIGHT_TURN:
-        return found_in.NotFollowed(motion.form, "turns_with_path")
+        return fact("not_followed", text=motion.form, reason="turns_with_path")
     share, q, stop = _followed(arm, way.poses, start, _parts(length, turned))
     return MotionPath(arm, tool_law(motion, length, turned, rules.assumed), share, q, length, turned, True, stop)
 
@@ -403,11 +404,12 @@ def _stopped(path: MotionPath, target: Reals) -> found_in.CheckFinding:
         except PoseError:
             continue
         if not len(solutions.q):
-            return found_in.StretchOutOfReach(at_mm, solutions.unsolved)
+            return fact("way_out_of_reach", at_mm=at_mm, reasons=solutions.unsolved)
     away = np.abs(solutions.q - last).max(axis=1)
     other = solutions.q[int(away.argmin())] - last
     joint = int(np.abs(other).argmax())
-    return found_in.ConfigurationEnds(at_mm, joint + 1, *joint_shown(arm, joint, float(other[joint])))
+    turned, slides = joint_shown(arm, joint, float(other[joint]))
+    return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, angle_deg=turned, slides=slides)
 
 
 def _proper(T: Reals) -> Reals:
@@ -515,11 +517,22 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
     if turned[lead] > FAR_TURN and path.length < NEAR_MOVE:
         tool = forward(arm, path.q[[0, -1]])[:, :3, :3]
         if rotation_angle(tool[0], tool[1]) < turned[lead] / 2:
-            found.append(found_in.JointJumps(lead + 1, float(np.degrees(step[lead])), path.length * 1000))
+            found.append(
+                fact(
+                    "joint_jumps", joint=lead + 1, angle_deg=float(np.degrees(step[lead])), moved_mm=path.length * 1000
+                )
+            )
     for j in np.flatnonzero(turned > np.pi).tolist():
         nearer = float(wrap_to_pi(step[j]))
         if abs(step[j]) - abs(nearer) > SPARED and arm.lower[j] <= start[j] + nearer <= arm.upper[j]:
-            found.append(found_in.WholeTurn(j + 1, *np.degrees([step[j], nearer]).tolist()))
+            found.append(
+                fact(
+                    "whole_turn",
+                    joint=j + 1,
+                    angle_deg=float(np.degrees(step[j])),
+                    nearest_deg=float(np.degrees(nearer)),
+                )
+            )
     return found
 
 
@@ -546,9 +559,11 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
             at = a + int(size[a:b].argmin())
             share, scale = float(path.share[at]), 1000.0 if kind == "shoulder" else float(np.degrees(1.0))
             if a < at + 1 < len(values) and values[max(at - 1, 0)] * values[at + 1] < 0:
-                found[found_in.MeetsSingularity(kind, path.along_mm(share), True)] = share
+                found[fact("meets_singularity", type=kind, at_mm=path.along_mm(share), bounded=True)] = share
             else:
-                found[found_in.PassesSingularity(kind, path.along_mm(share), float(size[at]) * scale)] = share
+                found[
+                    fact("passes_singularity", type=kind, at_mm=path.along_mm(share), distance=float(size[at]) * scale)
+                ] = share
     return found
 
 
@@ -566,4 +581,5 @@ def arrives_otherwise(path: MotionPath, given: Reals) -> found_in.CheckFinding |
     if path.end is None or np.abs(path.end - given).max() <= SAME_ARRIVAL:
         return None
     joint = int(np.argmax(np.abs(path.end - given)))
-    return found_in.ArrivesOtherwise(joint + 1, *joint_shown(path.arm, joint, float(path.end[joint] - given[joint])))
+    differs, slides = joint_shown(path.arm, joint, float(path.end[joint] - given[joint]))
+    return fact("arrives_otherwise", joint=joint + 1, difference_deg=differs, slides=slides)

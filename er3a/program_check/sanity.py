@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from er3a.finding import Finding, fact
 from er3a.kinematics.chain import arm_length
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
-from er3a.program_check.program_check_findings import SuspectNumber
 from er3a.programs.execution import Execution, Step
 from er3a.programs.instructions import MM, ArmMotion, JointTarget, NamedFrame, PoseTarget, Rate
 from er3a.robots.robot import Robot
@@ -23,7 +23,7 @@ MANY_TIMES = 10.0  # the usual speed
 USUAL = 3  # motions, from which others are compared with them
 
 
-def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
+def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, Finding]]:
     """Numbers of a program that are likely mistakes.
 
     Parameters
@@ -42,12 +42,13 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
     yield from _speeds(motions, robot)
     for which in ("tool", "base"):
         frames = [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)]
-        yield from ((step, SuspectNumber(which, *names)) for step, *names in _used_once(frames))  # type: ignore[arg-type]
+        yield from (
+            (step, fact("suspect_number", kind=which, text=text, usual=usual, unit=""))
+            for step, text, usual in _used_once(frames)
+        )  # type: ignore[arg-type]
 
 
-def _other_units(
-    motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool
-) -> Iterator[tuple[Step, SuspectNumber]]:
+def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool) -> Iterator[tuple[Step, Finding]]:
     """Targets that are none of the arm's as they are written, and would be in the other unit."""
     reach = arm_length(robot)
     unit, meant, scale = ("mm", "m", MM) if in_mm else ("m", "mm", 1.0)
@@ -57,17 +58,41 @@ def _other_units(
             xyz = target.pose[:3, 3]
             small = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
             if (small or not in_mm) and 0.1 * reach < other * np.linalg.norm(xyz) < 1.5 * reach:
-                yield step, SuspectNumber("unit", _listed(xyz * scale, unit), _listed(xyz * scale * other, unit), meant)
+                yield (
+                    step,
+                    fact(
+                        "suspect_number",
+                        kind="unit",
+                        text=_listed(xyz * scale, unit),
+                        usual=_listed(xyz * scale * other, unit),
+                        unit=meant,
+                    ),
+                )
         elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
             q = target.joints
             degrees = np.degrees(q)
             if in_mm and may_be_radians(degrees.tolist()):
                 yield (
                     step,
-                    SuspectNumber("unit", _listed(degrees, "deg"), _listed(np.degrees(degrees).round(), "deg"), "rad"),
+                    fact(
+                        "suspect_number",
+                        kind="unit",
+                        text=_listed(degrees, "deg"),
+                        usual=_listed(np.degrees(degrees).round(), "deg"),
+                        unit="rad",
+                    ),
                 )
             elif not in_mm and MOST_TURNED < np.abs(q).max() <= 360:
-                yield step, SuspectNumber("unit", _listed(q, "rad"), _listed(np.radians(q).round(3), "rad"), "deg")
+                yield (
+                    step,
+                    fact(
+                        "suspect_number",
+                        kind="unit",
+                        text=_listed(q, "rad"),
+                        usual=_listed(np.radians(q).round(3), "rad"),
+                        unit="deg",
+                    ),
+                )
 
 
 def _listed(values: Reals, unit: str) -> str:
@@ -83,28 +108,60 @@ def _value(rate: Rate | None, unit: str) -> float | None:
     return float(number) if refused else rate.value
 
 
-def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, SuspectNumber]]:
+def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, Finding]]:
     known = not robot.slides.any() and np.isfinite(robot.speed).all()
     fastest = float(robot.speed.sum()) * arm_length(robot) if known else np.inf  # no point of the arm is faster
     quickest = 2 * float(robot.speed.max()) if known else np.inf
     for step, motion in motions:
         if motion.speed and motion.speed.unit == "share" and motion.speed.text.endswith(" %"):
-            yield step, SuspectNumber("share", motion.speed.text, "100 %")
+            yield step, fact("suspect_number", kind="share", text=motion.speed.text, usual="100 %", unit="")
         along, turning = _value(motion.speed, "m/s"), _value(motion.speed, "rad/s")
         if along is not None and along > fastest:
             if along / MM < fastest:
-                yield step, SuspectNumber("unit", f"{along:g} m/s", f"{along / MM:g} m/s", "mm/s")
+                yield (
+                    step,
+                    fact(
+                        "suspect_number", kind="unit", text=f"{along:g} m/s", usual=f"{along / MM:g} m/s", unit="mm/s"
+                    ),
+                )
             else:
-                yield step, SuspectNumber("impossible_speed", f"{MM * along:g} mm/s", f"{MM * fastest:.0f} mm/s")
+                yield (
+                    step,
+                    fact(
+                        "suspect_number",
+                        kind="impossible_speed",
+                        text=f"{MM * along:g} mm/s",
+                        usual=f"{MM * fastest:.0f} mm/s",
+                        unit="",
+                    ),
+                )
         if turning is not None and turning > quickest > np.radians(turning):
-            yield step, SuspectNumber("unit", f"{turning:g} rad/s", f"{np.radians(turning):.2f} rad/s", "deg/s")
+            yield (
+                step,
+                fact(
+                    "suspect_number",
+                    kind="unit",
+                    text=f"{turning:g} rad/s",
+                    usual=f"{np.radians(turning):.2f} rad/s",
+                    unit="deg/s",
+                ),
+            )
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
     values = [value for _, value in given if value > 0]
     if len(values) > USUAL:
         usual = float(np.median(values))
         for step, value in given:
             if MANY_TIMES * usual < value <= fastest:
-                yield step, SuspectNumber("speed", f"{1000 * value:g} mm/s", f"{1000 * usual:g} mm/s")
+                yield (
+                    step,
+                    fact(
+                        "suspect_number",
+                        kind="speed",
+                        text=f"{1000 * value:g} mm/s",
+                        usual=f"{1000 * usual:g} mm/s",
+                        unit="",
+                    ),
+                )
 
 
 def _used_once(frames: list[tuple[Step, NamedFrame]]) -> Iterator[tuple[Step, str, str]]:

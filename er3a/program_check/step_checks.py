@@ -24,6 +24,7 @@ from er3a.collision.pairs import CarriedAndSolid, Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by
 from er3a.errors import PoseError
+from er3a.finding import fact, is_one
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import forward
@@ -55,8 +56,6 @@ CHUNK = 4_000  # points whose bodies are placed at a time
 MOST_TOUCHING = 200  # points of a motion at which depths are measured
 HALVINGS = 5  # of the part of a way in which bodies touch first
 CORNER_POINTS = 9
-
-Missing = found_in.NotFollowed
 
 
 @dataclass(eq=False)
@@ -143,7 +142,7 @@ class Judge:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
             chosen = motion.kind != "joint" or isinstance(motion.target, instructions.PoseTarget)
-            first = any(isinstance(each, found_in.ConfigurationGuessed) for each in checked.findings)
+            first = any(is_one(each, "configuration_guessed") for each in checked.findings)
             if checked.end is not None and (first or (checked.guessed and chosen)):
                 self._guessed.add(_rounded(checked.end))
         return self.motions[key]
@@ -165,23 +164,24 @@ class Judge:
         target, of_tool = motion.target, motion.kind != "joint"
         if isinstance(target, instructions.UnresolvedTarget):
             by_tool = target.reason == "position_unknown" and arm is None
-            checked.add(Missing(motion.tool.name, "tool") if by_tool else Missing(target.text, target.reason))
+            text, reason = (motion.tool.name, "tool") if by_tool else (target.text, target.reason)
+            checked.add(fact("not_followed", text=text, reason=reason))
             return checked
         _say_of(checked)
         if arm is None and (of_tool or isinstance(target, instructions.PoseTarget)):
-            checked.add(Missing(motion.tool.name, "tool"))
+            checked.add(fact("not_followed", text=motion.tool.name, reason="tool"))
         elif placed is None and isinstance(target, instructions.PoseTarget):
-            checked.add(Missing(motion.base.name, "base"))
+            checked.add(fact("not_followed", text=motion.base.name, reason="base"))
         elif of_tool:
             self._along_tool_path(checked, target)
         else:
             self._to_joints(checked, target)
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
-            values = (assumed.tool_speed, "m/s") if of_tool else (assumed.joint_share, "share")
+            value, unit = (assumed.tool_speed, "m/s") if of_tool else (assumed.joint_share, "share")
             number = word.rpartition("=")[2]
             refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
-            checked.add(found_in.SpeedNotGiven(*values, word, refused))  # type: ignore[arg-type]
+            checked.add(fact("speed_not_given", assumed=value, unit=unit, word=word, refused=refused))  # type: ignore[arg-type]
         return checked
 
     def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:
@@ -190,7 +190,7 @@ class Judge:
         if goal is None:
             return
         if checked.start is None:
-            checked.add(found_in.StartNotKnown(), *limit_findings(checked.arm, goal))
+            checked.add(fact("way_not_known"), *limit_findings(checked.arm, goal))
             checked.end = goal
             return
         checked.path = joint_path(checked.arm, checked.motion, checked.start, goal, self.rules)
@@ -208,11 +208,11 @@ class Judge:
         """A line or an arc."""
         motion, arm = checked.motion, checked.arm
         if motion.angle is not None:  # which ends elsewhere than at its target
-            checked.add(Missing("CA", "arc_angle"))
+            checked.add(fact("not_followed", text="CA", reason="arc_angle"))
             return
         given = target.joints if isinstance(target, instructions.JointTarget) else None
         if given is not None and np.isnan(given).any():
-            checked.add(Missing(motion.form, "position_unknown"))
+            checked.add(fact("not_followed", text=motion.form, reason="position_unknown"))
             return
         if given is not None:
             end = forward(arm, given)
@@ -221,13 +221,13 @@ class Judge:
             assert checked.base is not None
             end = checked.base @ target.pose
         if checked.start is None:
-            checked.add(found_in.StartNotKnown())
+            checked.add(fact("way_not_known"))
             checked.end = given if given is not None else self._goal(checked, target)
             return
         via = self._via(checked) if motion.kind == "arc" else None
         if motion.kind == "arc" and via is None:
             text = getattr(motion.via, "text", motion.form)
-            checked.add(Missing(text, getattr(motion.via, "reason", "undefined")))
+            checked.add(fact("not_followed", text=text, reason=getattr(motion.via, "reason", "undefined")))
             return
         found = tool_path(arm, motion, checked.start, end, via, self.rules)
         if not isinstance(found, MotionPath):
@@ -242,7 +242,7 @@ class Judge:
             checked.add(other)
         branch = target.branch if isinstance(target, instructions.PoseTarget) else None
         if branch is not None and found.end is not None and not solutions_meant(branch, arm, found.end[None])[0]:
-            checked.add(found_in.ConfigurationNotMet(_configuration(target)))
+            checked.add(fact("configuration_not_met", text=_configuration(target)))
 
     def _via(self, checked: CheckedMotion) -> Reals | None:
         """The arc's point: T_world_tool (4, 4), m."""
@@ -260,7 +260,13 @@ class Judge:
         if isinstance(target, instructions.JointTarget):
             open_ = np.isnan(target.joints)
             if before is None and open_.any():
-                checked.add(*(() if open_.all() else (Missing(checked.motion.form, "position_unknown"),)))
+                checked.add(
+                    *(
+                        ()
+                        if open_.all()
+                        else (fact("not_followed", text=checked.motion.form, reason="position_unknown"),)
+                    )
+                )
                 return None
             return target.joints if before is None else np.where(open_, before, target.joints)
         assert checked.base is not None
@@ -270,23 +276,23 @@ class Judge:
         try:
             found = inverse_batch(checked.arm, pose[None], reference)
         except PoseError:
-            checked.add(Missing(checked.motion.form, "too_far"))
+            checked.add(fact("not_followed", text=checked.motion.form, reason="too_far"))
             return None
         rows = found.q[0][found.solved[0]]
         if not len(rows):
-            checked.add(found_in.TargetOutOfReach(inverse(checked.arm, pose, reference).unsolved))
+            checked.add(fact("target_out_of_reach", reasons=inverse(checked.arm, pose, reference).unsolved))
             return None
         inside = [equivalents_within(checked.arm, row, reference) for row in rows]
         rows = np.concatenate([each for each in inside if len(each)] or [rows])
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
             met = solutions_meant(target.branch, checked.arm, rows)
             if not met.any():
-                checked.add(found_in.ConfigurationNotMet(_configuration(target)))
+                checked.add(fact("configuration_not_met", text=_configuration(target)))
             rows = rows[met] if met.any() else rows
         away = np.abs(rows - reference).max(axis=1)
         said = checked.motion.kind == "joint" and target.branch is None and bool(target.configuration)
         if (near is None or said) and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:
-            checked.add(found_in.ConfigurationGuessed(different))
+            checked.add(fact("configuration_guessed", solutions=different))
             if near is None:  # the one farthest from the limits
                 away = -np.minimum(rows - checked.arm.lower, checked.arm.upper - rows).min(axis=1)
         return np.asarray(rows[int(away.argmin())], np.float64)
@@ -306,9 +312,9 @@ def _say_of(checked: CheckedMotion) -> None:
     motion = checked.motion
     outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
     if outer:
-        checked.add(Missing(", ".join(outer), "external_axes"))
+        checked.add(fact("not_followed", text=", ".join(outer), reason="external_axes"))
     if motion.not_followed:
-        checked.add(Missing(motion.not_followed, "setting"))
+        checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
 
 
 def _key(motion: instructions.ArmMotion) -> Hashable:
@@ -394,7 +400,7 @@ class Obstacles(ByValue):
                 break
             if not keep_on():
                 for number in np.unique(owner[i]).tolist():
-                    paths[number][0].add(found_in.ClearanceNotProven())
+                    paths[number][0].add(fact("clearance_not_proven"))
                 break
             middle = np.arange(len(i)) + len(q)
             more = (q[i] + q[j]) / 2
@@ -431,8 +437,11 @@ class Obstacles(ByValue):
         if d[nearest] < 0:
             checked.add_on_way(self._touching(checked.path, share, np.flatnonzero(d < 0)))
         elif d[nearest] < self.assumed_margin:
-            near = found_in.ClearOfAssumed(
-                self.bodies.pairs[int(pair[nearest])], 1000 * checked.clearance, 1000 * self.assumed_margin
+            near = fact(
+                "clear_of_assumed",
+                pair=self.bodies.pairs[int(pair[nearest])],
+                clearance_mm=1000 * checked.clearance,
+                margin_mm=1000 * self.assumed_margin,
             )
             checked.add_on_way({near: float(share[nearest])})
 
@@ -479,7 +488,9 @@ class Obstacles(ByValue):
             return
         shares = [zone_share(zone, path) for path in (before, after)]
         if zone.kind == "distance" and max(shares) > 0.5 + 1e-9:
-            one.add(found_in.ZoneTooLarge(zone.value * 1000, min(before.length, after.length) * 1000))
+            one.add(
+                fact("zone_too_large", zone_mm=zone.value * 1000, motion_mm=min(before.length, after.length) * 1000)
+            )
         if not self.bodies.pairs or min(one.clearance or 0.0, other.clearance or 0.0) <= 0:
             return
         begins, corner = before.at(np.array([1 - min(shares[0], 0.5)]))[0], before.q[-1]
@@ -492,7 +503,11 @@ class Obstacles(ByValue):
         worst = int(np.argmin(d))
         if d[worst] < -self.tolerance:
             name = self.bodies.pairs[int(pair[worst])]
-            one.add(found_in.ZoneCollides(name, -1000 * float(d[worst]), arm_shapes(self.robot).assumed))
+            one.add(
+                fact(
+                    "zone_collides", pair=name, depth_mm=-1000 * float(d[worst]), assumed=arm_shapes(self.robot).assumed
+                )
+            )
 
 
 def zone_share(zone: instructions.Zone, path: MotionPath) -> float:

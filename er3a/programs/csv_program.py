@@ -19,13 +19,14 @@ from itertools import pairwise
 import numpy as np
 
 from er3a.errors import DoubtfulUnit, InputError
+from er3a.finding import fact
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NothingMoves, NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import NotUnderstood, ProgramFinding
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -124,7 +125,7 @@ def read_csv_program(source: ProgramText) -> Program:
     unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
     findings: tuple[ProgramFinding, ...] = (
         *unread,
-        *(() if table else (NothingMoves(),)),
+        *(() if table else (fact("program_nothing_moves"),)),
     )
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(

@@ -9,6 +9,7 @@ from typing import assert_never
 import numpy as np
 import scipy
 
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
@@ -16,7 +17,7 @@ from er3a.planning.moves import line, rotation_between
 from er3a.planning.profiles import LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH, arc
 from er3a.programs import instructions
-from er3a.programs.program_findings import HalfTurnsSplit, WriteFinding
+from er3a.programs.program_findings import WriteFinding
 from er3a.robots.robot import Robot
 
 TO_START = instructions.Rate(0.1, "share")
@@ -90,7 +91,7 @@ def listing_of(
             making.segments(parts, _row_times(command.timing, sizes), ends)
         case _:
             assert_never(command)
-    findings = (HalfTurnsSplit(making.split),) if making.split else ()
+    findings = (fact("written_half_turns_split", lines=making.split),) if making.split else ()
     return PathListing(instructions.Listing(name, tuple(making.found), title), start, findings)
 
 

@@ -11,11 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from er3a.errors import InputError
+from er3a.finding import fact, is_one
 from er3a.programs.csv_program import CSV
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing
 from er3a.programs.krl.language import KRL
 from er3a.programs.lexing import ProgramText, read_program_text
-from er3a.programs.program_findings import NothingMoves
 from er3a.programs.program_language import Language
 from er3a.programs.program_names import LanguageName
 from er3a.programs.rapid.language import RAPID
@@ -55,8 +55,8 @@ def read_program(path: str | Path) -> Program:
             raise InputError(path, None, f"{held} of a program, not the program", remedy)
     source = read_program_text(path)
     program = LANGUAGES[language_of(source)].reader(source)
-    if not _moves(program) and not any(isinstance(each, NothingMoves) for each in program.findings):
-        program = replace(program, findings=(*program.findings, NothingMoves()))
+    if not _moves(program) and not any(is_one(each, "program_nothing_moves") for each in program.findings):
+        program = replace(program, findings=(*program.findings, fact("program_nothing_moves")))
     return program
 
 

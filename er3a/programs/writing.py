@@ -6,12 +6,13 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from er3a.by_value import ByValue
+from er3a.finding import fact
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, program_findings
 from er3a.programs.solving import Resolver, way_of
@@ -441,24 +442,33 @@ class Writer(ABC):
         count = self.count
         found: list[program_findings.WriteFinding] = []
         if count["arcs"]:
-            found.append(program_findings.ArcsSplit(count["arcs"], count["chords"], self.options.arc_deviation))
+            found.append(
+                fact(
+                    "written_arcs_split",
+                    arcs=count["arcs"],
+                    lines=count["chords"],
+                    deviation_m=self.options.arc_deviation,
+                )
+            )
         if self.listing.one_sided:
-            found.append(program_findings.OneSideWritten(self.listing.one_sided))
-        found += [make(count[key]) for key, make in COUNTED.items() if count[key]]
+            found.append(fact("written_one_side", branches=self.listing.one_sided))
+        found += [fact(code, **{field: count[key]}) for key, (code, field) in COUNTED.items() if count[key]]
         if count["of assumed"]:
-            found.append(program_findings.SpeedsOfAssumed(count["of assumed"], ", ".join(sorted(self.assumed))))
-        return (*found, *map(program_findings.ToolNotGiven, self.tools))
+            found.append(
+                fact("written_speeds_of_assumed", motions=count["of assumed"], assumed=", ".join(sorted(self.assumed)))
+            )
+        return (*found, *(fact("written_tool_not_given", name=name) for name in self.tools))
 
 
-COUNTED: dict[str, Callable[[int], program_findings.WriteFinding]] = {
-    "zones": program_findings.ZonesDropped,
-    "estimated": program_findings.SpeedsEstimated,
-    "cut": program_findings.SpeedsCut,
-    "raised": program_findings.SpeedsRaised,
-    "left out": program_findings.TargetsLeftOut,
-    "rounded": program_findings.ValuesRounded,
-    "foreign": program_findings.NotTranslated,
-    "external": program_findings.ExternalAxesDropped,
+COUNTED: dict[str, tuple[str, str]] = {
+    "zones": ("written_zones_dropped", "zones"),
+    "estimated": ("written_speeds_estimated", "motions"),
+    "cut": ("written_speeds_cut", "motions"),
+    "raised": ("written_speeds_raised", "motions"),
+    "left out": ("written_targets_left_out", "motions"),
+    "rounded": ("written_values_rounded", "values"),
+    "foreign": ("written_not_translated", "instructions"),
+    "external": ("written_external_axes_dropped", "motions"),
 }
 
 
@@ -506,7 +516,7 @@ def head_line(finding: program_findings.WriteFinding) -> str:
     -------
     line : plain ASCII, in English
     """
-    values = {each.name: getattr(finding, each.name) for each in fields(finding)}
+    values = dict(finding.params)
     values["mm"] = 1000 * values.get("deviation_m", 0.0)
     return ascii_text(HEADS[finding.code].format(**values))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Literal, Self
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.references.quantities import Coordinate, Extremity, Point, SectionAxis, Segment, Side
 
 CornerLabel = Literal["x", "abs_x", "z"]
 
 
-class Subject(Finding, code=""):
+class Subject(Coded, code=""):
     """Base of all subjects; each has a ``code``."""
 
     @property

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.errors import Er3aError
+from er3a.finding import Finding, fact
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
@@ -17,45 +17,7 @@ SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 MAX_ROWS = 10_000  # turns of one pose: more make no list that anyone reads, and fill memory
 
 
-class LimitExceeded(Finding):
-    """A joint is above its upper or below its lower limit, by the excess."""
-
-    joint: int
-    side: Literal["above", "below"]
-    angle_deg: float
-    excess_deg: float
-    limit_deg: float
-
-
-class SlideExceeded(Finding):
-    """A prismatic joint is beyond its upper or below its lower limit, by the excess."""
-
-    joint: int
-    side: Literal["above", "below"]
-    position_mm: float
-    excess_mm: float
-    limit_mm: float
-
-
-class CombinationExceeded(Finding):
-    """A sum of joints is above its upper or below its lower limit; values in deg (mm if all of them slide)."""
-
-    joints: tuple[int, ...]
-    factors: tuple[float, ...]
-    side: Literal["above", "below"]
-    value: float
-    excess: float
-    limit: float
-    sliding: bool
-
-
-Exceeded = LimitExceeded | SlideExceeded | CombinationExceeded
-
-
-class LimitsExceeded(Finding):
-    """One or more joints, or sums of joints, are outside their limits."""
-
-    joints: tuple[Exceeded, ...]
+Exceeded = Finding
 
 
 def speeds_given(robot: Robot) -> Flags:
@@ -317,7 +279,7 @@ def turn_bounds(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
     return low, high
 
 
-def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
+def limits_exceeded(robot: Robot, q: Reals) -> Finding | None:
     """Which limits joint values leave, with the excess, for messages.
 
     Parameters
@@ -335,9 +297,21 @@ def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
             if robot.continuous[j]:
                 continue
             if slides[j]:
-                found.append(SlideExceeded(j + 1, side, *(1000 * np.array([value, excess, limit])).tolist()))
+                found.append(
+                    fact(
+                        "slide_exceeded",
+                        joint=j + 1,
+                        side=side,
+                        position_mm=1000 * float(value),
+                        excess_mm=1000 * excess,
+                        limit_mm=1000 * limit,
+                    )
+                )
             else:
-                found.append(LimitExceeded(j + 1, side, *np.degrees([value, excess, limit]).tolist()))
+                turned, beyond, most = np.degrees([value, excess, limit]).tolist()
+                found.append(
+                    fact("limit_exceeded", joint=j + 1, side=side, angle_deg=turned, excess_deg=beyond, limit_deg=most)
+                )
     for combined in robot.combined:
         factors = np.array(combined.factors)
         joints = np.flatnonzero(factors)
@@ -345,10 +319,21 @@ def limits_exceeded(robot: Robot, q: Reals) -> LimitsExceeded | None:
         # A sum is shown in mm only if all its joints slide; see CombinedLimit.
         scale = 1000.0 if sliding else float(np.degrees(1.0))
         for side, excess, limit in _beyond(float(factors @ q), combined.lower, combined.upper):
-            numbers = (joints + 1).tolist(), factors[joints].tolist()
-            shown = scale * float(factors @ q), scale * excess, scale * limit
-            found.append(CombinationExceeded(tuple(numbers[0]), tuple(numbers[1]), side, *shown, sliding))
-    return LimitsExceeded(tuple(found)) if found else None
+            own, shares = tuple((joints + 1).tolist()), tuple(factors[joints].tolist())
+            value = scale * float(factors @ q)
+            found.append(
+                fact(
+                    "combination_exceeded",
+                    joints=own,
+                    factors=shares,
+                    side=side,
+                    value=value,
+                    excess=scale * excess,
+                    limit=scale * limit,
+                    sliding=sliding,
+                )
+            )
+    return fact("limits_exceeded", joints=tuple(found)) if found else None
 
 
 def _beyond(value: float, lower: float, upper: float) -> list[tuple[Literal["above", "below"], float, float]]:

@@ -13,69 +13,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import Finding
-from er3a.collision.pairs import PairOverlaps
-from er3a.kinematics.solutions import Label, Solutions, Unsolved
+from er3a.by_value import Coded
+from er3a.finding import Finding, fact, is_one
+from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.joint_limits import LimitsExceeded, comparable, joint_shown, limit_margin
+from er3a.robots.joint_limits import comparable, joint_shown, limit_margin
 from er3a.robots.robot import Robot
 
 SAME_MOVE = 1e-9  # rad; moves closer than this differ by rounding only
 
-Refusal = LimitsExceeded | PairOverlaps
+Refusal = Finding
 
 
-class OtherBranch(Finding):
-    """The next best solution is on another branch."""
-
-    branch: int
-    label: Label
+NextBest = Finding
 
 
-class JointTurned(Finding):
-    """A joint of the next best solution is whole turns further."""
-
-    joint: int
-    turn_deg: int
+MaxMove = Finding
 
 
-class OtherTurns(Finding):
-    """The next best solution is on the same branch, with joints turned."""
-
-    joints: tuple[JointTurned, ...]
-
-
-class OtherFreeJoint(Finding):
-    """The next best solution is on the same branch, with its free joint at another angle."""
-
-
-NextBest = OtherBranch | OtherTurns | OtherFreeJoint
-
-
-class MaxJointMove(Finding, code="greatest_move"):
-    """The joint with the largest move, and that move."""
-
-    joint: int
-    angle_deg: float
-
-
-class MaxSlideMove(Finding, code="greatest_slide"):
-    """The joint with the largest move, which is prismatic, and that move."""
-
-    joint: int
-    move_mm: float
-
-
-MaxMove = MaxJointMove | MaxSlideMove
-
-
-class OnlyAdmissible(Finding):
-    """No other solution is within the limits (and free of collisions, where they count)."""
-
-    move: MaxMove
-
-
-class MovesLess(Finding):
+class MovesLess(Coded):
     """Its largest joint move is less than the next best solution's, by ``less_deg``."""
 
     move: MaxMove
@@ -87,7 +43,7 @@ class SlidesLess(MovesLess):
     """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
-class MovesLessTogether(Finding):
+class MovesLessTogether(Coded):
     """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
 
     move: MaxMove
@@ -99,37 +55,8 @@ class SlidesLessTogether(MovesLessTogether):
     """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
-class LowerBranchNumber(Finding):
-    """The next best solution is just as near."""
-
-    move: MaxMove
-    next_best: NextBest
-
-
-class NoSolution(Finding):
-    """The pose has no solution at all."""
-
-    unsolved: tuple[Unsolved, ...]
-
-
-class AllOutsideLimits(Finding):
-    """All solutions leave the limits; stated for the one with the smallest excess."""
-
-    count: int
-    branch: int
-    label: Label
-    exceeded: LimitsExceeded
-
-
-class AllCollide(Finding):
-    """All solutions within the limits collide; stated of the one with the largest margin to its limits."""
-
-    count: int
-    overlap: PairOverlaps
-
-
-WhyFirst = OnlyAdmissible | MovesLess | SlidesLess | MovesLessTogether | SlidesLessTogether | LowerBranchNumber
-WhyNone = NoSolution | AllOutsideLimits | AllCollide
+WhyFirst = Finding | MovesLess | SlidesLess | MovesLessTogether | SlidesLessTogether | Finding
+WhyNone = Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,9 +133,13 @@ def _why_first(
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
     value, slides = joint_shown(robot, joint, float(np.abs(solutions.q[chosen, joint] - q_ref[joint])))
-    move: MaxMove = MaxSlideMove(joint + 1, value) if slides else MaxJointMove(joint + 1, value)
+    move: MaxMove = (
+        fact("greatest_slide", joint=joint + 1, move_mm=value)
+        if slides
+        else fact("greatest_move", joint=joint + 1, angle_deg=value)
+    )
     if len(order) == 1:
-        return OnlyAdmissible(move)
+        return fact("only_admissible", move=move)
     second = order[1]
     other = _difference(solutions, chosen, second)
     margin = moves[second].max() - most
@@ -218,16 +149,16 @@ def _why_first(
     if nearer > SAME_MOVE:
         together = SlidesLessTogether if robot.sliding.any() else MovesLessTogether
         return together(move, float(np.degrees(nearer)), other)
-    return LowerBranchNumber(move, other)
+    return fact("lower_branch_number", move=move, next_best=other)
 
 
 def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
     """How another solution differs from the one chosen: its branch, its turns, or its free joint."""
     if solutions.branch[other] != solutions.branch[chosen]:
-        return OtherBranch(int(solutions.branch[other]), solutions.label[other])
+        return fact("other_branch", branch=int(solutions.branch[other]), label=solutions.label[other])
     turns = solutions.turn[other] - solutions.turn[chosen]
-    turned = tuple(JointTurned(int(j) + 1, int(360 * turns[j])) for j in np.flatnonzero(turns))
-    return OtherTurns(turned) if turned else OtherFreeJoint()
+    turned = tuple(fact("joint_turned", joint=int(j) + 1, turn_deg=int(360 * turns[j])) for j in np.flatnonzero(turns))
+    return fact("other_turns", joints=turned) if turned else fact("other_free_joint")
 
 
 def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:
@@ -243,13 +174,17 @@ def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | Non
     why : no solution at all; or the overlap of the solution with the largest margin; or the smallest excess of limits
     """
     if not len(solutions.q):
-        return NoSolution(solutions.unsolved)
-    overlaps = {row: why for row, why in enumerate(refused) if isinstance(why, PairOverlaps)}
+        return fact("no_solution", unsolved=solutions.unsolved)
+    overlaps = {row: why for row, why in enumerate(refused) if is_one(why, "pair_overlaps")}
     margin = limit_margin(robot, solutions.q)
     if overlaps:
         widest = max(overlaps, key=lambda row: margin[row])
-        return AllCollide(len(overlaps), overlaps[widest])
+        return fact("all_collide", count=len(overlaps), overlap=overlaps[widest])
     nearest = int(margin.argmax())
-    return AllOutsideLimits(
-        len(solutions.q), int(solutions.branch[nearest]), solutions.label[nearest], solutions.reason[nearest]
+    return fact(
+        "all_outside_limits",
+        count=len(solutions.q),
+        branch=int(solutions.branch[nearest]),
+        label=solutions.label[nearest],
+        exceeded=solutions.reason[nearest],
     )

@@ -22,12 +22,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from er3a.by_value import ByValue, Displayed, Finding, Sheet, shortly
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError, ShapeError
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
@@ -231,28 +231,6 @@ def checked_weights(rule: str | Mapping[str, float]) -> dict[RuleName, float]:
 COLLIDES = 0.0  # m; a solution with less clearance is refused
 
 
-class Measure(Finding):
-    """A solution's measure by a rule, in the rule's unit."""
-
-    rule: RuleName
-    value: float
-    unit: str
-
-
-class Placed(Finding):
-    """A solution's place, 1 the best, and what it was ranked by."""
-
-    place: int
-    measures: tuple[Measure, ...]
-
-
-class BestByRules(Finding):
-    """The solution taken, and the next best; ``next_best`` is empty if it is the only admissible one."""
-
-    measures: tuple[Measure, ...]
-    next_best: tuple[Measure, ...]
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class SolutionRanking(ByValue, Displayed):
     """Solutions of one pose in the order of a rule or of a mix of rules.
@@ -271,8 +249,8 @@ class SolutionRanking(ByValue, Displayed):
     measured: Mapping[RuleName, Reals]
     units: Mapping[RuleName, str]
     cost: Reals
-    reason: tuple[Placed | Refusal, ...]
-    chosen_reason: BestByRules | WhyNone
+    reason: tuple[Finding | Refusal, ...]
+    chosen_reason: Finding | WhyNone
 
     @property
     def chosen(self) -> int | None:
@@ -286,7 +264,7 @@ class SolutionRanking(ByValue, Displayed):
         -------
         sheet : place (from 1), row, cost, a column for each rule in its unit, and the refusal
         """
-        refused = [row for row, why in enumerate(self.reason) if not isinstance(why, Placed)]
+        refused = [row for row, why in enumerate(self.reason) if not is_one(why, "placed")]
         rows = (
             (place, row, self.cost[row], *(values[row] for values in self.measured.values()), why)
             for place, row, why in (
@@ -337,13 +315,15 @@ def select(
     order = _ordered(robot, solutions, list(weights), cost, allowed, q_ref)
     place = {int(row): rank + 1 for rank, row in enumerate(order)}
     measures = [
-        tuple(Measure(name, float(measured[name][row]), units[name]) for name in weights)
+        tuple(fact("measure", rule=name, value=float(measured[name][row]), unit=units[name]) for name in weights)
         for row in range(len(solutions.q))
     ]
-    reason = tuple(why or Placed(place[row], measures[row]) for row, why in enumerate(refused))
-    chosen_reason: BestByRules | WhyNone
+    reason = tuple(why or fact("placed", place=place[row], measures=measures[row]) for row, why in enumerate(refused))
+    chosen_reason: Finding | WhyNone
     if len(order):
-        chosen_reason = BestByRules(measures[order[0]], measures[order[1]] if len(order) > 1 else ())
+        chosen_reason = fact(
+            "best_by_rules", measures=measures[order[0]], next_best=measures[order[1]] if len(order) > 1 else ()
+        )
     else:
         chosen_reason = why_none(robot, solutions, refused)
     return SolutionRanking(order, measured, units, cost, reason, chosen_reason)
@@ -379,10 +359,12 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, .
     refused: list[Refusal | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
     distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
-    overlaps: dict[tuple[int, float], PairOverlaps] = {}  # turns share theirs
+    overlaps: dict[tuple[int, float], Finding] = {}  # turns share theirs
     for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
-            refused[row] = overlaps.setdefault((number, depth), PairOverlaps(bodies.pairs[number], depth * 1000))
+            refused[row] = overlaps.setdefault(
+                (number, depth), fact("pair_overlaps", pair=bodies.pairs[number], depth_mm=depth * 1000)
+            )
     return tuple(refused)
 
 

@@ -21,8 +21,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue, Finding
+from er3a.by_value import ByValue
 from er3a.errors import Er3aError
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import exp_rotation, inverse_right_jacobian, log_rotation, posed
 from er3a.numerics.arrays import Reals
 
@@ -104,21 +105,6 @@ class BoardViews(ByValue):
     reprojected: tuple[Reals, ...]
     ambiguous: Reals
     camera: Camera
-
-
-class AmbiguousTilt(Finding):
-    """Two poses of the flat board fit an image nearly alike: the other's errors are only ``ratio`` times as large."""
-
-    sample: str
-    ratio: float
-
-
-class BoardlessImage(Finding):
-    """An image shows too few corners of the board, and its sample is left out."""
-
-    sample: str
-    image: str
-    corners: int
 
 
 class BoardNotFoundError(Er3aError):
@@ -237,7 +223,7 @@ def intrinsics_covariance(found: Sequence[_Pose], corners: Sequence[Reals]) -> R
     return covariance
 
 
-def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousTilt, ...]:
+def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[Finding, ...]:
     """The images that leave open which way the board is tilted.
 
     Parameters
@@ -250,7 +236,7 @@ def ambiguous_tilts(views: BoardViews, names: Sequence[str]) -> tuple[AmbiguousT
     findings : where the other pose's reprojection errors are less than ``MIN_RATIO`` times as large
     """
     found = zip(names, views.ambiguous.tolist())
-    return tuple(AmbiguousTilt(name, ratio) for name, ratio in found if ratio < MIN_RATIO)
+    return tuple(fact("ambiguous_tilt", sample=name, ratio=ratio) for name, ratio in found if ratio < MIN_RATIO)
 
 
 def estimated_camera(points: Sequence[Reals], corners: Sequence[Reals], size: tuple[int, int]) -> Camera:

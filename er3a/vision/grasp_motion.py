@@ -19,6 +19,7 @@ import numpy as np
 from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
+from er3a.finding import fact
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
@@ -26,7 +27,7 @@ from er3a.planning.motion_faults import limit_intervals, rate_intervals
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import follow_as_curve, open_stretches
-from er3a.planning.way_around import EndOutsideLimits, NoneFound, NoWayAround, PlanningTask, WayAround, way_around
+from er3a.planning.way_around import NoWayAround, PlanningTask, WayAround, way_around
 from er3a.robots.joint_limits import limits_exceeded, within
 from er3a.robots.robot import Robot
 
@@ -113,7 +114,7 @@ def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tup
     legs : or why there are none
     """
     if outside := limits_exceeded(task.robot, start):
-        return EndOutsideLimits("start", outside)
+        return fact("end_outside_limits", end="start", limits=outside)
     straight = joint_legs("move", np.stack([start, end]), task.limits)
     if task.bodies is None or ((clear := _clearance(task.bodies, straight)) > 0 and clear >= needed):
         return straight
@@ -123,7 +124,7 @@ def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tup
     legs = joint_legs("move", found.corners, task.limits)
     around = _clearance(task.bodies, legs) if within(task.robot, found.corners).all() else 0.0
     if max(clear, around) <= 0:
-        return NoneFound(task.rounds)
+        return fact("none_found", rounds=task.rounds)
     return legs if around > clear else straight
 
 

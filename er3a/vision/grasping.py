@@ -13,15 +13,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rot_z, skew, translation
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
@@ -29,7 +30,7 @@ from er3a.kinematics.singularity import conditioning
 from er3a.numerics.arrays import Reals
 from er3a.planning.moves import line
 from er3a.planning.timing import JointLimits
-from er3a.planning.way_around import NoWayAround, PlanningTask
+from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.vision.grasp_motion import GraspLeg, Part, min_clearance, tool_leg, transfer
@@ -91,13 +92,7 @@ class GraspNeeds:
     probability: float = 0.0
 
 
-class GraspOutOfReach(Finding):
-    """No joint solution for any of the poses."""
-
-    poses: int
-
-
-class GraspNearLimits(Finding):
+class GraspNearLimits(Coded):
     """Every solution is nearer to a joint's limits than asked, or beyond them; the best of them by this much."""
 
     solutions: int
@@ -109,71 +104,11 @@ class GraspNearEnds(GraspNearLimits):
     """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
-class GraspSingular(Finding):
-    """Every solution left is nearer to a singularity than asked."""
-
-    solutions: int
-    singular_value: float
-    needed: float
-
-
-class GraspCollides(Finding):
-    """Every solution left comes nearer to something than asked, at the grasp; the best of them to this."""
-
-    solutions: int
-    pair: Pair
-    clearance_mm: float
-    needed_mm: float
-
-
-class LineLeaves(Finding):
-    """The straight line there or away can't be followed to its end within limits and away from singularities."""
-
-    part: Literal["approach", "retreat"]
-    after_mm: float
-
-
-class LineUnproven(Finding):
-    """The bounds don't settle that the straight line there or away keeps limits, rates and regular poses."""
-
-    part: Literal["approach", "retreat"]
-
-
-class PathCollides(Finding, code="way_collides"):
-    """Something is nearer than asked on a straight line, or on the way from where the arm waits."""
-
-    part: Part
-    pair: Pair
-    clearance_mm: float
-    needed_mm: float
-
-
-class NoTransfer(Finding):
-    """The straight joint move from where the arm waits collides, and the planner gives no other way."""
-
-    why: NoWayAround
-
-
-class GraspUnlikely(Finding):
-    """The gripper's tolerance is kept less often than asked; of the grasp that keeps it most often."""
-
-    probability: float
-    needed: float
-
-
-GraspRefusal = (
-    GraspOutOfReach
-    | GraspNearLimits
-    | GraspNearEnds
-    | GraspSingular
-    | GraspCollides
-    | LineLeaves
-    | LineUnproven
-    | PathCollides
-    | NoTransfer
-    | GraspUnlikely
+GraspRefusal = Finding | GraspNearLimits | GraspNearEnds | Finding
+_FAR = (
+    *("grasp_out_of_reach", "grasp_near_limits", "grasp_near_ends", "grasp_singular", "grasp_collides"),
+    *("line_leaves", "line_unproven", "way_collides", "no_transfer", "grasp_unlikely"),
 )
-_FAR: tuple[type, ...] = get_args(GraspRefusal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,10 +216,10 @@ def plan_grasp(
             return GraspPlan(replace(best, probability=probability, deviation=deviation), None, *counts)
         likeliest = max(likeliest, probability)
     if good:
-        return GraspPlan(None, GraspUnlikely(likeliest, task.needs.probability), *counts)
+        return GraspPlan(None, fact("grasp_unlikely", probability=likeliest, needed=task.needs.probability), *counts)
     refusals = [plan for plan in plans if not isinstance(plan, ChosenGrasp)]
     if refusals:
-        refusal = max(refusals, key=lambda why: _FAR.index(type(why)))
+        refusal = max(refusals, key=lambda why: _FAR.index(why.code))
     return GraspPlan(None, refusal, *counts)
 
 
@@ -301,7 +236,7 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
     """Candidates that pass at the grasp, the one with the largest margin first; else what the best of them lacks."""
     needs, robot = task.needs, task.robot
     if not candidates:
-        return [], GraspOutOfReach(poses)
+        return [], fact("grasp_out_of_reach", poses=poses)
     q = np.array([each.q for each in candidates])
     limit = limit_margin(robot, q)
     inside = np.flatnonzero(limit >= needs.limit_margin)
@@ -312,7 +247,9 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
     value = conditioning(robot, q[inside]).smallest_singular_value
     regular = inside[value >= needs.singular_value]
     if not regular.size:
-        return [], GraspSingular(len(inside), float(value.max()), needs.singular_value)
+        return [], fact(
+            "grasp_singular", solutions=len(inside), singular_value=float(value.max()), needed=needs.singular_value
+        )
     value = value[value >= needs.singular_value]
     margins = np.minimum(_ratio(limit[regular], needs.limit_margin), _ratio(value, needs.singular_value))
     if task.bodies is not None:
@@ -324,7 +261,13 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
             pair = clear.pair[best]
             if pair is not None:
                 wanted = 1000 * needs.clearance
-                return [], GraspCollides(len(regular), pair, float(1000 * clear.distance[best]), wanted)
+                return [], fact(
+                    "grasp_collides",
+                    solutions=len(regular),
+                    pair=pair,
+                    clearance_mm=float(1000 * clear.distance[best]),
+                    needed_mm=wanted,
+                )
         regular, margins = regular[free], margins[free]
     far = np.abs(q[regular] - task.home).max(axis=1)
     order = np.lexsort([far.round(TIE), -np.minimum(margins, 3.0).round(TIE)])
@@ -348,12 +291,12 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     for part, end, length in parts:
         points = _along(task, T, end, candidate.q)
         if len(points) < WAYPOINTS:
-            return LineLeaves(part, 1000 * length * max(len(points) - 1, 0) / (WAYPOINTS - 1))
+            return fact("line_leaves", part=part, after_mm=1000 * length * max(len(points) - 1, 0) / (WAYPOINTS - 1))
         ends = (before, T) if part == "approach" else (T, after)
         points = points[::-1] if part == "approach" else points
         legs = tool_leg(robot, part, points, ends, task.limits, task.line_speed)
         if legs is None:
-            return LineUnproven(part)
+            return fact("line_unproven", part=part)
         if (refusal := _too_near(task, part, legs)) is not None:
             return refusal
         lines += legs
@@ -361,7 +304,7 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     planning = PlanningTask(robot, task.bodies, PLANNING_TOLERANCE, task.limits, task.seed)
     moves = transfer(planning, task.home, q_before, needs.clearance)
     if not isinstance(moves, tuple):
-        return NoTransfer(moves)
+        return fact("no_transfer", why=moves)
     every = np.concatenate([leg.sampled(LEG_POINTS)[1] for leg in lines])
     limit = float(limit_margin(robot, every).min())
     value = float(conditioning(robot, every).smallest_singular_value.min())
@@ -391,11 +334,17 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     )
 
 
-def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> PathCollides | None:
+def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> Finding | None:
     smallest = min_clearance(task.bodies, legs) if task.bodies is not None else None
     if smallest is None or smallest[0] >= task.needs.clearance:
         return None
-    return PathCollides(part, smallest[1], 1000 * smallest[0], 1000 * task.needs.clearance)
+    return fact(
+        "way_collides",
+        part=part,
+        pair=smallest[1],
+        clearance_mm=1000 * smallest[0],
+        needed_mm=1000 * task.needs.clearance,
+    )
 
 
 def _along(task: GraspTask, T_from: Reals, T_to: Reals, q: Reals) -> Reals:

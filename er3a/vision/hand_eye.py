@@ -26,6 +26,7 @@ import scipy
 from scipy.spatial.transform import Rotation
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import (
     inverted,
     log_rotation,
@@ -73,8 +74,8 @@ class AngleCheck(ByValue):
     mismatch: Reals
     tolerance: float
     used: Flags
-    found: tuple[vision_findings.RotationMismatch, ...]
-    warning: vision_findings.NoMajority | None
+    found: tuple[Finding, ...]
+    warning: Finding | None
 
 
 def angles_between(R: Reals) -> Reals:
@@ -111,15 +112,19 @@ def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
     used = _agreeing(mismatch > tolerance)
     if used.sum() <= len(samples) / 2:
         conflict = mismatch[upper] > tolerance
-        warning = vision_findings.NoMajority(
-            int(conflict.sum()), len(conflict), float(np.degrees(np.median(mismatch[upper])))
+        warning = fact(
+            "no_majority",
+            pairs=int(conflict.sum()),
+            of=len(conflict),
+            median_deg=float(np.degrees(np.median(mismatch[upper]))),
         )
         return AngleCheck(mismatch, tolerance, np.ones(len(samples), bool), (), warning)
     found = tuple(
-        vision_findings.RotationMismatch(
-            samples.names[i],
-            _mending_turn(samples.target, turned, int(i), used, tolerance),
-            float(np.degrees(np.median(mismatch[i, used]))),
+        fact(
+            "rotation_mismatch",
+            sample=samples.names[i],
+            kind=_mending_turn(samples.target, turned, int(i), used, tolerance),
+            off_deg=float(np.degrees(np.median(mismatch[i, used]))),
         )
         for i in np.flatnonzero(~used)
     )
@@ -172,9 +177,7 @@ def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Re
     return [R @ Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
-def worst_sample(
-    samples: calibration_set.CalibrationSet, refined: Refined
-) -> tuple[int, vision_findings.FarFromFit] | None:
+def worst_sample(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[int, Finding] | None:
     """The sample whose residuals are too large compared with those of all others.
 
     The share by which a sample pulls the fit towards itself is taken back from its six residuals. Over the others'
@@ -203,8 +206,12 @@ def worst_sample(
         return None
     own = refined.residual[worst] / np.maximum(1 - refined.leverage[worst], 0.02)
     off_mm, off_deg = 1000 * np.linalg.norm(own[:3]), np.degrees(np.linalg.norm(own[3:]))
-    return worst, vision_findings.FarFromFit(
-        samples.names[worst], float(off_mm), float(off_deg), float(probability[worst])
+    return worst, fact(
+        "far_from_fit",
+        sample=samples.names[worst],
+        off_mm=float(off_mm),
+        off_deg=float(off_deg),
+        probability=float(probability[worst]),
     )
 
 
@@ -260,9 +267,7 @@ CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
 """How poses may have been meant, from how they are read."""
 
 
-def other_conventions(
-    samples: calibration_set.CalibrationSet, residual: Reals
-) -> tuple[vision_findings.OtherConvention, ...]:
+def other_conventions(samples: calibration_set.CalibrationSet, residual: Reals) -> tuple[Finding, ...]:
     """Conventions by which the samples fit much better than as they were read, all that fit equally well.
 
     Parameters
@@ -290,9 +295,22 @@ def other_conventions(
                 left = residuals(again.hand, again.target, *park(again.hand, again.target))[0]
             except np.linalg.LinAlgError:
                 continue
-            size, *rms_other = _misfit(left)
+            size, mm, deg = _misfit(left)
             if size < given / MUCH_BETTER:
-                found.append((size, vision_findings.OtherConvention(stream, name, *rms, *rms_other)))
+                found.append(
+                    (
+                        size,
+                        fact(
+                            "other_convention",
+                            stream=stream,
+                            convention=name,
+                            rms_given_mm=rms[0],
+                            rms_given_deg=rms[1],
+                            rms_other_mm=mm,
+                            rms_other_deg=deg,
+                        ),
+                    )
+                )
     least = min((size for size, _ in found), default=0.0)
     return tuple(each for size, each in found if size <= AS_GOOD * least)
 
@@ -330,11 +348,16 @@ class TouchCheck(ByValue):
     probability: float
 
     @property
-    def contradiction(self) -> vision_findings.TouchContradicts | None:
+    def contradiction(self) -> Finding | None:
         """The finding that the points contradict the calibration; None if they don't."""
         if self.probability >= CONTRADICTED:
             return None
-        return vision_findings.TouchContradicts(len(self.difference), 1000 * self.largest, self.probability)
+        return fact(
+            "touch_contradicts",
+            points=len(self.difference),
+            largest_mm=1000 * self.largest,
+            probability=self.probability,
+        )
 
     @property
     def largest(self) -> float:
@@ -522,7 +545,7 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
             cost = float(np.sum((residuals(F, B, X, Y)[0] / np.repeat(deviations, 3)) ** 2))
             best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
     if best is None:
-        raise vision_findings.HandEyeError(vision_findings.NothingFits())
+        raise vision_findings.HandEyeError(fact("nothing_fits"))
     return best[1], best[2]
 
 
@@ -531,9 +554,9 @@ def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
     try:
         found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
     except np.linalg.LinAlgError:
-        raise vision_findings.HandEyeError(vision_findings.NothingFits()) from None
+        raise vision_findings.HandEyeError(fact("nothing_fits")) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
-        raise vision_findings.HandEyeError(vision_findings.NothingFits())
+        raise vision_findings.HandEyeError(fact("nothing_fits"))
     return found
 
 
@@ -559,22 +582,22 @@ def _wider(half: Reals, refined: Refined, distances: tuple[DistanceFit, ...]) ->
 def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
     """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < MIN_SAMPLES:
-        raise vision_findings.HandEyeError(vision_findings.TooFewSamples(len(samples), MIN_SAMPLES))
+        raise vision_findings.HandEyeError(fact("too_few_samples", samples=len(samples), needed=MIN_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
         if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
-            raise vision_findings.HandEyeError(vision_findings.AllSamplesEqual(stream))  # type: ignore[arg-type]
+            raise vision_findings.HandEyeError(fact("all_samples_equal", stream=stream))  # type: ignore[arg-type]
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
     if greatest < MIN_TURN:
-        raise vision_findings.HandEyeError(vision_findings.NoRotation(float(np.degrees(greatest))))
+        raise vision_findings.HandEyeError(fact("no_rotation", greatest_turn_deg=float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
     turns = log_rotation(transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
     if apart < MIN_SPREAD:
         raise vision_findings.HandEyeError(
-            vision_findings.ParallelTurns(tuple(axes[0].tolist()), float(np.degrees(apart)))
+            fact("parallel_axes", axis=tuple(axes[0].tolist()), spread_deg=float(np.degrees(apart)))
         )
     return greatest, apart
 
@@ -588,21 +611,25 @@ def _warnings(
 ) -> list[vision_findings.CalibrationWarning]:
     found: list[vision_findings.CalibrationWarning] = []
     if not refined.converged:
-        found.append(vision_findings.NotConverged(len(samples)))
+        found.append(fact("not_converged", samples=len(samples)))
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
-        found.append(vision_findings.LittleMotion(float(np.degrees(greatest)), float(np.degrees(apart))))
+        found.append(
+            fact(
+                "little_motion", greatest_turn_deg=float(np.degrees(greatest)), axes_apart_deg=float(np.degrees(apart))
+            )
+        )
     if (places := len(set(samples.places.tolist()))) <= FEW_SAMPLES:
-        found.append(vision_findings.FewSamples(places))
+        found.append(fact("few_samples", samples=places))
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
-        found.append(vision_findings.MoreScatter(float(refined.scatter), largest))
+        found.append(fact("more_scatter", scatter=float(refined.scatter), largest=largest))
     if read := other_conventions(samples, refined.residual):
         return [*found, *read]
     found += [each.finding for each in distances if each.sure]
     size, distance, turn = _misfit(refined.residual)
     if size > 1 and not vision_findings.grave_warnings(found):
-        found.append(vision_findings.UnexplainedResiduals(distance, turn))
+        found.append(fact("unexplained_residuals", rms_mm=distance, rms_deg=turn))
     return found
 
 

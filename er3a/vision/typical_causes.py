@@ -24,6 +24,7 @@ import numpy as np
 import scipy
 
 from er3a.calibration.parameters import DEPENDENT
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import inverted, moved, step_between
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -215,11 +216,11 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
 
 def _finding(name: DistanceError, value: float, half_width: float) -> vision_findings.WrongDistances:
     if name == "board":
-        return vision_findings.BoardScale(1 + value, half_width)
+        return fact("board_scale", factor=1 + value, half_width=half_width)
     if name == "focal_length":
-        return vision_findings.FocalLength(1 + value, half_width)
+        return fact("focal_length", factor=1 + value, half_width=half_width)
     axis: Literal["x", "y"] = "x" if name == "principal_point_x" else "y"
-    return vision_findings.PrincipalPoint(axis, 100 * value, 100 * half_width)
+    return fact("principal_point", axis=axis, percent=100 * value, half_width_percent=100 * half_width)
 
 
 def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
@@ -277,7 +278,7 @@ def _alike(samples: CalibrationSet) -> Reals:
 # Steps ----------------------------------------------------------------------------------------------------------------
 
 
-def moved_between(samples: CalibrationSet, refined: Refined) -> vision_findings.MovedBetween | None:
+def moved_between(samples: CalibrationSet, refined: Refined) -> Finding | None:
     """The likeliest step of camera or board, if chance does not explain it.
 
     Parameters
@@ -303,7 +304,14 @@ def moved_between(samples: CalibrationSet, refined: Refined) -> vision_findings.
     if chance >= STEP_CHANCE or np.linalg.norm(step) < MIN_STEP:
         return None
     distance, turn = 1000 * np.linalg.norm(step[:3]), np.degrees(np.linalg.norm(step[3:]))
-    return vision_findings.MovedBetween(samples.names[at], what, float(distance), float(turn), chance)  # type: ignore[arg-type]
+    return fact(
+        "moved_between",
+        sample=samples.names[at],
+        what=what,
+        moved_mm=float(distance),
+        moved_deg=float(turn),
+        probability=chance,
+    )  # type: ignore[arg-type]
 
 
 def _step_at(samples: CalibrationSet, what: str, at: int) -> TypicalCause:
@@ -332,7 +340,7 @@ class ZerosTried:
     smallest : deg; a wrong zero of another joint is named if it is at least this large; 0 if there are no others
     """
 
-    zero: vision_findings.JointZero | None
+    zero: Finding | None
     mended: CalibrationSet | None
     unseen: tuple[str, ...]
     smallest: float
@@ -370,7 +378,9 @@ def wrong_zero(samples: CalibrationSet, used: CalibrationSet, refined: Refined, 
         return ZerosTried(None, None, tuple(unseen), smallest)
     given, other = (float(1000 * np.sqrt((each.residual[:, :3] ** 2).mean())) for each in (refined, fit))
     value, half_width = np.degrees([fit.values[0], fit.half_width[UNKNOWNS]]).tolist()
-    zero = vision_findings.JointZero(k + 1, value, half_width, given, other)
+    zero = fact(
+        "joint_zero", joint=k + 1, offset_deg=value, half_width_deg=half_width, rms_given_mm=given, rms_other_mm=other
+    )
     mended = replace(samples, flange=_flange(robot, samples, k, float(fit.values[0])))
     return ZerosTried(zero, mended, tuple(unseen), smallest)
 

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.arcs import FULL_TURN
@@ -64,19 +64,19 @@ class Relaxed:
         return self.limit + (self.by if self.side == "upper" else -self.by)
 
 
-class Disappears(Finding, code="void_disappears"):
+class Disappears(Coded, code="void_disappears"):
     """One limit alone makes the void, or each of two."""
 
     limits: tuple[Relaxed, ...]
 
 
-class SeveralLimits(Finding, code="void_of_several_limits"):
+class SeveralLimits(Coded, code="void_of_several_limits"):
     """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
 
     most: Relaxed | None
 
 
-class Geometry(Finding, code="void_of_geometry"):
+class Geometry(Coded, code="void_of_geometry"):
     """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
 
     remaining_ratio: float

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.by_value import Finding
+from er3a.finding import Finding, fact
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.by_class import (
@@ -42,22 +42,7 @@ BESIDE = np.array([1.1e-4, -0.7e-4, 0.9e-4])  # rad, about the tool's axes
 _PROBED = 24  # random poses that tell how often elimination leaves a doubt
 
 
-class InverseUnknown(Finding):
-    """No class of arms whose inverse is known fits this one."""
-
-
-class JointOneShared(Finding):
-    """Joint 1 is coupled with others or limited together with them, so what it carries around is not the same all
-    about."""
-
-
-class OrientationsUnknown(Finding):
-    """Which orientations the arm's few joints can give its tool at a point is not known."""
-
-    joints: int
-
-
-MapsMissing = InverseUnknown | JointOneShared | OrientationsUnknown
+MapsMissing = Finding
 
 
 def lacking_for_maps(robot: Robot) -> MapsMissing | None:
@@ -68,10 +53,10 @@ def lacking_for_maps(robot: Robot) -> MapsMissing | None:
     why : None if there are
     """
     if isinstance(arm_solver(robot).chain, Unsolved):
-        return InverseUnknown()
+        return fact("inverse_unknown")
     if not joint_1_alone(robot):
-        return JointOneShared()
-    return OrientationsUnknown(robot.joints) if asked_of(robot, 1) is None else None
+        return fact("joint_one_shared")
+    return fact("orientations_unknown", joints=robot.joints) if asked_of(robot, 1) is None else None
 
 
 @derived

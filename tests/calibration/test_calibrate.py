@@ -16,20 +16,12 @@ import er3a
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.fit import jacobian
 from er3a.calibration.observations import Measurement, observed
-from er3a.calibration.outcomes import (
-    CalibrationError,
-    FarFromTable,
-    MorePositions,
-    MovesNothing,
-    NoCorrectionFits,
-    NoCorrectionFound,
-    NotToldApart,
-)
+from er3a.calibration.outcomes import CalibrationError
 from er3a.calibration.parameters import parallel_pairs, parameters_of, placements_of
-from er3a.diagnosis.faults import ReversedDirection, WrongAlphaSign
 from er3a.errors import InputError
 from er3a.files.by_name import COLUMNS, load_measurements
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import lines_of
 from er3a.pipeline.messages.diagnosis import say
@@ -123,7 +115,7 @@ def test_what_intervals_leave_wider_than_a_table_may_be_off_is_not_settled(rando
     assert least <= settled / estimated <= most
     assert f"settle {settled} of {estimated + len(found.held)} numbers" in lines_of(found)
     if not settled:
-        assert found.conclusion == NoCorrectionFound(estimated, found.open)
+        assert found.conclusion == fact("no_correction_found", intervals=estimated, open=found.open)
         assert "settle nothing of base_x" in say(found.conclusion)
         assert "no correction" not in say(found.conclusion)
 
@@ -131,8 +123,11 @@ def test_what_intervals_leave_wider_than_a_table_may_be_off_is_not_settled(rando
 def test_what_positions_cannot_tell_apart_is_held(random):
     robot = load_robot("er3_600")
     held = er3a.calibrate(robot, measured(robot, poses_in(robot, random, 40), 0.05, random)).held
-    assert NotToldApart(("d3", "d2"), (2, 3)) in held or NotToldApart(("d2", "d3"), (2, 3)) in held
-    assert MovesNothing("offset6") in held
+    assert (
+        fact("not_told_apart", entries=("d3", "d2"), parallel_joints=(2, 3)) in held
+        or fact("not_told_apart", entries=("d2", "d3"), parallel_joints=(2, 3)) in held
+    )
+    assert fact("moves_nothing", entry="offset6") in held
 
 
 def test_held_and_estimated_entries_are_the_rank_of_the_jacobian(random):
@@ -174,12 +169,12 @@ def test_few_poses_give_fewer_entries_and_say_what_more_is_needed(random):
     robot = load_robot("er3_600")
     few = er3a.calibrate(robot, measured(robot, poses_in(robot, random, 5), 0.05, random))
     assert few.level == "lengths_and_offsets"
-    assert few.more.level == "all_entries"
+    assert few.more.fitted == "all_entries"
     assert few.more.determined + len(few.more.entries) == few.more.determinable
     with pytest.raises(CalibrationError) as caught:
         er3a.calibrate(robot, measured(robot, poses_in(robot, random, 1), 0.05, random))
     needed = caught.value.finding
-    assert isinstance(needed, MorePositions)
+    assert is_one(needed, "more_positions")
     assert (needed.poses, needed.determined, needed.determinable, needed.missing) == (1, 3, 5, 1)
 
 
@@ -188,7 +183,7 @@ def test_positions_of_another_arm_are_not_explained_away(random):
     rows = measured(other, random.uniform(-1, 1, (40, 6)), 0.05, random)
     with pytest.raises(CalibrationError) as caught:
         er3a.calibrate(robot, rows)
-    assert isinstance(caught.value.finding, NoCorrectionFits)
+    assert is_one(caught.value.finding, "no_correction_fits")
 
 
 def written(
@@ -337,7 +332,7 @@ def test_too_few_positions_ask_for_poses_that_settle_more(random):
     more = er3a.calibrate(robot, measured(robot, q, 0.05, random)).more
     others = poses_in(robot, random, more.missing)
     found = er3a.calibrate(robot, measured(robot, np.concatenate([q, others]), 0.05, random))
-    assert found.level == more.level
+    assert found.level == more.fitted
     assert len(found.estimates) == more.determinable
 
 
@@ -346,12 +341,12 @@ def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
     rows = measured(robot, poses_in(robot, random, 6), 0.05, random)
 
     def never(*_):
-        raise CalibrationError(NoCorrectionFits(100, 9.0), "")
+        raise CalibrationError(fact("no_correction_fits", steps=100, rest_mm=9.0), "")
 
     monkeypatch.setattr(calibration, "fit", never)
     with pytest.raises(CalibrationError) as caught:
         er3a.calibrate(robot, rows)
-    assert isinstance(caught.value.finding, MorePositions)
+    assert is_one(caught.value.finding, "more_positions")
 
 
 @pytest.mark.parametrize("convert", [lambda q: q[:, [0, 1, 2, 3, 5, 4]], lambda q: q * [1, 1, 1, 1, -1, 1]])
@@ -369,9 +364,9 @@ def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
     rows = rows if known else [replace(row, deviation_mm=None) for row in rows]
     found = er3a.calibrate(robot, rows)
     swapped = not np.array_equal(np.abs(wrong), np.abs(q))
-    assert isinstance(found.conclusion, FarFromTable)
+    assert is_one(found.conclusion, "far_from_table")
     assert found.wrong.swapped == ((5, 6) if swapped else None)
-    assert (ReversedDirection(5) in found.wrong.faults) is not swapped
+    assert (fact("reversed_direction", joint=5) in found.wrong.faults) is not swapped
     assert lines_of(found).startswith("Measurements and table belong together ")
     assert not found.fits
     advised = [replace(row, pose=tuple(own)) for row, own in zip(rows, np.degrees(convert(wrong)).tolist())]
@@ -389,7 +384,7 @@ def test_a_wrong_sign_of_alpha_is_named(name, joint, random):
     except CalibrationError as error:
         finding = error.finding
     given = float(np.degrees(wrong.alpha[joint - 1]))
-    assert WrongAlphaSign(joint, given, -given) in finding.faults
+    assert fact("wrong_alpha_sign", joint=joint, given_deg=given, fits_deg=-given) in finding.faults
     assert f"joint {joint}: alpha" in say(finding)
 
 

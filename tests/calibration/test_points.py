@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.calibration.fit import Fit, covariance_by_poses
 from er3a.calibration.observations import Measurement, PointObservations, spread
-from er3a.calibration.outcomes import CalibrationError, MovesNothing, NotToldApart
+from er3a.calibration.outcomes import CalibrationError
 from er3a.calibration.parameters import coupled, settles
 from er3a.calibration.terms import JointErrors, JointTerm, candidates, starting_table
 from er3a.dynamics.arm_model import arm_model
@@ -25,6 +25,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
+from er3a.finding import fact
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
@@ -225,7 +226,7 @@ def test_what_is_a_choice_between_base_tool_and_table_is_said(random):
     bench = Bench("seven", random)
     rows = bench.measured(60, 0.05)
     free = er3a.calibrate(bench.robot, rows)
-    assert NotToldApart(("offset1", "base_rz"), None) in free.held
+    assert fact("not_told_apart", entries=("offset1", "base_rz"), parallel_joints=None) in free.held
     names = {each.name for each in er3a.calibrate(bench.robot, rows, fixed=["base", "tool"]).estimates}
     assert {"d1", "offset1"} <= names
     assert not any(name.startswith(("base", "tool")) for name in names)
@@ -242,7 +243,7 @@ def test_a_coordinate_that_was_never_measured_leaves_open_what_moves_it_alone(ra
     for k in range(2):
         own = corrections[f"a{k + 1}"]
         assert own.correction == pytest.approx(1000 * (bench.truth.a - bench.robot.a)[k], abs=0.1)
-    assert {MovesNothing("base_z"), MovesNothing("d1")} <= set(found.held)
+    assert {fact("moves_nothing", entry="base_z"), fact("moves_nothing", entry="d1")} <= set(found.held)
     assert found.more is None
 
 

@@ -9,30 +9,19 @@ import pytest
 
 import er3a
 from er3a.diagnosis.diagnose import Hypothesis
-from er3a.diagnosis.faults import (
-    Faults,
-    ReversedDirection,
-    SwappedEntries,
-    WrongAlphaSign,
-    WrongConvention,
-    WrongLength,
-    WrongLimits,
-    WrongOffset,
-    WrongScale,
-    WrongUnit,
-    rounded,
-)
+from er3a.diagnosis.faults import Faults, rounded
 from er3a.diagnosis.ranking import rank, usable
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.references.reference import expected_of
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import to_modified
 from testing.known_faults import mutations_of, noisy, try_mutation
 
 TRUSTED = ("er3a_c60", "er3_600")
-OFFSET_MISSING = WrongOffset(2, 0.0, -90.0)
+OFFSET_MISSING = fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0)
 
 
 def alike(hypothesis: Hypothesis) -> list[Faults]:
@@ -75,13 +64,13 @@ def test_a_right_table_gets_no_diagnosis(name):
     ("entries", "named"),
     [
         ({"offset": (2, 0.0)}, OFFSET_MISSING),
-        ({"offset": (3, np.pi)}, WrongOffset(3, 180.0, 0.0)),
-        ({"direction": (3, 1.0)}, ReversedDirection(3)),
-        ({"alpha": (3, np.pi / 2)}, WrongAlphaSign(3, 90.0, -90.0)),
-        ({"a": (3, 0.0)}, WrongLength(3, "a", 0.0, 70.0)),
-        ({"d": (6, 0.0)}, WrongLength(6, "d", 0.0, 78.5)),
-        ({"d": (4, 0.3015)}, WrongLength(4, "d", 301.5, 299.0)),
-        ({"lower": (3, np.radians(75))}, WrongLimits(3, "lower_sign")),
+        ({"offset": (3, np.pi)}, fact("wrong_offset", joint=3, given_deg=180.0, fits_deg=0.0)),
+        ({"direction": (3, 1.0)}, fact("reversed_direction", joint=3)),
+        ({"alpha": (3, np.pi / 2)}, fact("wrong_alpha_sign", joint=3, given_deg=90.0, fits_deg=-90.0)),
+        ({"a": (3, 0.0)}, fact("wrong_length", joint=3, column="a", given_mm=0.0, fits_mm=70.0)),
+        ({"d": (6, 0.0)}, fact("wrong_length", joint=6, column="d", given_mm=0.0, fits_mm=78.5)),
+        ({"d": (4, 0.3015)}, fact("wrong_length", joint=4, column="d", given_mm=301.5, fits_mm=299.0)),
+        ({"lower": (3, np.radians(75))}, fact("wrong_limits", joint=3, fault="lower_sign")),
     ],
 )
 def test_single_faults_are_named(entries, named):
@@ -94,16 +83,19 @@ def test_unit_swap_scale_and_convention_are_named():
     robot = load_robot("er3a_c60")
     modified = to_modified(robot)
     for faulty, named in (
-        (robot.replace(a=robot.a / 1000), WrongUnit("a", "metres_as_millimetres")),
-        (robot.replace(alpha=np.radians(robot.alpha)), WrongUnit("alpha", "radians_as_degrees")),
-        (robot.replace(a=robot.d, d=robot.a), SwappedEntries(None)),
-        (robot.replace(a=robot.a * 1.05, d=robot.d * 1.05), WrongScale(0.952381)),
-        (modified.replace(convention="standard"), WrongConvention("standard")),
+        (robot.replace(a=robot.a / 1000), fact("wrong_unit", entries="a", misread="metres_as_millimetres")),
+        (
+            robot.replace(alpha=np.radians(robot.alpha)),
+            fact("wrong_unit", entries="alpha", misread="radians_as_degrees"),
+        ),
+        (robot.replace(a=robot.d, d=robot.a), fact("swapped_entries", joint=None)),
+        (robot.replace(a=robot.a * 1.05, d=robot.d * 1.05), fact("wrong_scale", factor=0.952381)),
+        (modified.replace(convention="standard"), fact("wrong_convention", read_as="standard")),
         (
             robot.replace(lower=np.radians(robot.lower), upper=np.radians(robot.upper)),
-            WrongUnit("limits", "radians_as_degrees"),
+            fact("wrong_unit", entries="limits", misread="radians_as_degrees"),
         ),
-        (robot.replace(lower=robot.upper, upper=robot.lower), WrongLimits(None, "crossed")),
+        (robot.replace(lower=robot.upper, upper=robot.lower), fact("wrong_limits", joint=None, fault="crossed")),
     ):
         assert (named,) in alike(er3a.diagnose(faulty, "er3a_c60")[0])
 
@@ -112,7 +104,10 @@ def test_unit_swap_scale_and_convention_are_named():
 def test_two_faults_are_found_together():
     faulty = changed("er3a_c60", offset=(2, 0.0), d=(6, 0.0))
     first = er3a.diagnose(faulty, "er3a_c60")[0]
-    assert set(map(rounded, first.faults)) == {OFFSET_MISSING, WrongLength(6, "d", 0.0, 78.5)}
+    assert set(map(rounded, first.faults)) == {
+        OFFSET_MISSING,
+        fact("wrong_length", joint=6, column="d", given_mm=0.0, fits_mm=78.5),
+    }
     np.testing.assert_allclose(first.corrected.d, load_robot("er3a_c60").d, atol=1e-5)
 
 
@@ -125,7 +120,7 @@ def test_a_tool_in_the_robots_file_does_not_count():
 def test_what_references_cannot_tell_apart_is_named():
     """Parallel axes 2 and 3: a sideways shift may stand in either row."""
     first = er3a.diagnose(changed("er3_600", d=(2, 0.02)), "er3_600")[0]
-    lengths = [fault for faults in alike(first) for fault in faults if isinstance(fault, WrongLength)]
+    lengths = [fault for faults in alike(first) for fault in faults if is_one(fault, "wrong_length")]
     assert any((fault.joint, fault.column, fault.given_mm) == (2, "d", 20.0) for fault in lengths)
     assert any((fault.joint, fault.column) == (3, "d") for fault in lengths)
 

@@ -11,21 +11,12 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault, NothingToExplain
 from er3a.diagnosis.diagnose import Hypothesis, diagnosis_of
-from er3a.diagnosis.faults import (
-    ReversedDirection,
-    SwappedLimits,
-    WrongLimit,
-    WrongLimits,
-    WrongScale,
-    WrongUnit,
-    entry_of,
-    rounded,
-)
+from er3a.diagnosis.faults import entry_of, rounded
 from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import COORDINATES, LimitExcess, PointCoordinate
 from er3a.references.reference import Reference
@@ -199,7 +190,7 @@ def test_pairs_are_solved_for(arm, wrong):
 def test_a_right_table_is_left_alone(arm):
     stated = stated_of(arm)
     conclusion = diagnosis_of(arm, stated).conclusion
-    assert isinstance(conclusion, NothingToExplain)
+    assert is_one(conclusion, "met")
 
 
 def test_a_limit_that_only_a_pose_contradicts(arm):
@@ -208,8 +199,8 @@ def test_a_limit_that_only_a_pose_contradicts(arm):
     narrow = arm.replace(upper=np.where(np.arange(6) == 1, np.radians(30), arm.upper))
     first = er3a.diagnose(narrow, (*stated_of(arm), shown))[0]
     named = [rounded(faults[0]) for faults in (first.faults, *first.indistinguishable_from)]
-    assert WrongLimit(2, "upper", 30.0, 60.0) in named
-    assert all(isinstance(fault, SwappedLimits | WrongLimits | WrongLimit | WrongUnit) for fault in named)
+    assert fact("wrong_limit", joint=2, side="upper", given_deg=30.0, fits_deg=60.0) in named
+    assert all(is_one(fault, "swapped_limits", "wrong_limits", "wrong_limit", "wrong_unit") for fault in named)
     assert first.explains
 
 
@@ -227,10 +218,10 @@ def test_the_whole_set_stands_in_the_conclusion():
     conclusion = diagnosis_of(
         changed(load_robot("er3a_c60"), "direction5", 0.0), load_references("er3a_c60")
     ).conclusion
-    assert isinstance(conclusion, MostLikelyFault)
+    assert is_one(conclusion, "named")
     members = [conclusion.faults, *conclusion.alternatives]
     assert {entry_of(fault) for faults in members for fault in faults} == {"offset4", "direction5"}
-    assert (ReversedDirection(5),) in members
+    assert (fact("reversed_direction", joint=5),) in members
 
 
 def test_a_fault_beside_references_that_are_off_is_named_as_what_leaves_least(arm):
@@ -239,7 +230,7 @@ def test_a_fault_beside_references_that_are_off_is_named_as_what_leaves_least(ar
     for place, by in ((4, 0.6), (10, -0.5)):
         stated[place] = replace(stated[place], expected=stated[place].expected + by)
     conclusion = diagnosis_of(changed(arm, "d4", 0.15), stated).conclusion
-    assert isinstance(conclusion, MainFault)
+    assert is_one(conclusion, "mostly")
     members = [conclusion.faults, *conclusion.alternatives]
     assert {entry_of(fault) for faults in members for fault in faults} == {"d2", "d3", "d4"}  # parallel axes
 
@@ -252,7 +243,7 @@ def test_a_missed_reference_is_never_put_down_to_noise(name):
     place = next(i for i, r in enumerate(stated) if r.unit == "mm")
     stated[place] = replace(stated[place], expected=stated[place].expected + 3 * stated[place].uncertainty)
     found = diagnosis_of(robot, stated)
-    assert not isinstance(found.conclusion, NothingToExplain)
+    assert not is_one(found.conclusion, "met")
     assert all(h.half_widths <= 1 + 1e-6 for h in found.hypotheses if h.explains)
 
 
@@ -264,11 +255,11 @@ def test_few_references_leave_a_set_without_end_that_is_still_said_whole(arm):
     found = diagnosis_of(faulty, [replace(each, expected=each.expected + 60 * i) for i, each in enumerate(stated)])
     first = found.hypotheses[0]
     assert first.explains
-    assert isinstance(found.conclusion, MostLikelyFault)
+    assert is_one(found.conclusion, "named")
     members = [first.faults, *first.indistinguishable_from]
     assert len(members) > 5
     assert len(members) == len({tuple(map(rounded, faults)) for faults in members})
-    assert not any(isinstance(fault, WrongScale) and fault.factor <= 0 for faults in members for fault in faults)
+    assert not any(is_one(fault, "wrong_scale") and fault.factor <= 0 for faults in members for fault in faults)
 
 
 @pytest.mark.long

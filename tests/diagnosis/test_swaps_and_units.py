@@ -10,17 +10,9 @@ import numpy as np
 import pytest
 
 from er3a.diagnosis.diagnose import diagnosis_of
-from er3a.diagnosis.faults import (
-    Fault,
-    ShiftedRows,
-    SwappedEntries,
-    SwappedRows,
-    WrongConvention,
-    WrongScale,
-    WrongUnit,
-    entry_of,
-)
+from er3a.diagnosis.faults import Fault, entry_of
 from er3a.files.robot_library import load_robot
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from testing.flange_positions import HALF_WIDTH_MM, flange_mm, references_to
 
@@ -97,19 +89,19 @@ def mistakes() -> dict[str, Change]:
 def name_of(fault: Fault) -> str | None:
     """What this file calls a fault; None for those of limits, which no position shows."""
     match fault:
-        case WrongUnit(entries, misread):
+        case Finding(code="wrong_unit", entries=entries, misread=misread):
             names = {"metres_as_millimetres": "x 1000", "millimetres_as_metres": "x 0.001"}
             names |= {"radians_as_degrees": "in rad", "degrees_as_radians": "in deg"}
             return None if entries == "limits" else f"{entries} {names[misread]}"
-        case SwappedEntries(joint):
+        case Finding(code="swapped_entries", joint=joint):
             return f"a for d of {joint}"
-        case SwappedRows(first, second):
+        case Finding(code="swapped_rows", first=first, second=second):
             return f"rows {first} and {second}"
-        case ShiftedRows(entries, toward):
+        case Finding(code="shifted_rows", entries=entries, toward=toward):
             return f"{entries} {toward}"
-        case WrongConvention():
+        case Finding(code="wrong_convention"):
             return "convention"
-        case WrongScale():
+        case Finding(code="wrong_scale"):
             return "scale"
     return entry_of(fault)
 

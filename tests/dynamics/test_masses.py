@@ -17,22 +17,12 @@ from scipy.spatial.transform import Rotation
 import er3a
 from er3a.dynamics import arm_model
 from er3a.dynamics.arm_model import capsule_body, estimated_links, filled
-from er3a.dynamics.plausibility import (
-    AboutOrigin,
-    CentreOutside,
-    ImpossibleInertia,
-    InertiaWithoutMass,
-    MissingLink,
-    PointMass,
-    SumOffWeight,
-    UnlikelyDensity,
-    UnlikelyInertia,
-    mass_findings,
-)
+from er3a.dynamics.plausibility import mass_findings
 from er3a.errors import InputError
 from er3a.files.robot_file import SLIDING, TURNING, DriveRow, drive_field
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
+from er3a.finding import fact, is_one
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, about, moved, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, Robot
@@ -51,9 +41,11 @@ def with_body(arm: Robot, link: int, change) -> Robot:
 
 
 def test_the_real_arm_lacks_link_6_and_nothing_else_stands_out(arm):
-    assert mass_findings(arm) == (MissingLink(6, singular=True),)
+    assert mass_findings(arm) == (fact("missing_link", link=6, singular=True),)
     rotor = replace(Drives.unknown(6), armature=np.full(6, 0.01))
-    assert mass_findings(arm.replace(masses=replace(arm.masses, drives=rotor))) == (MissingLink(6, singular=False),)
+    assert mass_findings(arm.replace(masses=replace(arm.masses, drives=rotor))) == (
+        fact("missing_link", link=6, singular=False),
+    )
 
 
 def scaled(factor: float):
@@ -68,27 +60,27 @@ def about_origin(body: MassBody) -> MassBody:
 @pytest.mark.parametrize(
     ("change", "kind", "link"),
     [
-        (lambda body: replace(body, mass=1000 * body.mass, inertia=scaled(1000)(body).inertia), UnlikelyDensity, 2),
-        (lambda body: replace(body, centre=tuple(1000 * value for value in body.centre)), CentreOutside, 2),
-        (scaled(1e6), UnlikelyInertia, 2),
-        (scaled(1e-3), UnlikelyInertia, 2),
-        (lambda body: replace(body, inertia=(0.0,) * 6), PointMass, 3),
-        (lambda body: replace(body, inertia=(1.0, 0.1, 0.1, 0, 0, 0)), ImpossibleInertia, 3),
-        (lambda body: replace(body, mass=0.0), InertiaWithoutMass, 3),
-        (lambda body: replace(body, mass=-1.0), ImpossibleInertia, 3),
-        (about_origin, AboutOrigin, 4),
+        (lambda body: replace(body, mass=1000 * body.mass, inertia=scaled(1000)(body).inertia), "unlikely_density", 2),
+        (lambda body: replace(body, centre=tuple(1000 * value for value in body.centre)), "centre_outside", 2),
+        (scaled(1e6), "unlikely_inertia", 2),
+        (scaled(1e-3), "unlikely_inertia", 2),
+        (lambda body: replace(body, inertia=(0.0,) * 6), "point_mass", 3),
+        (lambda body: replace(body, inertia=(1.0, 0.1, 0.1, 0, 0, 0)), "impossible_inertia", 3),
+        (lambda body: replace(body, mass=0.0), "inertia_without_mass", 3),
+        (lambda body: replace(body, mass=-1.0), "impossible_inertia", 3),
+        (about_origin, "about_origin", 4),
     ],
 )
 def test_faults_of_masses_are_named_with_their_link(arm, change, kind, link):
-    found = [each for each in mass_findings(with_body(arm, link, change)) if not isinstance(each, MissingLink)]
-    assert [type(each) for each in found] == [kind]
+    found = [each for each in mass_findings(with_body(arm, link, change)) if not is_one(each, "missing_link")]
+    assert [each.code for each in found] == [kind]
     assert found[0].link == link
 
 
 def test_the_sum_against_the_manufacturers_weight(arm):
     def findings(weight):
         found = mass_findings(arm.replace(masses=replace(arm.masses, weight=weight)))
-        return [each for each in found if isinstance(each, SumOffWeight)]
+        return [each for each in found if is_one(each, "sum_off_weight")]
 
     assert findings(21.0) == []
     assert findings(27.0) == []  # link 6 is missing, so less is no fault
@@ -127,7 +119,7 @@ def test_capsules_are_solid_capsules():
 
 def test_guessed_masses_stand_out_of_nothing(arm):
     guessed = arm.replace(masses=Masses(estimated_links(arm, 2700.0)))
-    assert {type(each) for each in mass_findings(guessed)} == {MissingLink}  # link 5 has no capsule
+    assert {each.code for each in mass_findings(guessed)} == {"missing_link"}  # link 5 has no capsule
     assert {each.link for each in mass_findings(guessed)} == {5}
 
 
@@ -373,11 +365,11 @@ def test_masses_are_judged_by_meshes_where_there_are_any(arm):
     def findings(centre):
         moments = (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)
         own = with_body(meshed, 2, lambda body: replace(body, mass=2.0, centre=centre, inertia=moments))
-        return [each for each in mass_findings(own) if not isinstance(each, MissingLink)]
+        return [each for each in mass_findings(own) if not is_one(each, "missing_link")]
 
     assert findings((0.13, 0.0, 0.3)) == []
     (off,) = findings((0.13, 0.0, 0.15))
-    assert (type(off), off.link, off.outside_mm) == (CentreOutside, 2, pytest.approx(100.0))
+    assert (off.code, off.link, off.outside_mm) == ("centre_outside", 2, pytest.approx(100.0))
 
 
 def test_shapes_guessed_from_a_table_accuse_only_what_is_off_by_orders_of_magnitude():
@@ -390,9 +382,9 @@ def test_shapes_guessed_from_a_table_accuse_only_what_is_off_by_orders_of_magnit
     )  # fmt: skip
     assert mass_findings(scara) == ()
     grams = with_body(scara, 2, lambda body: replace(body, mass=3000.0))
-    assert {type(each) for each in mass_findings(grams)} == {UnlikelyDensity}
+    assert {each.code for each in mass_findings(grams)} == {"unlikely_density"}
     metres = with_body(scara, 2, lambda body: replace(body, centre=(120.0, 0.0, 420.0)))
-    assert {type(each) for each in mass_findings(metres)} == {CentreOutside}
+    assert {each.code for each in mass_findings(metres)} == {"centre_outside"}
 
 
 @pytest.mark.long
@@ -404,9 +396,9 @@ def test_known_faults_of_published_urdfs_are_named_and_sound_ones_are_not(tmp_pa
         if isinstance(file, UrdfFile):
             name = next(each for each in names if each in file.name)
             robot = import_urdf(file.path, snap=True).robot
-            found[name] = {(type(each), each.link) for each in mass_findings(robot)}
-    assert found["ur5_robot"] >= {(UnlikelyInertia, link) for link in (4, 5, 6)}
-    assert (UnlikelyDensity, 0) in found["kr16_2"]
+            found[name] = {(each.code, each.link) for each in mass_findings(robot)}
+    assert found["ur5_robot"] >= {("unlikely_inertia", link) for link in (4, 5, 6)}
+    assert ("unlikely_density", 0) in found["kr16_2"]
     assert [found[name] for name in sound] == [set()] * 4
 
 

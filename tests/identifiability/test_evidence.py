@@ -14,19 +14,13 @@ from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
+from er3a.finding import is_one
 from er3a.identifiability.alternatives import Flip
 from er3a.identifiability.continuous import Extent
 from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import NOT_OFF, evidence_of
-from er3a.identifiability.proposals import (
-    LookAtMotion,
-    MeasureAngle,
-    Proposal,
-    ReadLimit,
-    TimeJoint,
-    proposals_of,
-)
+from er3a.identifiability.proposals import Proposal, proposals_of
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.pipeline.stages.validation.checks import parts_found
 from er3a.references.quantities import PointCoordinate, QuantityAtPose
@@ -209,17 +203,17 @@ def test_what_is_not_settled_has_a_measurement_proposed(name):
 def as_rows(proposal: Proposal, robot: Robot) -> tuple[str, str]:
     """The file that a person enters a measurement in, and its line, as read off the robot."""
     j = proposal.joint
-    if isinstance(proposal, LookAtMotion):
+    if is_one(proposal, "look_at_motion"):
         pose = ",".join(f"{angle:g}" for angle in proposal.pose_deg)
         return "observations.csv", f"{pose},{j},{proposal.point},{proposal.seen},,seen on the arm,measured,measured"
-    if isinstance(proposal, ReadLimit):
+    if is_one(proposal, "read_limit"):
         value = np.degrees(getattr(robot, proposal.side)[j - 1])
         both = f"{value},," if proposal.side == "lower" else f",{value},"
         return "limits.csv", f"{j},{both}{proposal.half_width_deg},read off,measured,measured"
-    if isinstance(proposal, TimeJoint):
+    if is_one(proposal, "time_joint"):
         value = np.degrees(robot.speed[j - 1])
         return "speeds.csv", f"{j},{value},{proposal.half_width_deg_s},timed,measured,measured"
-    if isinstance(proposal, MeasureAngle):
+    if is_one(proposal, "measure_angle"):
         value = np.degrees(getattr(robot, proposal.column)[j - 1])
         return "angles.csv", f"{j},{proposal.column},{value},{proposal.half_width_deg},measured,measured,measured"
     value = 1000 * getattr(robot, proposal.column)[j - 1]

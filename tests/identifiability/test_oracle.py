@@ -10,9 +10,10 @@ import pytest
 
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
+from er3a.finding import Finding, is_one
 from er3a.identifiability.continuous import Extents
 from er3a.identifiability.entries import continuous_of, gauge_of
-from er3a.identifiability.proposals import LookAtMotion, proposals_of
+from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import tables_of
@@ -278,7 +279,7 @@ DIRECTIONS["down"] = (0, 0, -1)
 
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not(name):
-    proposals = [each for each in proposals_of(evidence(name)).values() if isinstance(each, LookAtMotion)]
+    proposals = [each for each in proposals_of(evidence(name)).values() if is_one(each, "look_at_motion")]
     assert {each.entry for each in proposals} == {f"direction{joint}" for joint in range(1, 7)}
     rows = oracle.table_of(name)
     for each in proposals:
@@ -287,7 +288,7 @@ def test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does
         assert seen(reversed_, each) > 130
 
 
-def seen(rows: oracle.Rows, look: LookAtMotion) -> float:
+def seen(rows: oracle.Rows, look: Finding) -> float:
     """The angle in deg between what is seen and what is said to be seen."""
     q, step = np.radians([look.pose_deg]), np.zeros((1, 6))
     step[0, look.joint - 1] = 1e-5

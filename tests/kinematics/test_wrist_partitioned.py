@@ -11,20 +11,12 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from er3a.errors import NotWristPartitionedError
+from er3a.finding import fact
 from er3a.kinematics.closed_form import OFF_AXIS, ORIENTATION, TOO_FAR, TOO_NEAR
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import (
-    CoupledWrist,
-    ElbowAxesNotParallel,
-    NeighboursParallel,
-    NoArmLength,
-    NoWristCentre,
-    solve_slots,
-    wrist_partition_missing,
-    wrist_partitioned_arm,
-)
+from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partition_missing, wrist_partitioned_arm
 from er3a.pipeline.messages.kinematics import say
 from testing.arms import DEG, OTHERS_LONG, joints_at_random, make_arm, number, placement, pose_errors
 
@@ -177,16 +169,16 @@ def test_a_wrist_that_can_t_tilt_far_enough_is_named():
 @pytest.mark.parametrize(
     ("change", "lacks"),
     [
-        ({"alpha": np.array([-90, 1, -90, 90, -90, 0]) * DEG}, ElbowAxesNotParallel()),
-        ({"alpha": np.array([0, 0, -90, 90, -90, 0]) * DEG}, NeighboursParallel(1, 2)),
-        ({"alpha": np.array([-90, 0, -90, 0, -90, 0]) * DEG}, NeighboursParallel(4, 5)),
-        ({"alpha": np.array([-90, 0, -90, 90, 180, 0]) * DEG}, NeighboursParallel(5, 6)),
-        ({"d": [0.3, 0, 0, 0.35, 0.02, 0.08]}, NoWristCentre(pytest.approx(10))),
-        ({"d": [0.3, 0, 0, 0.35, 2e-6, 0.08]}, NoWristCentre(pytest.approx(1e-3))),
-        ({"coupling": np.diag([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])}, CoupledWrist()),
-        ({"a": [0.1, 0.4, 0.05, 0.001, 0, 0]}, NoWristCentre(pytest.approx(2 / 3))),
-        ({"a": [0.1, 0.0, 0.05, 0, 0, 0]}, NoArmLength()),
-        ({"a": [0.1, 0.4, 0, 0, 0, 0], "d": [0.3, 0, 0, 0, 0, 0.08]}, NoArmLength()),
+        ({"alpha": np.array([-90, 1, -90, 90, -90, 0]) * DEG}, fact("elbow_axes_not_parallel")),
+        ({"alpha": np.array([0, 0, -90, 90, -90, 0]) * DEG}, fact("neighbouring_axes_parallel", first=1, second=2)),
+        ({"alpha": np.array([-90, 0, -90, 0, -90, 0]) * DEG}, fact("neighbouring_axes_parallel", first=4, second=5)),
+        ({"alpha": np.array([-90, 0, -90, 90, 180, 0]) * DEG}, fact("neighbouring_axes_parallel", first=5, second=6)),
+        ({"d": [0.3, 0, 0, 0.35, 0.02, 0.08]}, fact("no_common_point_of_axes_4_5_6", miss_mm=pytest.approx(10))),
+        ({"d": [0.3, 0, 0, 0.35, 2e-6, 0.08]}, fact("no_common_point_of_axes_4_5_6", miss_mm=pytest.approx(1e-3))),
+        ({"coupling": np.diag([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])}, fact("coupled_wrist")),
+        ({"a": [0.1, 0.4, 0.05, 0.001, 0, 0]}, fact("no_common_point_of_axes_4_5_6", miss_mm=pytest.approx(2 / 3))),
+        ({"a": [0.1, 0.0, 0.05, 0, 0, 0]}, fact("upper_arm_or_forearm_without_length")),
+        ({"a": [0.1, 0.4, 0, 0, 0, 0], "d": [0.3, 0, 0, 0, 0, 0.08]}, fact("upper_arm_or_forearm_without_length")),
     ],
 )
 def test_other_arms_are_told_what_they_lack(change, lacks):

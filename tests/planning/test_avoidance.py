@@ -10,12 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import NearSingular, determinant_factors, factor_of
 from er3a.kinematics.wrist_partitioned import solve_slots
 from er3a.pipeline.messages import planning as messages
-from er3a.planning.avoidance import avoidance, strategies
+from er3a.planning.avoidance import strategies
 from er3a.planning.avoidance.avoidance import singular_segment
 from er3a.planning.avoidance.strategies import STRATEGIES, best, compare_strategies, deviation
 from er3a.planning.follow import follow
@@ -71,7 +72,7 @@ def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
 def test_stop_rests_on_the_path_before_the_region(results, name):
     case, price = segment_of(name), results[name]["stop"].cost
     end = price.motion.q[-1]
-    assert results[name]["stop"].reasons == (avoidance.PathNotFinished(price.done),)
+    assert results[name]["stop"].reasons == (fact("path_not_finished", done=price.done),)
     assert 0.2 < price.done < 0.9
     assert NEAR.margin(case.robot, price.motion.q).min() >= 1
     assert NEAR.margin(case.robot, end[None])[0] < 1.1
@@ -168,10 +169,10 @@ def test_another_branch_is_clear_from_the_start():
 def test_what_can_not_be_repaired_is_said_so(results):
     found = results["out_of_reach"]
     assert best(list(found.values()), meets=True) is None
-    assert found["slow"].reasons == (avoidance.PartlyOutOfReach(),)
-    assert found["detour"].reasons == (avoidance.EndsOutOfReach(),)
-    assert found["via_shift"].reasons == (avoidance.EndsInRegion(),)
-    assert found["stop"].reasons == (avoidance.PathNotFinished(found["stop"].cost.done),)
+    assert found["slow"].reasons == (fact("partly_out_of_reach"),)
+    assert found["detour"].reasons == (fact("ends_out_of_reach"),)
+    assert found["via_shift"].reasons == (fact("ends_in_region"),)
+    assert found["stop"].reasons == (fact("path_not_finished", done=found["stop"].cost.done),)
 
 
 def test_best_way_keeps_away_from_a_pose_that_the_path_meets(results):
@@ -206,7 +207,7 @@ def test_start_inside_the_region_is_left_by_a_joint_move():
         result.name: result for result in compare_strategies(singular_segment(followed, NEAR, limits, fixed_start=True))
     }
     np.testing.assert_allclose(found["detour"].cost.motion.q[0], q, atol=1e-9)
-    assert found["via_shift"].reasons == found["stop"].reasons == (avoidance.BeginsInRegion(),)
+    assert found["via_shift"].reasons == found["stop"].reasons == (fact("begins_in_region"),)
 
 
 def test_every_strategy_has_a_name_and_words():

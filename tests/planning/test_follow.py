@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import PoseError
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import TYPES, NearSingular, determinant_factors, factor_of
-from er3a.kinematics.solutions import WristTooFar
 from er3a.planning.follow import follow
-from er3a.planning.motion_faults import BelowLimit, limit_intervals, rate_intervals, singular_events, unreachable
+from er3a.planning.motion_faults import limit_intervals, rate_intervals, singular_events, unreachable
 from er3a.planning.moves import JointMove, line
 from er3a.planning.sequences import arc, segment_path
 from er3a.planning.timing import joint_limits
@@ -166,7 +166,7 @@ def test_unreachable_stretch_ends_where_the_stretched_arm_ends(robot):
     followed = follow(robot, way, GRID)
     (interval,) = unreachable(robot, followed)
     assert interval.end == 1.0
-    assert any(isinstance(reason.why, WristTooFar) for reason in interval.cause.reasons)
+    assert any(is_one(reason.why, "wrist_too_far") for reason in interval.cause.reasons)
     inside, outside = way.progress(np.array([interval.start - 1e-6, interval.start + 1e-6]))[0]
     assert np.isfinite(followed.joints_at(np.array([inside]))).all()
     assert np.isnan(follow(robot, line(way.poses(outside), way.poses(1.0), 1.0), GRID).q).all()
@@ -188,7 +188,9 @@ def test_limits_are_left_where_the_angle_crosses_them():
     way = line(transform([0.3, 0, 0.25], [np.pi, 0, 0]), transform([0.12, 0, 0.25], [np.pi, 0, 0]), 4.0)
     followed = follow(robot, way, np.linspace(0, 4, 50))
     (interval,) = limit_intervals(robot, curve_of(followed)[0])
-    assert interval.cause == BelowLimit(3, pytest.approx(-91.3, abs=0.05), pytest.approx(-75))
+    assert interval.cause == fact(
+        "below_limit", joint=3, reached_deg=pytest.approx(-91.3, abs=0.05), limit_deg=pytest.approx(-75)
+    )
     assert interval.end == 4.0
     np.testing.assert_allclose(followed.joints(interval.start)[2], robot.lower[2], atol=1e-8)
 

@@ -11,22 +11,10 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Box, Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import transform
 from er3a.planning.timing import joint_limits
-from er3a.planning.way_around import (
-    EndOutsideLimits,
-    EndOverlaps,
-    EndUnreached,
-    NoneFound,
-    NothingMeasured,
-    PlannerMissing,
-    PlanningTask,
-    WayAround,
-    _Moves,
-    _tree,
-    way_around,
-    way_between,
-)
+from er3a.planning.way_around import PlanningTask, WayAround, _Moves, _tree, way_around, way_between
 from testing.arms import palletiser, scara
 from testing.hard_scenes import hard_scenes
 from testing.motion_cases import contacts_of
@@ -60,7 +48,7 @@ def test_planned_motions_touch_nothing_and_keep_their_limits(title, random):
     for _ in range(2):
         start, end = blocked(one.bodies, random)
         way = way_around(one, start, end)
-        if isinstance(way, NoneFound):
+        if is_one(way, "none_found"):
             continue
         found += 1
         q, velocity, acceleration = way.motion.curve.rates(np.linspace(0, way.motion.duration, DENSE))
@@ -128,7 +116,7 @@ def test_a_wall_through_the_arms_middle_has_no_way_around():
     for side in (1, -1):
         q = random.uniform(-0.5, 0.5, (300, 6)) + np.array([side * np.pi / 2, 0.6, 0, 0, 0.8, 0])
         ends.append(next(arm for arm in q if one.bodies.min_distance(arm[None])[0][0] > 5e-3))
-    assert way_around(one, *ends) == NoneFound(60 * 3)
+    assert way_around(one, *ends) == fact("none_found", rounds=60 * 3)
 
 
 def test_ends_that_can_not_be_are_named():
@@ -138,12 +126,12 @@ def test_ends_that_can_not_be_are_named():
     outside = home.copy()
     outside[1] = ROBOT.upper[1] + 0.1
     assert way_around(one, outside, home).end == "start"
-    assert isinstance(way_around(one, home, outside), EndOutsideLimits)
+    assert is_one(way_around(one, home, outside), "end_outside_limits")
     low = np.radians([0, 80, 40, 0, 60, 0])
     if one.bodies.min_distance(low[None])[0][0] < 0:
-        assert isinstance(way_around(one, home, low), EndOverlaps)
-    assert way_between(one, home[None], np.empty((0, 6))) == EndUnreached("end")
-    assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == NothingMeasured()
+        assert is_one(way_around(one, home, low), "end_overlaps")
+    assert way_between(one, home[None], np.empty((0, 6))) == fact("end_unreached", end="end")
+    assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == fact("nothing_measured")
 
 
 def test_drawn_joints_keep_from_their_limits_by_their_own_unit(monkeypatch):
@@ -183,4 +171,4 @@ def test_a_missing_planner_is_said(monkeypatch, random):
     one = task(load_scene("data/scenes/table_and_post.yaml"))
     query = blocked(one.bodies, random)
     monkeypatch.setattr(builtins, "__import__", without)
-    assert way_around(one, *query) == PlannerMissing()
+    assert way_around(one, *query) == fact("planner_missing")

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from er3a.finding import fact
 from er3a.pipeline import (
     cli,  # noqa: F401
     program_reports,
@@ -19,7 +20,6 @@ from er3a.pipeline.program_reports import PathProgram
 from er3a.pipeline.scope import Open
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import TargetsLeftOut
 
 ROOT = Path(__file__).resolve().parents[2]
 FAULTS = "data/programs/faults"
@@ -258,7 +258,10 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
 
 @pytest.mark.parametrize(
     ("findings", "missed", "reason"),
-    [((TargetsLeftOut(1),), (), "left out"), ((), (Open("program_rest", ("line: 3",)),), "(line: 3)")],
+    [
+        ((fact("written_targets_left_out", motions=1),), (), "left out"),
+        ((), (Open("program_rest", ("line: 3",)),), "(line: 3)"),
+    ],
 )
 def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, reason):
     made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)

@@ -7,11 +7,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from er3a.errors import InputError
+from er3a.finding import fact
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import ArmMotion, Remark, Unknown, UnresolvedTarget
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NothingMoves
 from tests.programs.test_examples import EXAMPLES
 from tests.programs.test_other_readers import XPL
 
@@ -110,7 +110,7 @@ def test_languages_are_told_by_what_the_file_holds(tmp_path):
 )
 def test_no_motion_at_all_is_a_finding(name, text, tmp_path):
     (tmp_path / name).write_text(text)
-    assert NothingMoves() in read_program(tmp_path / name).findings
+    assert fact("program_nothing_moves") in read_program(tmp_path / name).findings
 
 
 def test_deep_nesting_and_long_expressions_end(tmp_path):

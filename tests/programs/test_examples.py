@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NothingMoves
 from er3a.programs.solving import Resolver
 from er3a.programs.writing import WriteOptions
 
@@ -75,5 +75,5 @@ def test_examples_are_written_and_read_in_their_language(path, tmp_path):
 def test_faulty_programs_can_be_read(path):
     program = read_program(path)
     execution = execute(program, load_robot("er3a_c60"))
-    assert (NothingMoves() in program.findings) == (path.stem == "no_motion")
+    assert (fact("program_nothing_moves") in program.findings) == (path.stem == "no_motion")
     assert execution.complete

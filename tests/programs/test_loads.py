@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
-from er3a.program_check.program_check_findings import LoadAbovePayload
 from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Load, NamedFrame, UnclearLoad, Unknown
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import ToolNotGiven
 from er3a.programs.writing import WriteOptions, WrittenProgram
 from er3a.robots.masses import MassBody
 
@@ -80,7 +79,7 @@ def test_a_mass_alone_is_compared_with_the_payload(tmp_path):
     found = checked(
         tmp_path, f"def p():\n  set_payload(50)\n{move}  set_payload(read_input_float_register(0))\n{move}end\n"
     )
-    said = [each for each in found.findings if isinstance(each.finding, LoadAbovePayload)]
+    said = [each for each in found.findings if is_one(each.finding, "load_above_payload")]
     assert [(each.level, each.finding.code) for each in said] == [
         ("fail", "load_above_payload"),
     ]
@@ -141,7 +140,7 @@ def test_a_load_that_can_not_be_written_is_named():
         ("krl", UnclearLoad("set_payload(2)", 2.0), "the load set_payload(2)"),
     ):
         findings = written(language, [load]).findings
-        assert name in [each.name for each in findings if isinstance(each, ToolNotGiven)]
+        assert name in [each.name for each in findings if is_one(each, "written_tool_not_given")]
 
 
 def checked(tmp_path, text: str, robot: str = "er3_600") -> ProgramCheck:
@@ -157,9 +156,9 @@ def test_a_load_is_named_once_and_one_above_the_payload_fails(tmp_path):
         f"  set_payload(2, [0, 0, 0.05])\n{move}end\n"
     )
     found = checked(tmp_path, text)
-    said = [each for each in found.findings if isinstance(each.finding, LoadAbovePayload)]
+    said = [each for each in found.findings if is_one(each.finding, "load_above_payload")]
     assert [(each.place.line, each.level, each.finding) for each in said] == [
-        (6, "fail", LoadAbovePayload(3.5, 3.0)),
+        (6, "fail", fact("load_above_payload", mass_kg=3.5, payload_kg=3.0)),
     ]
 
 
@@ -169,4 +168,4 @@ def test_a_load_behind_a_branch_is_followed_on_both_sides(tmp_path):
         f"def p():\n  set_payload(1, [0, 0, 0.05])\n  if get_digital_in(1):\n    set_payload(5, [0, 0, 0.05])\n  end\n"
         f"{move}end\n"
     )
-    assert any(isinstance(each.finding, LoadAbovePayload) for each in checked(tmp_path, text).findings)
+    assert any(is_one(each.finding, "load_above_payload") for each in checked(tmp_path, text).findings)

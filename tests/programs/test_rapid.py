@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
+from er3a.finding import is_one
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.program_check.check_program import CheckOptions, check_program
@@ -28,7 +29,6 @@ from er3a.programs.instructions import (
 )
 from er3a.programs.languages import files_of, read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import ToolNotGiven
 from er3a.programs.rapid.data_types import branch_of
 from er3a.programs.rapid.reader import MOTIONS
 from er3a.programs.solving import solutions_meant
@@ -494,7 +494,7 @@ def test_tools_come_back_with_their_names_and_masses(tmp_path):
     text = written.files[".mod"]
     assert "PERS tooldata gripper:=[TRUE,[[0.000000,0.000000,120.000000]" in text
     assert "PERS wobjdata table:=[FALSE,TRUE" in text
-    assert not any(isinstance(each, ToolNotGiven) for each in written.findings)
+    assert not any(is_one(each, "written_tool_not_given") for each in written.findings)
     (tmp_path / "again.mod").write_text(text)
     again = execute(read_program(tmp_path / "again.mod"), ROBOT)
     for before, after in zip(motions(execution), motions(again), strict=True):
@@ -506,7 +506,7 @@ def test_tools_come_back_with_their_names_and_masses(tmp_path):
         assert after.zone.value == before.zone.value
     unknown = run(tmp_path, "MoveAbsJ home,v200,z10,gripper;", DATA.replace("[2,[0", "[0.001,[0"), robot=ROBOT)
     named = write_program(unknown.listing(), "rapid", WriteOptions(ROBOT)).findings
-    assert [each.name for each in named if isinstance(each, ToolNotGiven)] == ["the load of gripper"]
+    assert [each.name for each in named if is_one(each, "written_tool_not_given")] == ["the load of gripper"]
 
 
 @pytest.mark.parametrize("rotation", ["[2,0,0,0]", "[0.5,0,0,0]", "[1,1,0,0]"])

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.planning.commands import (
@@ -26,21 +27,6 @@ from er3a.programs.instructions import ArmMotion, JointTarget, Listing, Output, 
 from er3a.programs.krl.writer import KrlWriter
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import (
-    ArcsSplit,
-    ExternalAxesDropped,
-    HalfTurnsSplit,
-    NotTranslated,
-    OneSideWritten,
-    SpeedsCut,
-    SpeedsEstimated,
-    SpeedsOfAssumed,
-    SpeedsRaised,
-    TargetsLeftOut,
-    ToolNotGiven,
-    ValuesRounded,
-    ZonesDropped,
-)
 from er3a.programs.writing import HEAD, WriteOptions, with_head_lines
 from er3a.robots.joint_limits import joint_columns
 
@@ -158,7 +144,7 @@ def test_arcs_become_lines_within_the_deviation_that_is_said(language, tmp_path)
     q, command = tool_path(2)
     path = listing_of(command, ROBOT, q)
     written = write_program(path.listing, language, WriteOptions(ROBOT, arc_deviation=2e-4))
-    split = next(each for each in written.findings if isinstance(each, ArcsSplit))
+    split = next(each for each in written.findings if is_one(each, "written_arcs_split"))
     assert split.arcs == 1
     text = next(iter(written.files.values()))
     assert f"1 arc(s) as {split.lines} lines that stay within 0.2 mm" in text
@@ -239,7 +225,7 @@ def test_a_turn_by_180_deg_is_written_in_two_halves_of_the_sense_that_is_asked(k
     if kind == "table":
         command = ToolTableCommand(np.array([T, end]), ("a", "b"), 2.0, half_turn_axis=axis)
     path = listing_of(command, robot, q)
-    assert path.findings == (HalfTurnsSplit(1),)
+    assert path.findings == (fact("written_half_turns_split", lines=1),)
     half, rest = path.listing.motions[1:]
     middle = robot.base @ half.target.pose
     turn = Rotation.from_matrix(middle[:3, :3] @ T[:3, :3].T).as_rotvec()
@@ -265,7 +251,7 @@ def test_so_is_one_of_an_arc_or_of_a_table(axis, sense):
         (table, [[0, 0.03, 0]]),
     ):
         path = listing_of(command, ROBOT, q)
-        assert path.findings == (HalfTurnsSplit(1),)
+        assert path.findings == (fact("written_half_turns_split", lines=1),)
         _, first, second = path.listing.motions
         turn = Rotation.from_matrix(first.target.pose[:3, :3] @ T[:3, :3].T).as_rotvec()
         np.testing.assert_allclose(turn, [0, 0, sense * np.pi / 2], atol=1e-9)
@@ -289,20 +275,35 @@ def test_what_a_language_has_no_equal_for_is_said_in_the_head():
     listing = Listing("mixed", moves, language="rpl")
     written = write_program(listing, "krl", WriteOptions(ROBOT))
     assert written.findings == (
-        *(ZonesDropped(1), SpeedsEstimated(1), SpeedsCut(1)),
-        *(NotTranslated(1), SpeedsOfAssumed(1, "100 deg/s")),
+        *(
+            fact("written_zones_dropped", zones=1),
+            fact("written_speeds_estimated", motions=1),
+            fact("written_speeds_cut", motions=1),
+        ),
+        *(
+            fact("written_not_translated", instructions=1),
+            fact("written_speeds_of_assumed", motions=1, assumed="100 deg/s"),
+        ),
     )
     head = written.files[".src"].split("BAS(")[0]
     for words in ("zone(s)", "duration(s)", "above 100 %, which", "an assumed 100 deg/s", "other language"):
         assert words in head
     rpl = write_program(Listing("mixed", moves[1:2]), "rpl", WriteOptions(ROBOT, start=a))
-    assert {type(each) for each in rpl.findings} == {SpeedsEstimated, SpeedsOfAssumed, ValuesRounded}
+    assert {each.code for each in rpl.findings} == {
+        "written_speeds_estimated",
+        "written_speeds_of_assumed",
+        "written_values_rounded",
+    }
     slow = write_program(Listing("slow", (replace(moves[1], speed=Rate(9000.0, "s")),)), "rpl", WriteOptions(ROBOT, a))
-    assert {type(each) for each in slow.findings} == {SpeedsEstimated, SpeedsOfAssumed, SpeedsRaised}
+    assert {each.code for each in slow.findings} == {
+        "written_speeds_estimated",
+        "written_speeds_of_assumed",
+        "written_speeds_raised",
+    }
     assert "FASTER than what was checked" in slow.files[".pgm"]
     narrow = ArmMotion("joint", JointTarget(a), speed=Rate(0.5, "share"), zone=Zone("distance", 0.0))
     rapid = write_program(Listing("narrow", (narrow,)), "rapid", WriteOptions(ROBOT))
-    assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((ZonesDropped(1),), True)
+    assert (rapid.findings, ",vmax,fine," in rapid.files[".mod"]) == ((fact("written_zones_dropped", zones=1),), True)
 
 
 def test_branches_and_external_axes_that_are_left_out_are_said_in_the_head(tmp_path):
@@ -312,7 +313,9 @@ def test_branches_and_external_axes_that_are_left_out_are_said_in_the_head(tmp_p
     (tmp_path / "a.src").write_text(text)
     listing = execute(read_program(tmp_path / "a.src"), ROBOT).listing()
     written = write_program(listing, "urscript", WriteOptions(ROBOT))
-    assert {OneSideWritten(1), ExternalAxesDropped(1)} <= set(written.findings)
+    assert {fact("written_one_side", branches=1), fact("written_external_axes_dropped", motions=1)} <= set(
+        written.findings
+    )
     head = written.files[".script"].split("movej")[0]
     assert "1 branch(es) of which one side alone" in head
     assert "without their external axes" in head
@@ -323,25 +326,38 @@ def test_only_an_assumed_speed_that_decides_is_named():
     known = ROBOT.replace(speed=np.array([1.25, *[np.nan] * 5]))
     turn = ArmMotion("joint", JointTarget(np.eye(6)[0]), speed=Rate(1.0, "s"))
     first = write_program(Listing("turn", (turn,)), "krl", WriteOptions(known, np.zeros(6)))
-    assert (first.findings, "BAS(#VEL_PTP,80.0)" in first.files[".src"]) == ((SpeedsEstimated(1),), True)
+    assert (first.findings, "BAS(#VEL_PTP,80.0)" in first.files[".src"]) == (
+        (fact("written_speeds_estimated", motions=1),),
+        True,
+    )
     own = WriteOptions(ROBOT, np.zeros(6), assumed_speed=np.radians([180, 180, 180, 360, 360, 360]))
     fast = replace(turn, speed=Rate(1 / np.radians(0.95 * 180), "s"))
     second = write_program(Listing("turn", (fast,)), "krl", own)
-    assert second.findings == (SpeedsEstimated(1), SpeedsOfAssumed(1, "180 deg/s"))
+    assert second.findings == (
+        fact("written_speeds_estimated", motions=1),
+        fact("written_speeds_of_assumed", motions=1, assumed="180 deg/s"),
+    )
     assert "BAS(#VEL_PTP,95.0)" in second.files[".src"]
     half = Listing("half", (replace(turn, speed=Rate(0.5, "share")),), language="krl")
     assert write_program(half, "krl", own).findings == ()
     invented = write_program(half, "urscript", own)
-    assert (invented.findings, "v=1.570796" in invented.files[".script"]) == ((SpeedsOfAssumed(1, "180 deg/s"),), True)
+    assert (invented.findings, "v=1.570796" in invented.files[".script"]) == (
+        (fact("written_speeds_of_assumed", motions=1, assumed="180 deg/s"),),
+        True,
+    )
     slide = KrlWriter(
         Listing("slide", (turn,)), WriteOptions(ROBOT.replace(sliding=np.arange(6) == 0), np.zeros(6))
     ).write()
-    assert slide.findings == (SpeedsEstimated(1), SpeedsCut(1), SpeedsOfAssumed(1, "500 mm/s"))
+    assert slide.findings == (
+        fact("written_speeds_estimated", motions=1),
+        fact("written_speeds_cut", motions=1),
+        fact("written_speeds_of_assumed", motions=1, assumed="500 mm/s"),
+    )
 
 
 def test_a_pose_without_an_arm_is_left_out_where_joints_are_written():
     listing = Listing("poses", (ArmMotion("line", PoseTarget(np.eye(4))),))
-    assert TargetsLeftOut(1) in write_program(listing, "rpl").findings
+    assert fact("written_targets_left_out", motions=1) in write_program(listing, "rpl").findings
     assert "LIN {X 0.000000" in write_program(listing, "krl").files[".src"]
 
 
@@ -369,7 +385,7 @@ def test_tools_are_written_as_each_language_has_them(tmp_path):
     ur = write_program(listing, "urscript", WriteOptions(robot))
     assert "set_tcp(p[0.000000000, 0.010000000, 0.120000000" in ur.files[".script"]
     rpl = write_program(listing, "rpl", WriteOptions(robot))
-    assert any(isinstance(each, ToolNotGiven) for each in rpl.findings)
+    assert any(is_one(each, "written_tool_not_given") for each in rpl.findings)
     for written in (krl, ur):
         moves = execute(read_program(saved(tmp_path, written)), robot).listing().motions
         np.testing.assert_allclose(moves[1].tool.pose, tool, atol=1e-9)
@@ -407,5 +423,5 @@ def test_a_table_that_leaves_the_reach_is_left_out_from_there_and_said():
     poses[20, 0, 3] += 5.0
     listing = listing_of(ToolTableCommand(poses, tuple(map(str, range(30))), 9.0, blend=0.0), ROBOT, q[0]).listing
     written = write_program(listing, "rpl", WriteOptions(ROBOT))
-    assert TargetsLeftOut(1) in written.findings
+    assert fact("written_targets_left_out", motions=1) in written.findings
     assert written.files[".pgm"].count("MLIN(POINTJ") == 28

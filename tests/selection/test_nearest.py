@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
 from er3a.pipeline.messages.kinematics import say
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import CombinedLimit
-from er3a.selection.nearest import MaxJointMove, MaxSlideMove, OnlyAdmissible, nearest
+from er3a.selection.nearest import nearest
 from er3a.selection.select import select, select_sequence
 from testing.arms import scara
 
@@ -43,7 +44,7 @@ def test_nearest_of_none_and_of_one():
     assert [one.joint for one in choice.reason.exceeded.joints] == [1]
     choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
     assert choice.order.tolist() == [0]
-    assert choice.reason == OnlyAdmissible(MaxJointMove(1, np.degrees(1)))
+    assert choice.reason == fact("only_admissible", move=fact("greatest_move", joint=1, angle_deg=np.degrees(1)))
     assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
 
 
@@ -74,7 +75,7 @@ def test_a_millimetre_of_a_slide_counts_as_a_degree_and_is_told_as_one():
     solutions = inverse(robot, forward(robot, q), q_ref)
     choice = nearest(robot, solutions, q_ref)
     assert np.degrees(choice.max_joint_move) == pytest.approx(120)
-    assert choice.reason.move == MaxSlideMove(3, pytest.approx(120))
+    assert choice.reason.move == fact("greatest_slide", joint=3, move_mm=pytest.approx(120))
     assert say(choice.reason).startswith("greatest joint move 120.0 mm (J3); the next best")
     assert "needs the same, but" in say(choice.reason)
     assert "(in deg, or mm of a prismatic joint)" in say(choice.reason)

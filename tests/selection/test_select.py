@@ -9,10 +9,10 @@ import pytest
 
 import er3a
 from er3a.collision.along import clearance
-from er3a.collision.pairs import PairOverlaps
 from er3a.errors import Er3aError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
+from er3a.finding import fact
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
 from er3a.selection.select import RULES, available_rules, joint_weights, mixed_cost, select, select_sequence
@@ -77,7 +77,7 @@ def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):
     assert touching.any()
     for row in np.flatnonzero(touching):
         assert row not in ranking.order
-        assert ranking.reason[row] == PairOverlaps(clear.pair[row], -clear.distance[row] * 1000)
+        assert ranking.reason[row] == fact("pair_overlaps", pair=clear.pair[row], depth_mm=-clear.distance[row] * 1000)
 
 
 def test_nothing_left_says_why(arm, solutions):

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+import er3a.pipeline.messages.inverse  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Plane, Scene
 from er3a.files.robot_library import load_robot
@@ -15,7 +16,7 @@ from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Target
-from er3a.pipeline.messages.inverse import say
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.workspace import say as say_of_workspace
 from er3a.pipeline.stages.inverse.compute import LITTLE_MARGIN_DEG, solve_target
 from er3a.pipeline.stages.inverse.model import TargetResult

@@ -14,11 +14,11 @@ import yaml
 
 import er3a
 import er3a.pipeline.messages.dynamics
-from er3a.dynamics.plausibility import MissingLink
 from er3a.errors import InputError
 from er3a.files.robot_file import Placement, WristLoadGroup, check_masses
 from er3a.files.robot_library import LoadFields
 from er3a.files.robot_writer import write_robot
+from er3a.finding import fact, is_one
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import listed, say
 from er3a.pipeline.results import Stored, read_results
@@ -27,10 +27,8 @@ from er3a.pipeline.stages.dynamics.compute import PathTorques, open_of_load, unk
 from er3a.pipeline.stages.dynamics.model import (
     RESULTS,
     AllWithin,
-    DataOpen,
     DynamicsResults,
     Marginal,
-    NoData,
     NoLimits,
     Overload,
     TorqueRows,
@@ -117,7 +115,7 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
     found = computed(tmp_path, study, "er3_600")
     assert found.status == "no_reference"
     verdict = found.results.summary.verdict.finding
-    assert isinstance(verdict, NoData)
+    assert is_one(verdict, "dynamics.no_data")
     left = {each.reason: each.names for each in found.results.summary.assumed}
     assert left["link_masses"] == tuple("123456")
     assert {"peak_torques", "load"} <= left.keys()
@@ -152,7 +150,7 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert verdict.missing_links == (6,)
     assert verdict.grade == "export"
     assert "exported from a CAD model, neither measured nor given" in say(verdict)
-    assert summary.findings == (MissingLink(6, singular=True),)
+    assert summary.findings == (fact("missing_link", link=6, singular=True),)
     assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
     assert summary.uses == ()
     assert all(path.payload is path.speed_scale is None for path in summary.paths)
@@ -220,7 +218,10 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     nothing = replace(robot.masses.body(3), mass=0.0, inertia=(0.0,) * 6)
     links = tuple(replace(each, body=nothing) if each.link == 3 else each for each in robot.masses.links)
     without = robot.replace(masses=replace(robot.masses, links=links))
-    assert unknowns(without, ("load",)) == (DataOpen("masses", (3,)), DataOpen("load"))
+    assert unknowns(without, ("load",)) == (
+        fact("dynamics.unknown", what="masses", numbers=(3,)),
+        fact("dynamics.unknown", what="load", numbers=()),
+    )
 
 
 @pytest.mark.parametrize(("group", "need"), [("drives", "drives_guess"), ("wrist_load", "wrist_guess")])
@@ -521,7 +522,14 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
     limit = f"At most {down:.2f} kg, limited by the {by} torque of J{least.payload.joint} on {least.name}, on the paths"
     assert lead.startswith(limit)
     assert ("not known and left out" in lead) == bool(summary.unknown) == bool(rest)
-    unknown = replace(summary, paths=(), unknown=(DataOpen("masses", (6,)), DataOpen("peak")))
+    unknown = replace(
+        summary,
+        paths=(),
+        unknown=(
+            fact("dynamics.unknown", what="masses", numbers=(6,)),
+            fact("dynamics.unknown", what="peak", numbers=()),
+        ),
+    )
     lead, rest = dynamics.payload_text(unknown, robot)
     assert lead.startswith("Not known, for lack of 2 quantities: mount nothing until the manufacturer gives the rated")
     assert rest == "Ask for: mass, centre of mass and inertia of the links (link 6); peak torques of the drives."

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import pytest
 
+import er3a.pipeline.messages.expectations  # noqa: F401
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.files.target_file import read_targets
-from er3a.pipeline.messages.expectations import as_expected, demonstrated, say
+from er3a.pipeline.messages.expectations import as_expected, demonstrated
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.expectations import Outcome, demonstrations, unmet_expectations
 
 

@@ -15,6 +15,7 @@ import pytest
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import using
 from er3a.pipeline.messages.expectations import outcome_word
@@ -24,7 +25,7 @@ from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.programs.compute import compute as compute_programs
-from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults, SomeProgramsFail
+from er3a.pipeline.stages.programs.model import RESULTS, ProgramsResults
 from er3a.pipeline.stages.programs.page.played import faults, motions
 from er3a.pipeline.stages.programs.page.record import record
 from er3a.pipeline.stages.programs.page.report import report
@@ -106,7 +107,9 @@ def test_an_unexpected_fault_fails_the_stage(study, tmp_path):
     listed.write_text(json.dumps({"kind": "programs", "programs": [entry]}))
     results = STAGES["programs"].module("compute").compute(with_entry(study, programs=str(listed)), "er3a_c60")
     assert results.summary.verdict.status == "fail"
-    assert results.summary.verdict.finding == SomeProgramsFail(1, 0, (), ("far",), (), ("far",))
+    assert results.summary.verdict.finding == fact(
+        "programs.fail", programs=1, passed=0, caution=(), failed=("far",), demonstrations=(), not_examined=("far",)
+    )
 
 
 @pytest.mark.long

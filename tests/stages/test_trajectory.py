@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.pairs import LinkAndSolid, PairOverlaps
+from er3a.collision.pairs import LinkAndSolid
 from er3a.errors import InputError
 from er3a.files.path_file import ProgramPath
 from er3a.files.program_file import load_programs
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
@@ -25,15 +26,7 @@ from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, path_text, repair_text, strategy_word
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.results import (
-    AbsentResults,
-    NotComputed,
-    Stored,
-    Summary,
-    Verdict,
-    read_results,
-    write_results,
-)
+from er3a.pipeline.results import AbsentResults, Stored, Summary, Verdict, read_results, write_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.registry import STAGES
@@ -58,7 +51,6 @@ from er3a.pipeline.teach import panel
 from er3a.pipeline.teach.panel import write_teach_page
 from er3a.planning.avoidance.strategies import STRATEGIES
 from er3a.planning.commands import CommandSource
-from er3a.planning.motion_faults import AboveLimit
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.programs.languages import read_program
 from testing.arms import scara
@@ -296,7 +288,7 @@ def test_a_strategy_that_meets_something_is_not_taken(study, results, tmp_path):
     path = by_name(compute(with_settings(few, scene=str(scene)), name))["line_shoulder"]
     shifted = tried(path, "via_shift")
     assert not shifted.usable
-    (met,) = [reason.pair for reason in shifted.reasons if isinstance(reason, PairOverlaps)]
+    (met,) = [reason.pair for reason in shifted.reasons if is_one(reason, "pair_overlaps")]
     assert met.solid == "ball"
     assert path.strategy != "via_shift"
 
@@ -395,7 +387,7 @@ def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of
 def test_the_index_says_first_what_validation_came_to(study, folders, stored, tmp_path):
     one = study.model_copy(update={"robots": {"er3_600": study.robots["er3_600"]}})
     for stage in (each for each in one.stages("er3_600") if each != "trajectory"):
-        absent = AbsentResults(Summary(Verdict("not_computed", NotComputed("made up")), ()))
+        absent = AbsentResults(Summary(Verdict("not_computed", fact("stage.not_computed", reason="made up")), ()))
         write_results(tmp_path / "results/er3_600" / stage, one, "er3_600", STAGES[stage], absent)
     shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
     write_index(one, tmp_path / "results", tmp_path)
@@ -426,7 +418,7 @@ def test_the_teach_panel_says_first_what_validation_came_to(study, tmp_path, mon
     folder = tmp_path / "results/er3_600/validation"
     monkeypatch.setattr(panel, "program_head", lambda validated: [f"by {validated}"])  # what is made up has no evidence
     if status:
-        found = AbsentResults(Summary(Verdict(status, NotComputed("made up")), ()))
+        found = AbsentResults(Summary(Verdict(status, fact("stage.not_computed", reason="made up")), ()))
         write_results(folder, study, "er3_600", STAGES["validation"], found)
     write_teach_page(study, "er3_600", tmp_path / "results", tmp_path / "teach.html")
     page = (tmp_path / "teach.html").read_text(encoding="utf-8")
@@ -503,7 +495,7 @@ def test_extreme_paths_give_results(study, tmp_path):
     assert found["still"].verdict == "safe"
     assert found["far"].unreachable[0].t1_s == 2
     assert found["outside"].out_of_limits[0].t0_s == 0
-    assert isinstance(found["outside"].out_of_limits[0].cause, AboveLimit)
+    assert is_one(found["outside"].out_of_limits[0].cause, "above_limit")
     assert found["outside"].out_of_limits[0].cause.joint == 1
     start = found["singular-start"].singularities[0]
     assert start == Singularity(0, start.until_s, "wrist", True, 0, None)

@@ -14,6 +14,7 @@ from lxml import etree
 from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.say import say
@@ -40,8 +41,7 @@ from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
 from er3a.pipeline.stages.trajectory.page.played import advised, faults, motions, slowed
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
-from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, PathOutOfReach, TooFast, TooFastIfAssumed
-from er3a.planning.tool_curve import Undecided
+from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, TooFast, TooFastIfAssumed
 from testing.motion_cases import judged, limits_of
 
 ROBOT = "er3a_c60"
@@ -323,7 +323,7 @@ def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     assert [told.t_s for told in first_faults(several)] == [0.5, path.collisions[0].t0_s]
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(several,))))
     assert (fault.when, fault.what[:18]) == ("0.500 s", "wrist singularity;")
-    beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=PathOutOfReach(())),))
+    beyond = replace(several, unreachable=(replace(fast, t0_s=0.9, s0_m=0.1, cause=fact("out_of_reach", reasons=())),))
     assert "From t = 0.5 s: wrist singularity; from t = 0.9 s (100.0 mm of the path) it is out of reach" in advice(
         replace(beyond, sound_end=advised_end(beyond, rows, limits))
     )
@@ -497,7 +497,7 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
     clear = next(path for path in results.summary.paths if path.name == "line_collides")
     near = replace(clear, verdict="safe", collisions=(), clearance=replace(clear.clearance, least_mm=11.0, t_s=2.4))
     verdict = results.summary.verdict
-    verdict = replace(verdict, shapes=replace(verdict.shapes, near=("line_collides",)))
+    verdict = replace(verdict, shapes=verdict.shapes.but(near=("line_collides",)))
     (shown,) = motions(robot, replace(results, summary=replace(results.summary, paths=(near,), verdict=verdict)))
     (event,) = shown.events
     assert shown.text == event.text
@@ -511,7 +511,7 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
 
 
 def test_stretches_of_one_cause_that_adjoin_are_told_once():
-    open_, other = Undecided(), TooFast(1, 20.0, 10.0)
+    open_, other = fact("undecided"), TooFast(1, 20.0, 10.0)
     parts = [stretch(open_, 1.97, 2.03), stretch(open_, 1.945, 1.967), stretch(other, 1.95, 1.96)]
     found = adjoined([*parts, stretch(open_, 2.9, 3.0)])
     assert [(each.cause, each.t0_s, each.t1_s) for each in found] == [

@@ -16,15 +16,13 @@ from scipy.spatial.transform import Rotation
 
 import er3a
 import er3a.pipeline.messages.validation
-from er3a.diagnosis.conclusions import MostLikelyFault, NoFewFaultsExplain, NothingToExplain
-from er3a.diagnosis.faults import BaseElsewhere, WrongOffset
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
+from er3a.finding import fact, is_one
 from er3a.identifiability.reactions import CheckCounts, CheckTally, bases_of
 from er3a.kinematics.forward import frames
 from er3a.kinematics.round_trips import batch_round_trips
-from er3a.kinematics.wrist_partitioned import NoWristCentre
 from er3a.pipeline.messages.pages import next_step
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
@@ -45,7 +43,6 @@ from er3a.pipeline.stages.validation.model import (
     DefinedOtherwise,
     LeftOpen,
     NothingToCompare,
-    NumbersMissing,
     SelfCheck,
     SetSummary,
     ValidationResults,
@@ -74,7 +71,7 @@ from testing.on_demand import OnDemand
 from testing.readme import answer
 from tests.robots.test_conventions import random_arm
 
-MISSING_OFFSET = WrongOffset(2, 0.0, -90.0)
+MISSING_OFFSET = fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0)
 NAMES = ("er3a_c60_article", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60", "er3_600")))
 WRITTEN = {f"{name}.parquet" for name in table_types(RESULTS)} | {"summary.json", "SHA256SUMS"}
 
@@ -272,7 +269,7 @@ def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
     edited = edited_robot(study, tmp_path, lambda c: c["dh"]["rows"][4].update(a_mm=20))
     stored = computed(edited, tmp_path / "out")
     summary = stored.results.summary
-    assert isinstance(summary.table.no_closed_form, NoWristCentre)
+    assert is_one(summary.table.no_closed_form, "no_common_point_of_axes_4_5_6")
     assert summary.table.no_closed_form.miss_mm > 1
     assert summary.round_trips is None
     assert SelfCheck("closed_form") in with_status(stored.results, "no_reference")
@@ -361,7 +358,7 @@ def test_table_checks_see_faults_that_a_file_could_not_hold():
     found = {check.subject.quantity: check for check in table_checks(crossed)}
     assert found["numbers_not_finite"].measured == 6
     assert found["crossed_limits"].measured == 6
-    assert found["closed_form"].note == NumbersMissing()
+    assert found["closed_form"].note == fact("numbers_missing")
     assert [check.status for check in table_checks(robot)] == ["pass"] * 6
     metres = robot.replace(
         a=robot.a / 1000, d=robot.d / 1000, lower=np.radians(robot.lower), upper=np.radians(robot.upper)
@@ -369,7 +366,7 @@ def test_table_checks_see_faults_that_a_file_could_not_hold():
     assert [check.status for check in table_checks(metres)] == ["pass"] * 3 + ["fail"] * 2 + ["pass"]
     bent = table_checks(robot.replace(a=robot.a + 0.02))[-1]
     assert bent.status == "no_reference"
-    assert isinstance(bent.note, NoWristCentre)
+    assert is_one(bent.note, "no_common_point_of_axes_4_5_6")
 
 
 def test_round_trips_find_the_joints_again(robot):
@@ -599,8 +596,8 @@ def test_diagnosis_names_the_articles_missing_offset_and_no_fault_of_another_arm
     assert (own.reference_set, own.hypotheses[0].faults) == ("er3a_c60_article", (MISSING_OFFSET,))
     assert own.hypotheses[0].residual_before == pytest.approx(1432.87, abs=0.01)
     assert own.hypotheses[0].residual_after < 1e-9
-    assert isinstance(own.conclusion, MostLikelyFault)
-    assert isinstance(real.conclusion, NoFewFaultsExplain)
+    assert is_one(own.conclusion, "named")
+    assert is_one(real.conclusion, "unexplained")
     (claims,) = summaries["er3a_c60_article"].verdict.finding.claims
     assert (claims.claims, claims.failed) == (22, 4)
 
@@ -609,7 +606,7 @@ def test_diagnosis_names_the_articles_missing_offset_and_no_fault_of_another_arm
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_diagnosis_of_the_right_tables_has_nothing_to_explain(summaries, name):
     (found,) = summaries[name].diagnoses
-    assert isinstance(found.conclusion, NothingToExplain)
+    assert is_one(found.conclusion, "met")
     assert found.hypotheses == ()
 
 
@@ -675,8 +672,8 @@ def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
     assert not any(each.another_arm for each in summary.sets)
     also = tuple(replace(each, another_arm=True) for each in summary.sets)
     assert not replace(summary, sets=also).is_beyond_correction
-    assert any(isinstance(fault, BaseElsewhere) for fault in found.diagnosis.faults)
-    assert {fault.joint for fault in found.diagnosis.faults if isinstance(fault, WrongOffset)} >= {2, 3}
+    assert any(is_one(fault, "base_elsewhere") for fault in found.diagnosis.faults)
+    assert {fault.joint for fault in found.diagnosis.faults if is_one(fault, "wrong_offset")} >= {2, 3}
     assert "the same arm, defined otherwise" in say(found)
     assert "This is the robot, but its zeros" in page_of(other, stored, tmp_path)
 

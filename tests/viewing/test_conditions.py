@@ -12,8 +12,8 @@ import pytest
 
 from er3a.collision.bodies import Bodies
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.identifiability.entry_evidence import Tolerance
-from er3a.identifiability.proposals import LookAtMotion
 from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.inverse import inverse
@@ -56,7 +56,9 @@ FOUND = LeftOpen(
     TURNED,
     at_least=False,
     unbounded=tuple(f"direction{k}" for k in range(1, 7)),
-    next_measurement=LookAtMotion("direction1", 1, "flange", (0.0,) * 6, "left"),
+    next_measurement=fact(
+        "look_at_motion", entry="direction1", joint=1, point="flange", pose_deg=(0.0,) * 6, seen="left"
+    ),
     contradiction=None,
 )
 

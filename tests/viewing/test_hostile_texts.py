@@ -13,8 +13,9 @@ import pytest
 import yaml
 
 from er3a.errors import InputError
+from er3a.finding import fact
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.results import AbsentResults, NotComputed, Summary, Verdict, read_stage, write_checksums
+from er3a.pipeline.results import AbsentResults, Summary, Verdict, read_stage, write_checksums
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
@@ -102,7 +103,7 @@ def test_a_page_shows_hostile_texts_and_does_not_act_on_them(hostile, small_stud
 def test_the_page_of_a_stage_that_was_not_computed_does_not_act_on_its_reason(hostile, tmp_path):
     study, folder = hostile
     stored = read_stage(folder / "results" / ROBOT / "inverse", STAGES["inverse"])
-    absent = AbsentResults(Summary(Verdict("not_computed", NotComputed(HOSTILE)), ()))
+    absent = AbsentResults(Summary(Verdict("not_computed", fact("stage.not_computed", reason=HOSTILE)), ()))
     report_absent(study, replace(stored, results=absent), tmp_path / "inverse.html")
     html = (tmp_path / "inverse.html").read_text(encoding="utf-8")
     found = Tags(html)

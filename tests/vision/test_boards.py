@@ -14,9 +14,9 @@ from PIL import Image
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.hand_eye_file import load_hand_eye, read_calibration
+from er3a.finding import fact
 from er3a.vision.boards import (
     Board,
-    BoardlessImage,
     BoardNotFoundError,
     Camera,
     _pose,
@@ -141,7 +141,9 @@ def test_a_camera_is_calibrated_from_images_alone_and_those_without_a_board_are_
     for number in blank:
         Image.fromarray(np.full((960, 1280), 128, np.uint8)).save(tmp_path / f"{number}.png")
     again, images = read_calibration(tmp_path / "set.yaml", None)
-    assert images.boardless == tuple(BoardlessImage(f"row {k + 2}", f"{k}.png", 0) for k in blank)
+    assert images.boardless == tuple(
+        fact("boardless_image", sample=f"row {k + 2}", image=f"{k}.png", corners=0) for k in blank
+    )
     assert again.names == tuple(f"row {k + 2}" for k in range(0, 12, 2))
     np.testing.assert_array_equal(again.target, samples.target[::2])
     np.testing.assert_array_equal(again.flange, samples.flange[::2])

@@ -17,24 +17,14 @@ from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.vision import say
 from er3a.planning.timing import joint_limits
-from er3a.planning.way_around import EndOutsideLimits, NoneFound, PlannerMissing
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import (
-    DetectedObject,
-    Grasp,
-    GraspNearEnds,
-    GraspNeeds,
-    GraspTask,
-    GraspUnlikely,
-    NoTransfer,
-    PathCollides,
-    plan_grasp,
-)
+from er3a.vision.grasping import DetectedObject, Grasp, GraspNearEnds, GraspNeeds, GraspTask, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
 from testing.arms import scara
@@ -133,7 +123,7 @@ def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
     sure, wide = plan(1e-4, 0.95), plan(2e-2, 0.95)
     assert sure.chosen.probability > 0.99
     assert wide.chosen is None
-    assert isinstance(wide.refusal, GraspUnlikely)
+    assert is_one(wide.refusal, "grasp_unlikely")
     assert wide.refusal.probability < 0.1
     assert wide.refusal.needed == 0.95
     assert plan(2e-2, 0.0).chosen.probability == pytest.approx(wide.refusal.probability, abs=0.05)
@@ -269,14 +259,14 @@ def test_the_move_to_the_approach_keeps_the_clearance_asked_for(monkeypatch):
     scene = replace(task.scene, solids=(*task.scene.solids, bump))
     passed = clearance(robot, np.linspace(home, plan.chosen.q_before, 201), scene).distance.min()
     assert 0 < passed < NEEDS.clearance
-    monkeypatch.setattr("er3a.vision.grasp_motion.way_around", lambda *given: NoneFound(1))
+    monkeypatch.setattr("er3a.vision.grasp_motion.way_around", lambda *given: fact("none_found", rounds=1))
     file, task, _ = task_of(FIXED, robot)
     near = replace(task, home=home, scene=scene, bodies=Bodies(robot, scene))
     target = file.objects[0].detected()
     found = calibrate_hand_eye(load_hand_eye(FOLDER / "fixed_camera.yaml", robot))
     T = seen_pose(found, target.T_camera_object)
     refused = plan_grasp(near, target, T, lambda q: target.covariance).refusal
-    assert isinstance(refused, PathCollides)
+    assert is_one(refused, "way_collides")
     assert (refused.part, "bump" in say(refused)) == ("move", True)
     closer = replace(near, needs=replace(NEEDS, clearance=0.001))
     assert plan_grasp(closer, target, T, lambda q: target.covariance).chosen.clearance == pytest.approx(
@@ -289,14 +279,14 @@ def test_without_the_planner_the_object_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
     _, _, plan = chosen_from(BEHIND_THE_POST)
     assert plan.chosen is None
-    assert plan.refusal == NoTransfer(PlannerMissing())
+    assert plan.refusal == fact("no_transfer", why=fact("planner_missing"))
 
 
 def test_a_start_outside_the_limits_is_named():
     robot = load_robot(FIXED.robot)
     _, _, plan = chosen_from(BEHIND_THE_POST + np.array([robot.upper[0], 0, 0, 0, 0, 0]))
-    assert isinstance(plan.refusal, NoTransfer)
-    assert isinstance(plan.refusal.why, EndOutsideLimits)
+    assert is_one(plan.refusal, "no_transfer")
+    assert is_one(plan.refusal.why, "end_outside_limits")
 
 
 def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import moved, transform
 from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.vision.compute import _open_frames
@@ -21,25 +22,7 @@ from er3a.vision.classic_methods import park, shah
 from er3a.vision.hand_eye import CONVENTIONS, calibrate_hand_eye, other_conventions
 from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
 from er3a.vision.typical_causes import moved_between, wrong_distances
-from er3a.vision.vision_findings import (
-    AllSamplesEqual,
-    BoardScale,
-    FarFromFit,
-    FewSamples,
-    FocalLength,
-    HandEyeError,
-    LittleMotion,
-    MoreScatter,
-    MovedBetween,
-    NoRotation,
-    OtherConvention,
-    ParallelTurns,
-    PrincipalPoint,
-    RotationMismatch,
-    TooFewSamples,
-    UnexplainedResiduals,
-    grave_warnings,
-)
+from er3a.vision.vision_findings import HandEyeError, grave_warnings
 from testing.hand_eye_coverage import board_coverage, pose_coverage
 from testing.hand_eye_sets import (
     PIXELS,
@@ -205,7 +188,7 @@ def test_a_mirrored_tilt_is_told_from_other_turns():
     sight = T[:3, 3] / np.linalg.norm(T[:3, 3])
     T[:3, :3] = (np.eye(3) - 2 * np.outer(sight, sight)) @ T[:3, :3] @ np.diag([1.0, 1.0, -1.0])
     (found,) = calibrate_hand_eye(samples).suspects
-    assert isinstance(found, RotationMismatch)
+    assert is_one(found, "rotation_mismatch")
     assert (found.sample, found.kind) == ("7", "mirrored_tilt")
 
 
@@ -213,7 +196,7 @@ def test_a_shifted_board_is_named_though_no_angle_tells_it():
     samples = a_set("eye_in_hand", 9)
     samples.target[2, :3, 3] += [0.01, 0, 0]
     (found,) = calibrate_hand_eye(samples).suspects
-    assert isinstance(found, FarFromFit)
+    assert is_one(found, "far_from_fit")
     assert found.sample == "3"
     assert found.off_mm == pytest.approx(10, abs=2)
 
@@ -252,7 +235,7 @@ def test_poses_without_errors_are_no_reason_to_warn(setup):
 def test_a_pose_written_again_at_the_end_is_no_other_setup():
     samples = a_set("eye_in_hand", 4, 12)
     samples.flange[9:], samples.target[9:] = samples.flange[8], samples.target[8]
-    assert not any(isinstance(each, MovedBetween) for each in calibrate_hand_eye(samples).warnings)
+    assert not any(is_one(each, "moved_between") for each in calibrate_hand_eye(samples).warnings)
 
 
 def test_places_are_the_same_in_any_order():
@@ -281,7 +264,7 @@ def test_both_streams_inverted_is_the_same_problem_with_the_unknowns_swapped():
 def test_a_board_of_another_size_is_named_with_the_factor():
     samples = a_set("eye_to_hand", 13, 20)
     samples.target[:, :3, 3] /= 1.05
-    scale = [each for each in calibrate_hand_eye(samples).warnings if isinstance(each, BoardScale)]
+    scale = [each for each in calibrate_hand_eye(samples).warnings if is_one(each, "board_scale")]
     assert scale[0].factor == pytest.approx(1.05, abs=scale[0].half_width)
 
 
@@ -299,13 +282,13 @@ def test_poses_computed_with_a_wrong_focal_length_or_principal_point_are_named(s
         found = calibrate_hand_eye(a_pnp_set(setup, 5, PIXELS * [[factor], [factor], [1]]))
         assert np.linalg.norm(off(found.X, X_TRUE)[:3]) > 0.003
         (named,) = grave_warnings(found.warnings)
-        assert isinstance(named, FocalLength)
+        assert is_one(named, "focal_length")
         assert named.factor == pytest.approx(1 / factor, abs=named.half_width)
     for axis, pixels in (("x", 25), ("y", -25)):
         given = PIXELS.copy()
         given["xy".index(axis), 2] += pixels
         (named,) = grave_warnings(calibrate_hand_eye(a_pnp_set(setup, 6, given)).warnings)
-        assert isinstance(named, PrincipalPoint)
+        assert is_one(named, "principal_point")
         assert (named.axis, named.percent) == (axis, pytest.approx(100 * pixels / 900, abs=0.8))
     for seed in range(7, 10):
         assert not grave_warnings(calibrate_hand_eye(a_pnp_set(setup, seed, PIXELS)).warnings)
@@ -364,7 +347,7 @@ def test_poses_read_by_another_convention_are_named(convention, stream):
     for name in ("flange", "target") if stream == "both" else (stream,):
         samples = replace(samples, **{name: MISREAD[convention](getattr(samples, name))})
     found = calibrate_hand_eye(samples)
-    named = [each for each in found.warnings if isinstance(each, OtherConvention)]
+    named = [each for each in found.warnings if is_one(each, "other_convention")]
     assert (stream, convention) in {(each.stream, each.convention) for each in named}
     assert max(each.rms_other_mm for each in named) < 3
     assert set(grave_warnings(found.warnings)) >= set(named)
@@ -391,7 +374,7 @@ def test_residuals_that_nothing_explains_are_an_error():
     samples.target[:, :3, 3] += np.random.default_rng(3).normal(0, 0.1, (15, 3))
     found = calibrate_hand_eye(samples)
     (grave,) = grave_warnings(found.warnings)
-    assert isinstance(grave, UnexplainedResiduals)
+    assert is_one(grave, "unexplained_residuals")
     assert grave.rms_mm > 30
 
 
@@ -400,7 +383,7 @@ def test_a_step_of_the_setup_is_named_with_and_without_stated_deviations(stated)
     samples = a_set("eye_in_hand", 14, **({"camera_covariance": covariance(15)} if stated else {}))
     samples.target[8:] = moved(np.eye(4), np.array([0.02, 0.01, 0, 0, 0, 0.02])) @ samples.target[8:]
     found = calibrate_hand_eye(samples)
-    (step,) = [each for each in found.warnings if isinstance(each, MovedBetween)]
+    (step,) = [each for each in found.warnings if is_one(each, "moved_between")]
     assert (step.sample, step.what) == (samples.names[8], "camera")
 
 
@@ -409,7 +392,7 @@ def test_the_other_setup_is_named(setup):
     samples = a_set(setup, 15)
     other = CalibrationSet(next(each for each in SETUPS if each != setup), samples.flange, samples.target)
     assert any(getattr(each, "convention", "") == "inverted" for each in calibrate_hand_eye(other).warnings)
-    assert not any(isinstance(each, OtherConvention) for each in calibrate_hand_eye(samples).warnings)
+    assert not any(is_one(each, "other_convention") for each in calibrate_hand_eye(samples).warnings)
 
 
 def test_residuals_beyond_what_is_stated_are_said():
@@ -417,14 +400,14 @@ def test_residuals_beyond_what_is_stated_are_said():
     assert calibrate_hand_eye(good).warnings == ()
     bad = a_set("eye_in_hand", 15, camera_covariance=covariance(15) / 9)
     (found,) = calibrate_hand_eye(bad).warnings
-    assert isinstance(found, MoreScatter)
+    assert is_one(found, "more_scatter")
     assert found.scatter == pytest.approx(3, abs=0.6)
 
 
 def test_samples_too_few_to_be_judged_by_one_another_are_said():
     for count in (4, 6, 7):
         found = calibrate_hand_eye(a_set("eye_in_hand", count=count))
-        assert [each.samples for each in found.warnings if isinstance(each, FewSamples)] == [count] * (count < 7)
+        assert [each.samples for each in found.warnings if is_one(each, "few_samples")] == [count] * (count < 7)
         assert grave_warnings(found.warnings) == ()
 
 
@@ -433,7 +416,7 @@ def test_little_motion_is_said():
     flange = flange_poses(random, 12, turn=0.03)
     samples = CalibrationSet("eye_in_hand", flange, noisy(seen("eye_in_hand", flange), random))
     found = calibrate_hand_eye(samples)
-    assert any(isinstance(each, LittleMotion) for each in found.warnings)
+    assert any(is_one(each, "little_motion") for each in found.warnings)
     assert found.half_width[:3].max() > 2e-3
 
 
@@ -447,16 +430,18 @@ def refusal(flange: np.ndarray, target: np.ndarray | None = None) -> object:
 def test_sets_that_determine_nothing_say_why():
     random = np.random.default_rng(20)
     flange = flange_poses(random, 10)
-    assert refusal(flange[:2]) == TooFewSamples(2, 3)
-    assert refusal(np.repeat(flange[:1], 5, axis=0)) == AllSamplesEqual("flange")
-    assert refusal(flange, np.repeat(seen("eye_in_hand", flange)[:1], 10, axis=0)) == AllSamplesEqual("target")
+    assert refusal(flange[:2]) == fact("too_few_samples", samples=2, needed=3)
+    assert refusal(np.repeat(flange[:1], 5, axis=0)) == fact("all_samples_equal", stream="flange")
+    assert refusal(flange, np.repeat(seen("eye_in_hand", flange)[:1], 10, axis=0)) == fact(
+        "all_samples_equal", stream="target"
+    )
     shifted = flange.copy()
     shifted[:, :3, :3] = flange[0, :3, :3]
-    assert isinstance(refusal(shifted), NoRotation)
+    assert is_one(refusal(shifted), "no_rotation")
     about_z = flange.copy()
     about_z[:, :3, :3] = Rotation.from_euler("z", random.uniform(-60, 60, (10, 1)), degrees=True).as_matrix()
     found = refusal(about_z)
-    assert isinstance(found, ParallelTurns)
+    assert is_one(found, "parallel_axes")
     assert abs(found.axis[2]) == pytest.approx(1)
 
 
@@ -539,7 +524,7 @@ SLID, ELSEWHERE, TURNED = (
 )
 def test_a_set_of_two_setups_is_named_with_the_sample_between(setup, last, what, step):
     found = calibrate_hand_eye(of_two_setups(setup, 18, 18 - last, **{what: step}))
-    (named,) = (each for each in found.warnings if isinstance(each, MovedBetween))
+    (named,) = (each for each in found.warnings if is_one(each, "moved_between"))
     assert named.what == what
     assert abs(int(named.sample) - (19 - last)) <= 1
     truth = np.linalg.norm(step[:3, 3]) * 1000
@@ -557,7 +542,7 @@ def test_samples_at_one_pose_count_as_one(setup, apart):
     few, random = a_set(setup, 2, 6), np.random.default_rng(5)
     flange, target = (noisy(np.repeat(T, 4, axis=0), random, apart, apart) for T in (few.flange, few.target))
     alone, copied = calibrate_hand_eye(few), calibrate_hand_eye(CalibrationSet(setup, flange, target))
-    assert [each.samples for each in copied.warnings if isinstance(each, FewSamples)] == [6]
+    assert [each.samples for each in copied.warnings if is_one(each, "few_samples")] == [6]
     assert (copied.half_width > 0.5 * alone.half_width).all()
     assert np.abs(off(copied.X, alone.X)).max() < 1e-3
 

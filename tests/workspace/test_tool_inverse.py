@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
@@ -17,13 +18,7 @@ from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.capability import map_capability
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.orientations import asked_of
-from er3a.workspace.tool_inverse import (
-    InverseUnknown,
-    JointOneShared,
-    OrientationsUnknown,
-    all_solutions,
-    lacking_for_maps,
-)
+from er3a.workspace.tool_inverse import all_solutions, lacking_for_maps
 from testing.arms import (
     dh_matrix,
     five_axis,
@@ -221,8 +216,11 @@ def test_a_scara_that_points_down_serves_no_box_from_the_side():
 
 
 def test_what_no_maps_are_made_of_is_told():
-    assert lacking_for_maps(palletiser()) == OrientationsUnknown(4)
+    assert lacking_for_maps(palletiser()) == fact("orientations_unknown", joints=4)
     shared = make_arm(combined=(CombinedLimit((1.0, 1.0, 0, 0, 0, 0), -1.0, 1.0),))
-    assert lacking_for_maps(shared) == JointOneShared()
+    assert lacking_for_maps(shared) == fact("joint_one_shared")
     rows = [("R", 0, 90, 300, -170, 170), ("R", 350, 0, 0, -10, 170), ("R", 0, 90, 0, -150, 150)]
-    assert lacking_for_maps(made_of([*rows, ("R", 0, 0, 200, -180, 180)])) in (InverseUnknown(), OrientationsUnknown(4))
+    assert lacking_for_maps(made_of([*rows, ("R", 0, 0, 200, -180, 180)])) in (
+        fact("inverse_unknown"),
+        fact("orientations_unknown", joints=4),
+    )

@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 from er3a.errors import Er3aError
+from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.commands.options import PROGRAMS, AsJson, FailOn, app, given_files, print_json, print_note
 from er3a.programs.program_names import LanguageName
@@ -175,7 +176,6 @@ def write(
     from er3a.pipeline.scope import by_reason
     from er3a.pipeline.stages.covered import assumed_tool, covered_units, gaps_of_program
     from er3a.pipeline.viewing.conditions import program_head
-    from er3a.programs.program_findings import TargetsLeftOut
     from er3a.programs.writing import with_head_lines
 
     with noted_doubts() as doubts, shown_work(f"{paths}: checking each path"):
@@ -196,7 +196,7 @@ def write(
             print(f"{file}: written")
         for finding in made.findings:
             print_note(f"{made.name}: {say(finding)}")
-        refused += bool(made.open) or any(isinstance(finding, TargetsLeftOut) for finding in made.findings)
+        refused += bool(made.open) or any(is_one(finding, "written_targets_left_out") for finding in made.findings)
     missed = by_reason(each for made in programs for each in made.open)
     for line in filter(None, (shapes_line(arm), missed_line((*alone, *missed)))):
         print_note(line)

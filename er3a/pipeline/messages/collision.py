@@ -7,16 +7,16 @@ from typing import assert_never
 
 import numpy as np
 
-from er3a.by_value import Finding
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, Pair, PairsUnexamined, ShapesAssumed
+from er3a.collision.pairs import BASE, TRIED, Pair
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
+from er3a.finding import AnyFinding, Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages import scope  # noqa: F401
 from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.collision.model import BaseInSolid, FreeSpace, HomeCollides, NeverFree, ShapesOverlap
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.pipeline.stages.collision.model import FreeSpace, HomeCollides
 
 NAMED = 3
 KEY_FIGURES = {
@@ -119,19 +119,19 @@ def _(found: Pair) -> str:
     return say_as(found, **{key: own_title(it) if isinstance(it, str) else _link(it) for key, it in bodies.items()})
 
 
-@say.register
-def _(found: PairsUnexamined) -> str:
+@says("pairs_unexamined")
+def _(found: Finding) -> str:
     return say_as(found, pairs=_first_of(found.pairs))
 
 
-def _first_of(findings: Sequence[Finding]) -> str:
+def _first_of(findings: Sequence[AnyFinding]) -> str:
     """The first few, and how many more there are."""
     more = [sentence("more", count=len(findings) - NAMED)] if len(findings) > NAMED else []
     return joined([*listed(findings[:NAMED]), *more], ", ")
 
 
-@say.register
-def _(found: ShapesAssumed) -> str:
+@says("shapes_assumed")
+def _(found: Finding) -> str:
     rests = say_as(found, "partial" if found.partial else "given" if found.given else "guessed")
     return joined([rests, near_shapes(found.margin_mm, found.near)], " ")
 
@@ -145,18 +145,18 @@ def _link(number: int) -> str:
     return sentence("link#base") if number == BASE else sentence("link#number", number=number)
 
 
-@say.register
-def _(found: NeverFree) -> str:
+@says("collision.never_free")
+def _(found: Finding) -> str:
     return say_as(found, "assumed" if found.assumed else "given", pairs=joined(listed(found.pairs[:NAMED]), ", "))
 
 
-@say.register
-def _(found: ShapesOverlap) -> str:
+@says("collision.shapes_overlap")
+def _(found: Finding) -> str:
     return say_as(found, count=TRIED, pairs=joined(listed(found.pairs[:NAMED]), ", "), percent=100 * found.free_ratio)
 
 
-@say.register
-def _(found: BaseInSolid) -> str:
+@says("collision.base_in_solid")
+def _(found: Finding) -> str:
     return say_as(found, own_name=", ".join(found.solids[:NAMED]))
 
 

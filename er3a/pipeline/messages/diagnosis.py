@@ -4,39 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from er3a.calibration.outcomes import (
-    FarFromTable,
-    Misfit,
-    MorePositions,
-    MoreTouches,
-    NoCorrectionFound,
-    NotToldApart,
-)
-from er3a.diagnosis.conclusions import (
-    MainFault,
-    MostLikelyFault,
-    NoFewFaultsExplain,
-)
-from er3a.diagnosis.faults import (
-    BaseElsewhere,
-    CountedFromGround,
-    Faults,
-    FlangeElsewhere,
-    ReversedDirection,
-    ShiftedRows,
-    SwappedEntries,
-    WrongAlpha,
-    WrongAlphaSign,
-    WrongConvention,
-    WrongLength,
-    WrongLimit,
-    WrongLimits,
-    WrongOffset,
-    WrongScale,
-    WrongUnit,
-)
+from er3a.diagnosis.faults import Faults
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_, as_text
-from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, says, sentence, texts, word
 
 ENTRIES = {
     "a": N_("column a"),
@@ -163,9 +134,9 @@ TEXTS = texts(
         "more_positions#known": Plural(
             "poses",
             "{coordinates} coordinates at {count} pose determine {determined} of the {determinable} entries "
-            "({level}) that positions of these points can determine",
+            "({fitted}) that positions of these points can determine",
             "{coordinates} coordinates at {count} poses determine {determined} of the {determinable} entries "
-            "({level}) that positions of these points can determine",
+            "({fitted}) that positions of these points can determine",
         ),
         "more_positions#needed": Plural(
             "missing", "at least {count} more position is needed", "at least {count} more positions are needed"
@@ -184,7 +155,7 @@ TEXTS = texts(
         "more_touches#bar": "{poses} poses or more with each bar",
         "more_touches#pair": "{pairs} pairs or more",
         "misfit": (
-            "Correcting {level} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
+            "Correcting {fitted} does not make this table fit the positions: {rms_after_mm:.3g} mm of "
             "{rms_before_mm:.3g} mm (root mean square) remain. Calibration can't repair it."
         ),
         "far_from_table": (
@@ -220,10 +191,10 @@ def shown(value: float) -> str:
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
 
 
-def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
+def fitted(found: Finding) -> str:
     """The value that fits: to four digits, or to as many as tell it from the one that is given."""
     given, fits = (
-        (found.given_mm, found.fits_mm) if isinstance(found, WrongLength) else (found.given_deg, found.fits_deg)
+        (found.given_mm, found.fits_mm) if is_one(found, "wrong_length") else (found.given_deg, found.fits_deg)
     )
     if abs(fits) < MIN_FITTED:
         return "0"
@@ -231,88 +202,88 @@ def fitted(found: WrongAlpha | WrongOffset | WrongLimit | WrongLength) -> str:
     return text or as_text(fits, ".7g")
 
 
-@say.register
-def _(found: NoCorrectionFound) -> str:
+@says("no_correction_found")
+def _(found: Finding) -> str:
     return joined(
         ["" if len(found.open) == found.intervals else say_as(found), say_as(found, "open") if found.open else ""], " "
     )
 
 
-@say.register
-def _(found: WrongUnit) -> str:
+@says("wrong_unit")
+def _(found: Finding) -> str:
     return _at(word(found.code, ENTRIES, found.entries), word(found.code, MISREAD, found.misread))
 
 
-@say.register
-def _(found: WrongAlphaSign | ReversedDirection) -> str:
+@says("wrong_alpha_sign", "reversed_direction")
+def _(found: Finding) -> str:
     return _at_joint(found.joint, say_as(found))
 
 
-@say.register
-def _(found: WrongAlpha | WrongOffset | WrongLength) -> str:
-    given = found.given_mm if isinstance(found, WrongLength) else found.given_deg
+@says("wrong_alpha", "wrong_offset", "wrong_length")
+def _(found: Finding) -> str:
+    given = found.given_mm if is_one(found, "wrong_length") else found.given_deg
     return _at_joint(found.joint, say_as(found, "missing" if given == 0 else "given", fits=fitted(found)))
 
 
-@say.register
-def _(found: SwappedEntries) -> str:
+@says("swapped_entries")
+def _(found: Finding) -> str:
     if found.joint is None:
         return say_as(found, "columns")
     return _at_joint(found.joint, say_as(found, "joint"))
 
 
-@say.register
-def _(found: ShiftedRows) -> str:
+@says("shifted_rows")
+def _(found: Finding) -> str:
     return word(found.code, SHIFTS, f"{found.entries} {found.toward}")
 
 
-@say.register
-def _(found: WrongConvention) -> str:
+@says("wrong_convention")
+def _(found: Finding) -> str:
     return word(found.code, CONVENTIONS, found.read_as)
 
 
-@say.register
-def _(found: WrongLimits) -> str:
+@says("wrong_limits")
+def _(found: Finding) -> str:
     fault = word(found.code, LIMIT_FAULTS, found.fault)
     return _at(sentence("place#every_joint"), fault) if found.joint is None else _at_joint(found.joint, fault)
 
 
-@say.register
-def _(found: WrongLimit) -> str:
+@says("wrong_limit")
+def _(found: Finding) -> str:
     fault = say_as(found, found.side, given=found.given_deg, fits=fitted(found))
     return _at_joint(found.joint, fault)
 
 
-@say.register
-def _(found: WrongScale) -> str:
+@says("wrong_scale")
+def _(found: Finding) -> str:
     fault = say_as(found)
     return _at(word("wrong_unit", ENTRIES, "lengths"), fault)
 
 
-@say.register
-def _(found: BaseElsewhere | FlangeElsewhere) -> str:
+@says("base_elsewhere", "flange_elsewhere")
+def _(found: Finding) -> str:
     x, y, z = found.shift_mm
     return say_as(found, "turned" if found.turn_deg >= MIN_SHOWN else "shifted", x=x, y=y, z=z)
 
 
-@say.register
-def _(found: CountedFromGround) -> str:
+@says("counted_from_ground")
+def _(found: Finding) -> str:
     sign = "+" if found.sign > 0 else "−"
     others = "".join(f" {sign} J{joint}" for joint in found.along)
     return _at_joint(found.joint, say_as(found, sum=f"J{found.joint}{others}"))
 
 
-@say.register
-def _(found: MostLikelyFault | MainFault) -> str:
+@says("named", "mostly")
+def _(found: Finding) -> str:
     return say_as(found, hypothesis=_residual_falls(found))
 
 
-@say.register
-def _(found: NoFewFaultsExplain) -> str:
+@says("unexplained")
+def _(found: Finding) -> str:
     return say_as(found, before=shown(found.residual_before), least=shown(found.least))
 
 
-def _residual_falls(found: MostLikelyFault | MainFault) -> str:
+def _residual_falls(found: Finding) -> str:
     faults = both(found.faults)
     if found.alternatives:
         faults = sentence(
@@ -348,8 +319,8 @@ def level(name: str) -> str:
     return word("level", LEVELS, name)
 
 
-@say.register
-def _(found: NotToldApart) -> str:
+@says("not_told_apart")
+def _(found: Finding) -> str:
     entries = _with_and(found.entries)
     if found.parallel_joints is None:
         return say_as(found, entries=entries)
@@ -357,28 +328,28 @@ def _(found: NotToldApart) -> str:
     return say_as(found, "parallel", entries=entries, first=first, second=second)
 
 
-@say.register
-def _(found: MorePositions) -> str:
-    known = say_as(found, "known", level=level(found.level))
+@says("more_positions")
+def _(found: Finding) -> str:
+    known = say_as(found, "known", fitted=level(found.fitted))
     needed = say_as(found, "needed")
     if found.entries:
         needed = say_as(found, "for_entries", needed=needed)
     return say_as(found, "request", known=known, needed=needed)
 
 
-@say.register
-def _(found: MoreTouches) -> str:
+@says("more_touches")
+def _(found: Finding) -> str:
     each = [say_as(found, kind, poses=poses, pairs=poses * things) for kind, things, poses in found.each]
     return say_as(found, each=joined(each, ", "))
 
 
-@say.register
-def _(found: Misfit) -> str:
-    return say_as(found, level=level(found.level))
+@says("misfit")
+def _(found: Finding) -> str:
+    return say_as(found, fitted=level(found.fitted))
 
 
-@say.register
-def _(found: FarFromTable) -> str:
+@says("far_from_table")
+def _(found: Finding) -> str:
     if found.swapped:
         return say_as(found, "swapped", first=found.swapped[0], second=found.swapped[1])
     if found.faults:

@@ -9,12 +9,10 @@ import numpy as np
 
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
-from er3a.dynamics.plausibility import (
-    ImpossibleInertia,
-)
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, own_title
 from er3a.pipeline.messages.numbers import at_least
-from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
@@ -266,8 +264,8 @@ def use_text(use: model.Use) -> str:
     return sentence("dynamics.use#path", **parts)
 
 
-@say.register
-def _(found: model.NoData) -> str:
+@says("dynamics.no_data")
+def _(found: Finding) -> str:
     needs: list[model.Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
     return say_as(found, needs=joined(map(need_word, needs), ", "))
 
@@ -315,8 +313,8 @@ def _graded(grade: Grade | None) -> str:
     return sentence("dynamics.graded", grade=word("dynamics.graded_as", GRADED, grade))
 
 
-@say.register
-def _(found: model.DataOpen) -> str:
+@says("dynamics.unknown")
+def _(found: Finding) -> str:
     if not found.numbers:
         return need_word(found.what)
     parts = {"what": need_word(found.what), "numbers": ", ".join(map(str, found.numbers))}
@@ -325,7 +323,7 @@ def _(found: model.DataOpen) -> str:
     return sentence("dynamics.unknown#joints", **parts)
 
 
-@say.register
-def _(found: ImpossibleInertia) -> str:
+@says("impossible_inertia")
+def _(found: Finding) -> str:
     why = word("dynamics.why", WHY, found.why)
     return say_as(found, why=why)

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from er3a.finding import Finding
 from er3a.pipeline.language import N_
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.expectations import (
-    Demonstration,
-    ExpectationsUnmet,
-    Judged,
-    Outcome,
-    UnmetExpectation,
-    came_to,
-    expected_of,
-    is_met,
-)
+from er3a.pipeline.messages.say import Plural, joined, listed, say_as, says, sentence, texts, word
+from er3a.pipeline.stages.expectations import Judged, Outcome, came_to, expected_of, is_met
 
 OUTCOMES: dict[Outcome, str] = {
     "unreachable": N_("unreachable"),
@@ -77,7 +69,7 @@ def as_expected(judged: Judged) -> str:
     return sentence("as_expected#not")
 
 
-def demonstrated(shown: tuple[Demonstration, ...], asked: int) -> str:
+def demonstrated(shown: tuple[Finding, ...], asked: int) -> str:
     """What fails as it is meant to, beside so many that are ``asked`` not to; empty if nothing does."""
     if not shown:
         return ""
@@ -85,17 +77,17 @@ def demonstrated(shown: tuple[Demonstration, ...], asked: int) -> str:
     return sentence(form, count=len(shown), named=joined(listed(shown), ", "))
 
 
-@say.register
-def _(found: Demonstration) -> str:
+@says("demonstration")
+def _(found: Finding) -> str:
     return say_as(found, outcome=outcome_words(found.found))
 
 
-@say.register
-def _(found: UnmetExpectation) -> str:
+@says("unmet_expectation")
+def _(found: Finding) -> str:
     return say_as(found, found=outcome_words(found.found), expected=outcome_words(found.expected))
 
 
-@say.register
-def _(found: ExpectationsUnmet) -> str:
+@says("expectations_unmet")
+def _(found: Finding) -> str:
     others = sentence("expectations_unmet.others", named=joined(listed(found.others), ", ")) if found.others else ""
     return joined([say_as(found, count=len(found.unmet)), others], " ")

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_
 from er3a.pipeline.messages.expectations import demonstrated
 from er3a.pipeline.messages.kinematics import sum_of_joints
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts
-from er3a.pipeline.stages.inverse.model import (
-    AllSolved,
-    NoneSolved,
-    ReachMissing,
-    ShiftTool,
-    SomeUnsolved,
-    TargetCounts,
-    TurnTool,
-    UnsolvedTarget,
-)
-from er3a.robots.joint_limits import CombinationExceeded, Exceeded, LimitsExceeded, SlideExceeded
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say_as, says, sentence, texts
+from er3a.robots.joint_limits import Exceeded
 
 NAMED = 3
 KEY_FIGURES = {
@@ -126,8 +117,8 @@ TEXTS = texts(
 )
 
 
-@say.register
-def _(found: AllSolved) -> str:
+@says("inverse.all_solved")
+def _(found: Finding) -> str:
     if not found.targets:
         return _and_demonstrations("", found)
     where = _where(found.collisions)
@@ -137,14 +128,14 @@ def _(found: AllSolved) -> str:
     return _and_demonstrations(some, found)
 
 
-@say.register
-def _(found: NoneSolved) -> str:
+@says("inverse.none_solved")
+def _(found: Finding) -> str:
     none = say_as(found, where=_where(found.collisions), none_for=_none_for(found.unsolved))
     return _and_demonstrations(none, found)
 
 
-@say.register
-def _(found: SomeUnsolved) -> str:
+@says("inverse.some_unsolved")
+def _(found: Finding) -> str:
     some = say_as(
         found,
         total=found.targets,
@@ -154,7 +145,7 @@ def _(found: SomeUnsolved) -> str:
     return _and_demonstrations(some, found)
 
 
-def _and_demonstrations(text: str, found: TargetCounts) -> str:
+def _and_demonstrations(text: str, found: Finding) -> str:
     expected = demonstrated(found.demonstrations, found.targets)
     singular = sentence("inverse.singular", names=found.singular) if found.singular else ""
     return joined([text, singular, sentence("finding", finding=expected) if expected else ""], " ")
@@ -166,42 +157,42 @@ def _where(collisions: bool) -> str:
     return sentence("where#itself")
 
 
-def _none_for(unsolved: tuple[UnsolvedTarget, ...]) -> str:
+def _none_for(unsolved: tuple[Finding, ...]) -> str:
     named = listed(unsolved[:NAMED])
     if len(unsolved) > NAMED:
         named.append(sentence("more", count=len(unsolved) - NAMED))
     return joined(named, ", ")
 
 
-@say.register
-def _(found: ReachMissing) -> str:
+@says("reach_missing")
+def _(found: Finding) -> str:
     if found.gap_mm >= 10:
         return say_as(found, "far")
     return say_as(found, "near")
 
 
-def limits_in_short(found: LimitsExceeded) -> str:
+def limits_in_short(found: Finding) -> str:
     """Which limits are left and by how much, for a cell of a table."""
     return joined(map(_in_short, found.joints), ", ")
 
 
 def _in_short(found: Exceeded) -> str:
-    if isinstance(found, CombinationExceeded):
+    if is_one(found, "combination_exceeded"):
         return sentence(
             f"sum_in_short#{found.side}", sum=sum_of_joints(found.joints, found.factors), excess=found.excess
         )
-    if isinstance(found, SlideExceeded):
+    if is_one(found, "slide_exceeded"):
         return sentence(f"slide_in_short#{found.side}", joint=found.joint, excess=found.excess_mm)
     return sentence(f"turn_in_short#{found.side}", joint=found.joint, excess=found.excess_deg)
 
 
-@say.register
-def _(found: TurnTool) -> str:
+@says("turn_tool")
+def _(found: Finding) -> str:
     roll, pitch, yaw = found.to_deg
     return say_as(found, share=100 * found.orientation_ratio, roll=roll, pitch=pitch, yaw=yaw)
 
 
-@say.register
-def _(found: ShiftTool) -> str:
+@says("shift_tool")
+def _(found: Finding) -> str:
     x, y, z = found.to_mm
     return say_as(found, x=x, y=y, z=z)

@@ -3,33 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.kinematics.solutions import (
-    ByClass,
-    Label,
-    PoseUnsolved,
-    SideUnsolved,
-    Unsolved,
-    WristTooFar,
-    WristTooNear,
-    WristTooNearAxis1,
-)
-from er3a.kinematics.wrist_partitioned import (
-    NotSixTurning,
-)
+from er3a.finding import Finding
+from er3a.kinematics.solutions import ByClass, Label, PoseUnsolved, SideUnsolved, Unsolved
 from er3a.pipeline.language import N_, as_text, tr
-from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts, word
-from er3a.robots.joint_limits import CombinationExceeded, LimitExceeded, LimitsExceeded, SlideExceeded
-from er3a.selection.nearest import (
-    AllOutsideLimits,
-    LowerBranchNumber,
-    MovesLess,
-    MovesLessTogether,
-    NoSolution,
-    OtherBranch,
-)
-from er3a.selection.select import BestByRules, Measure, Placed
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.selection.nearest import MovesLess, MovesLessTogether
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -194,20 +175,20 @@ def singular_pose(kind: str) -> str:
     return word("singular_pose", SINGULAR_POSES, kind) if kind in SINGULAR_POSES else ""
 
 
-@say.register
-def _(found: LimitExceeded) -> str:
+@says("limit_exceeded")
+def _(found: Finding) -> str:
     at, by, bound = found.angle_deg, found.excess_deg, found.limit_deg
     return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
 
 
-@say.register
-def _(found: SlideExceeded) -> str:
+@says("slide_exceeded")
+def _(found: Finding) -> str:
     at, by, bound = found.position_mm, found.excess_mm, found.limit_mm
     return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
 
 
-@say.register
-def _(found: CombinationExceeded) -> str:
+@says("combination_exceeded")
+def _(found: Finding) -> str:
     at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else tr("deg")
     named = sum_of_joints(found.joints, found.factors)
     return say_as(found, found.side, sum=named, at=at, by=by, bound=bound, unit=unit)
@@ -223,13 +204,13 @@ def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
     return text
 
 
-@say.register
-def _(found: LimitsExceeded) -> str:
+@says("limits_exceeded")
+def _(found: Finding) -> str:
     return joined(listed(found.joints))
 
 
-@say.register
-def _(found: NotSixTurning) -> str:
+@says("not_six_turning_joints")
+def _(found: Finding) -> str:
     if found.sliding:
         return say_as(found, "sliding")
     return say_as(found, "revolute")
@@ -245,18 +226,18 @@ def _(found: ByClass) -> str:
     return say_as(found, **parts)
 
 
-@say.register
-def _(found: WristTooNearAxis1) -> str:
+@says("wrist_too_near_axis_1")
+def _(found: Finding) -> str:
     return say_as(found, gap=_mm(found.gap_mm))
 
 
-@say.register
-def _(found: WristTooFar) -> str:
+@says("wrist_too_far")
+def _(found: Finding) -> str:
     return say_as(found, gap=_mm(found.gap_mm), reach=_mm(found.reach_mm))
 
 
-@say.register
-def _(found: WristTooNear) -> str:
+@says("wrist_too_near")
+def _(found: Finding) -> str:
     return say_as(found, gap=_mm(found.gap_mm), least=_mm(found.least_mm))
 
 
@@ -274,18 +255,20 @@ def _mm(length: float) -> str:
     return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"
 
 
-@say.register
-def _(found: MovesLess | MovesLessTogether | LowerBranchNumber) -> str:
+@say.register(MovesLess)
+@say.register(MovesLessTogether)
+@says("lower_branch_number")
+def _(found: Any) -> str:
     return say_as(found, other=sentence("next_best", branch=say(found.next_best)))
 
 
-@say.register
-def _(found: OtherBranch) -> str:
+@says("other_branch")
+def _(found: Finding) -> str:
     return branch_word(found.label, found.branch)
 
 
-@say.register
-def _(found: NoSolution) -> str:
+@says("no_solution")
+def _(found: Finding) -> str:
     if len(found.unsolved) == 1:
         return say(found.unsolved[0])
     faults = list(dict.fromkeys(say(part.why) for part in found.unsolved))
@@ -298,28 +281,28 @@ def _of_side(found: Unsolved) -> str:
     return joined((side, say(found.why)), ", ")
 
 
-@say.register
-def _(found: AllOutsideLimits) -> str:
+@says("all_outside_limits")
+def _(found: Finding) -> str:
     label, reason = branch_word(found.label, found.branch), say(found.exceeded)
     if found.count == 1:
         return say_as(found, "one", branch=label, reason=reason)
     return say_as(found, "several", branch=label, reason=reason)
 
 
-@say.register
-def _(found: Measure) -> str:
+@says("measure")
+def _(found: Finding) -> str:
     rule = word("rule", RULE_NAMES, found.rule)
     return f"{rule} {as_text(found.value, '.3g')} {found.unit}".removesuffix(" 1")
 
 
-@say.register
-def _(found: Placed) -> str:
+@says("placed")
+def _(found: Finding) -> str:
     measures = joined(listed(found.measures), ", ")
     return say_as(found, measures=measures)
 
 
-@say.register
-def _(found: BestByRules) -> str:
+@says("best_by_rules")
+def _(found: Finding) -> str:
     measures = joined(listed(found.measures), ", ")
     if not found.next_best:
         return say_as(found, "only", measures=measures)

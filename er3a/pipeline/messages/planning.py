@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, tr
-from er3a.pipeline.messages.say import by, joined, listed, say, say_as, sentence, texts
+from er3a.pipeline.messages.say import by, joined, listed, say, say_as, says, sentence, texts
 from er3a.planning.motion_faults import (
     AccelerationTooGreat,
     AccelerationTooGreatIfAssumed,
     JerkTooGreat,
     NeededAcceleration,
-    PathOutOfReach,
     RateCause,
     TooFast,
     TooFastIfAssumed,
@@ -153,6 +153,6 @@ def times_needed(ratio: float, *, acceleration: bool) -> str:
     return sentence("times_needed#acceleration" if acceleration else "times_needed#speed", times=times)
 
 
-@say.register
-def _(found: PathOutOfReach) -> str:
+@says("out_of_reach")
+def _(found: Finding) -> str:
     return joined(listed(found.reasons))

@@ -9,25 +9,30 @@ from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
+from er3a.finding import AnyFinding, Finding, is_one
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed, unit_of
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.programs.model import FindingAt, ProgramCounts, ProgramSummary
-from er3a.planning.motion_faults import AboveLimit, AccelerationTooGreat, BelowLimit, TooFast, TooFastIfAssumed
-from er3a.program_check import program_check_findings as found_in
-from er3a.program_check.program_check_findings import (
-    RANKS,
-    CheckFinding,
-    Level,
-    MeetsSingularity,
-    MotionCollides,
-    NotFollowedReason,
-    PassesSingularity,
+from er3a.pipeline.messages.say import (
+    Maker,
+    Plural,
+    by,
+    by_code,
+    joined,
+    listed,
+    say,
+    say_as,
+    says,
+    sentence,
+    texts,
+    word,
 )
-from er3a.programs import program_findings as text
+from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
+from er3a.planning.motion_faults import AccelerationTooGreat, TooFast, TooFastIfAssumed
+from er3a.program_check import program_check_findings as found_in
+from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, MotionCollides, NotFollowedReason
 from er3a.programs.program_names import ProgramOutcome
 
 LEVELS: dict[Level, str] = {
@@ -287,8 +292,8 @@ TEXTS = texts(
 )
 
 
-@say.register
-def _(found: ProgramCounts) -> str:
+@says("programs.pass", "programs.caution", "programs.fail")
+def _(found: Finding) -> str:
     passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
     others = []
@@ -311,34 +316,34 @@ def level_word(level: Level) -> str:
     return word("program_level", LEVELS, level)
 
 
-@say.register
-def _(found: found_in.NotFollowed) -> str:
+@says("not_followed")
+def _(found: Finding) -> str:
     reason = word("target_reason", REASONS, found.reason)
     if not found.text:
         return sentence("not_followed.course", reason=reason)
     return say_as(found, reason=reason)
 
 
-@say.register
-def _(found: found_in.StretchOutOfReach) -> str:
+@says("way_out_of_reach")
+def _(found: Finding) -> str:
     return say_as(found, reasons=joined(listed(found.reasons)))
 
 
-@say.register
-def _(found: found_in.ConfigurationEnds | found_in.ArrivesOtherwise) -> str:
+@says("configuration_ends", "arrives_otherwise")
+def _(found: Finding) -> str:
     return say_as(found, unit=unit_of(found.slides))
 
 
-@say.register
-def _(found: found_in.MeetsSingularity) -> str:
+@says("meets_singularity")
+def _(found: Finding) -> str:
     parts = {"type": singularity_word(found.type), "at": found.at_mm}
     if found.bounded:
         return sentence("meets_singularity.bounded", **parts)
     return say_as(found, **parts)
 
 
-@say.register
-def _(found: found_in.PassesSingularity) -> str:
+@says("passes_singularity")
+def _(found: Finding) -> str:
     parts = {"type": singularity_word(found.type), "at": found.at_mm, "distance": found.distance}
     if found.type == "shoulder":
         return sentence("passes_singularity.mm", **parts)
@@ -353,8 +358,8 @@ def _(found: found_in.MotionCollides) -> str:
     return sentence("motion_collides.assumed", **parts) if found.assumed else say_as(found, **parts)
 
 
-@say.register
-def _(found: found_in.ZoneCollides) -> str:
+@says("zone_collides")
+def _(found: Finding) -> str:
     code = "zone_collides.assumed" if found.assumed else "zone_collides"
     return sentence(code, pair=say(found.pair), depth_mm=found.depth_mm)
 
@@ -371,8 +376,8 @@ def _(found: found_in.BodiesTouch) -> str:
     return sentence("bodies_touch.enlarged", touch=touch, enlarged_mm=found.enlarged_mm)
 
 
-@say.register
-def _(found: found_in.SpeedNotGiven) -> str:
+@says("speed_not_given")
+def _(found: Finding) -> str:
     if found.word:
         assumed = f"{100 * found.assumed:g} %" if found.unit == "share" else f"{found.assumed:g} m/s"
         return sentence("speed_not_given.word", word=found.word, assumed=assumed)
@@ -381,35 +386,41 @@ def _(found: found_in.SpeedNotGiven) -> str:
     return say_as(found)
 
 
-@say.register
-def _(found: text.ArcsSplit) -> str:
+@says("written_arcs_split")
+def _(found: Finding) -> str:
     return say_as(found, deviation=found.deviation_m * 1000)
 
 
-@say.register
-def _(found: text.WrittenUnsafe) -> str:
+@says("written_unsafe")
+def _(found: Finding) -> str:
     return say_as(found, verdict=outcome_word(found.verdict))
+
+
+ADVISED: dict[str, Maker] = {}
+advises = by_code(ADVISED)
 
 
 @singledispatch
 def remedy(finding: Any) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
+    if maker := ADVISED.get(finding.code):
+        return maker(finding)
     return word("remedy", REMEDIES, finding.code) if finding.code in REMEDIES else ""
 
 
-@remedy.register
-def _(found: found_in.NotFollowed) -> str:
+@advises("not_followed")
+def _(found: Finding) -> str:
     return word("remedy", NOT_FOLLOWED, found.reason) if found.reason in NOT_FOLLOWED else tr(OTHERWISE)
 
 
-@remedy.register
-def _(found: MeetsSingularity | PassesSingularity) -> str:
+@advises("meets_singularity", "passes_singularity")
+def _(found: Finding) -> str:
     return word("remedy", SINGULAR, found.type)
 
 
-@remedy.register
-def _(found: AboveLimit | BelowLimit) -> str:
-    side = "above" if isinstance(found, AboveLimit) else "below"
+@advises("above_limit", "below_limit")
+def _(found: Finding) -> str:
+    side = "above" if is_one(found, "above_limit") else "below"
     return sentence(f"remedy.limit#{side}", joint=found.joint, limit=found.limit_deg, unit=tr("deg"))
 
 
@@ -434,8 +445,8 @@ def _(found: AccelerationTooGreat) -> str:
     return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / found.ratio) / 10)
 
 
-@remedy.register
-def _(found: found_in.ZoneTooLarge) -> str:
+@advises("zone_too_large")
+def _(found: Finding) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
@@ -452,7 +463,7 @@ def rates_text(paces: Sequence[Pace]) -> str:
     return sentence("programs.rates", worst=(rate_needed(worst),), **parts)
 
 
-def singular_cause(found: MeetsSingularity | PassesSingularity) -> str:
+def singular_cause(found: AnyFinding) -> str:
     """That a line comes to a singular pose, and how the arm stands there."""
     return sentence("programs.cause", finding=found, pose=singular_pose(found.type))
 

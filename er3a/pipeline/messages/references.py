@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from er3a.identifiability.proposals import LookAtMotion, MeasureAngle, MeasureLength
-from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, own_title, tr
-from er3a.pipeline.messages.say import by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import by, joined, say, say_as, says, sentence, texts, word
 from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete
 
@@ -216,8 +215,8 @@ def _with_coordinate(vector: str, coordinate: str | None) -> str:
     return sentence("coordinate_of", vector=vector, coordinate=LABELS.get(coordinate, coordinate))
 
 
-@say.register
-def _(found: LookAtMotion) -> str:
+@says("look_at_motion")
+def _(found: Finding) -> str:
     motion = motion_seen(subjects.MotionOfJoint(found.joint, found.point, found.seen))
     if not any(found.pose_deg):
         return say_as(found, motion=motion)
@@ -225,28 +224,28 @@ def _(found: LookAtMotion) -> str:
     return sentence("look_at_motion_from", joint=found.joint, own_pose=pose, motion=motion)
 
 
-@say.register
-def _(found: MeasureAngle) -> str:
+@says("measure_angle")
+def _(found: Finding) -> str:
     return _measurement(found, found.half_width_deg)
 
 
-@say.register
-def _(found: MeasureLength) -> str:
+@says("measure_length")
+def _(found: Finding) -> str:
     return _measurement(found, found.half_width_mm)
 
 
-def _measurement(found: MeasureAngle | MeasureLength, half_width: float) -> str:
+def _measurement(found: Finding, half_width: float) -> str:
     return say_as(found, found.column, own_entry=found.entry, before=found.joint - 1, half_width=half_width)
 
 
-@say.register
-def _(found: InconsistentWithOwnText) -> str:
+@says("inconsistent_with_own_text")
+def _(found: Finding) -> str:
     against = tuple(map(own_title, found.against))
     if found.entry is None:
         return sentence("inconsistent_unexplained", own_documents=joined(against))
     return say_as(found, against=against, unit=tr(found.unit))
 
 
-@say.register
-def _(found: NotTheRobotDescribed) -> str:
+@says("not_the_robot_described")
+def _(found: Finding) -> str:
     return say_as(found, against=tuple(map(own_title, found.against)))

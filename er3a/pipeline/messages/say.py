@@ -25,12 +25,13 @@ Views and the command line import the modules whose findings they show.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import Any, Literal, TypeVar
 
-from er3a.by_value import Finding
+from er3a.finding import Amount, AnyFinding
+from er3a.finding import Finding as Found
 from er3a.pipeline import language
 
 KeyT = TypeVar("KeyT", bound=str)
@@ -57,6 +58,9 @@ class By:
 LONGEST, EXCERPT = 2_000, 200  # letters
 Text = str | Plural
 _texts: dict[str, Text] = {}
+Maker = Callable[[Found], str]
+MAKERS: dict[str, Maker] = {}
+"""What makes the texts of findings, by their codes, where a text alone can't."""
 _fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
 
 
@@ -104,8 +108,38 @@ def english(key: str) -> tuple[str, ...]:
 @singledispatch
 def say(finding: Any) -> str:
     """A finding as a text in the language in use, by its code; functions for types are registered with it."""
+    if maker := MAKERS.get(finding.code):
+        return maker(finding)
     field = _fields.get(finding.code)
-    return say_as(finding, str(getattr(finding, field)).lower() if field else "")
+    return say_as(finding, str(_params(finding)[field]).lower() if field else "")
+
+
+def by_code(makers: dict[str, Maker]) -> Callable[..., Callable[[Maker], Maker]]:
+    """What has functions make texts of findings, where a text alone can't.
+
+    Parameters
+    ----------
+    makers : by the finding's code; a function decorated with ``@...("code", ...)`` is added
+    """
+
+    def of(*codes: str) -> Callable[[Maker], Maker]:
+        def known(maker: Maker) -> Maker:
+            makers.update(dict.fromkeys(codes, maker))
+            return maker
+
+        return known
+
+    return of
+
+
+says = by_code(MAKERS)
+"""Has a function make the texts of findings with these codes."""
+
+
+def _params(finding: Any) -> Mapping[str, Any]:
+    if isinstance(finding, Found):
+        return finding.params
+    return {name: getattr(finding, name) for name in finding.__dataclass_fields__}
 
 
 def excerpt(text: str) -> str:
@@ -113,10 +147,9 @@ def excerpt(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:EXCERPT]} …"
 
 
-def say_as(finding: Finding, variant: str = "", /, **parts: Any) -> str:
+def say_as(finding: AnyFinding, variant: str = "", /, **parts: Any) -> str:
     """A finding as one of its texts, with parts besides its own fields or in place of them."""
-    fields = {name: getattr(finding, name) for name in finding.__dataclass_fields__}
-    return sentence(f"{finding.code}#{variant}" if variant else finding.code, **fields | parts)
+    return sentence(f"{finding.code}#{variant}" if variant else finding.code, **{**_params(finding), **parts})
 
 
 def sentence(key: str, /, **parts: Any) -> str:
@@ -139,6 +172,8 @@ def _as_text(part: Any, spec: str) -> str:
         return joined([_as_text(each, "") for each in part], spec or "; ")
     if hasattr(part, "code"):
         return say(part)
+    if isinstance(part, Amount):
+        return language.with_unit(language.as_text(part.value, spec), part.unit)
     return language.as_text(excerpt(part) if isinstance(part, str) else part, spec)
 
 
@@ -147,12 +182,12 @@ def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
     return language.translated(code, words[key]) if key in words else key
 
 
-def listed(findings: Iterable[Finding]) -> list[str]:
+def listed(findings: Iterable[AnyFinding]) -> list[str]:
     """Each finding's text."""
     return [say(finding) for finding in findings]
 
 
-def say_all(findings: Iterable[Finding]) -> str:
+def say_all(findings: Iterable[AnyFinding]) -> str:
     """Findings, each a sentence, one after the other."""
     return joined(listed(findings), " ")
 
@@ -165,7 +200,9 @@ def bracketed(text: str, more: str) -> str:
 def say_first(finding: Any) -> str:
     """A finding with the first of the reasons that it names, and of the bodies that touch the first and the deepest."""
     if reasons := getattr(finding, "reasons", ()):
-        return say(replace(finding, reasons=reasons[:1]))
+        return say(
+            finding.but(reasons=reasons[:1]) if isinstance(finding, Found) else replace(finding, reasons=reasons[:1])
+        )
     if touches := getattr(finding, "touches", ()):
         deepest = max(touches, key=lambda each: each.depth_mm)
         return say(replace(finding, touches=tuple(dict.fromkeys((touches[0], deepest)))))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from er3a.by_value import Finding
 from er3a.collision.pairs import BASE, link_label
+from er3a.finding import AnyFinding
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
@@ -178,7 +178,7 @@ def never_text(stage: str) -> str:
     return sentence(key) if (key := f"never.{stage}") in TEXTS else ""
 
 
-def say_reserved(finding: Finding, assumed: Iterable[Open]) -> str:
+def say_reserved(finding: AnyFinding, assumed: Iterable[Open]) -> str:
     """A verdict's finding, and what it is not to be taken for where its stage assumed something."""
     reserved = any(each.reason in RESERVED.get(finding.code, ()) for each in assumed)
     return joined([say(finding), sentence(f"reserved.{finding.code}") if reserved else ""], " ")

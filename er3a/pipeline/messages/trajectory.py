@@ -8,13 +8,14 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid, ShapesAssumed
+from er3a.collision.pairs import LinkAndSolid
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.planning import rate_needed
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, says, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import JerkTooGreat, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
@@ -224,8 +225,8 @@ TEXTS = texts(
 )
 
 
-@say.register
-def _(found: model.PathCounts) -> str:
+@says("trajectory.safe", "trajectory.some_unsafe", "trajectory.none_safe")
+def _(found: Finding) -> str:
     unsafe: dict[PathVerdict, tuple[str, ...]] = {
         "unreachable": found.unreachable,
         "none found": found.none_found,
@@ -528,7 +529,7 @@ def advice(
     path: model.PathSummary,
     limits: model.LimitsUsed | None = None,
     *,
-    shapes: ShapesAssumed | None = None,
+    shapes: Finding | None = None,
     slowed: Slowed | None = None,
 ) -> str | None:
     """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
@@ -558,7 +559,7 @@ def no_repair(path: model.PathSummary) -> str:
     return _within_reach(path) or sentence("advice.none", why=why)
 
 
-def _of_end(path: model.PathSummary, shapes: ShapesAssumed | None) -> str:
+def _of_end(path: model.PathSummary, shapes: Finding | None) -> str:
     """That the clearance up to where a path may be run is that of assumed shapes; empty where none is named."""
     end, last = path.sound_end, path.clear_until
     if end is None or last is None or end.t_s < last.t_s or path.unreachable:
@@ -566,7 +567,7 @@ def _of_end(path: model.PathSummary, shapes: ShapesAssumed | None) -> str:
     return _of_assumed(last.margin_mm, shapes)
 
 
-def _of_assumed(clearance_mm: float, shapes: ShapesAssumed | None) -> str:
+def _of_assumed(clearance_mm: float, shapes: Finding | None) -> str:
     """That a clearance is that of assumed shapes, and whether these may be wrong by more; empty where none are."""
     if shapes is None:
         return ""
@@ -584,7 +585,7 @@ def _until(path: model.PathSummary) -> str:
     return sentence("advice.sound", t=end.t_s, **_end(end))
 
 
-def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: ShapesAssumed | None) -> str:
+def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: Finding | None) -> str:
     """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured, of
     assumed ``shapes`` or of given ones; that first, where assumed ones may be wrong by more."""
     last = path.clear_until
@@ -654,7 +655,7 @@ def repair_text(
     path: model.PathSummary,
     limits: model.LimitsUsed | None = None,
     *,
-    shapes: ShapesAssumed | None = None,
+    shapes: Finding | None = None,
     slowed: Slowed | None = None,
 ) -> str:
     """All that is said of the strategy that was chosen; arguments as of :func:`advice`."""
@@ -697,7 +698,7 @@ def _clearance_kept(motion: model.StrategyMotion) -> float | None:
 
 
 def repair_facts(
-    path: model.PathSummary, limits: model.LimitsUsed | None, shapes: ShapesAssumed | None
+    path: model.PathSummary, limits: model.LimitsUsed | None, shapes: Finding | None
 ) -> list[tuple[FactName, str]]:
     """What else is said of the strategy that was chosen, and what it takes of ``limits`` that are assumed."""
     tried, motion = _chosen(path)

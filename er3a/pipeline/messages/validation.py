@@ -7,25 +7,22 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.diagnosis.faults import CountedFromGround, ReversedDirection, WrongOffset
+from er3a.finding import Finding, is_one
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.language import N_, as_text, distinct, own_title, tr, with_unit
 from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
-from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, sentence, texts, word
+from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
-    Claims,
     Confirmed,
     Contradicted,
-    Contradiction,
     DefinedOtherwise,
     JudgedTable,
     LeftOpen,
     ModelUnsound,
-    NamedPose,
     NothingToCompare,
     PartFound,
     SelfCheck,
@@ -226,8 +223,8 @@ def counted_checks(counts: CheckCounts) -> str:
     )
 
 
-@say.register
-def _(found: Claims) -> str:
+@says("claims")
+def _(found: Finding) -> str:
     return say_as(found, "some" if found.failed else "all")
 
 
@@ -345,7 +342,7 @@ def shortened(names: Sequence[str]) -> str:
     return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
 
 
-def _contradiction(found: Contradiction | None) -> list[str]:
+def _contradiction(found: Finding | None) -> list[str]:
     return [say(found)] if found else []
 
 
@@ -371,7 +368,7 @@ def _(found: Contradicted) -> str:
 @say.register
 def _(found: DefinedOtherwise) -> str:
     faults = found.diagnosis.faults if found.diagnosis else ()
-    joints = any(isinstance(fault, WrongOffset | ReversedDirection | CountedFromGround) for fault in faults)
+    joints = any(is_one(fault, "wrong_offset", "reversed_direction", "counted_from_ground") for fault in faults)
     head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
     meaning = say_as(found, "joints" if joints else "places")
     return joined([head, say(found.diagnosis) if found.diagnosis else "", meaning, *_of_claims(found)], " ")
@@ -389,15 +386,15 @@ def _(found: AnotherArm) -> str:
     return joined(sentences, " ")
 
 
-@say.register
-def _(found: Contradiction) -> str:
+@says("contradiction")
+def _(found: Finding) -> str:
     stated = stated_text(found)
     if not found.more:
         return say_as(found, "one", stated=stated)
     return say_as(found, "more", stated=stated)
 
 
-def stated_text(found: Contradiction) -> str:
+def stated_text(found: Finding) -> str:
     """The values that references state about one number."""
     return _chained("or", [with_unit(value, found.unit) for value in distinct(found.stated)])
 
@@ -431,8 +428,8 @@ def _chained(link: str, words: Sequence[str]) -> str:
     return sentence(f"chain#{link}", value=words[0], values=_chained(link, words[1:]))
 
 
-@say.register
-def _(found: NamedPose) -> str:
+@says("named_pose")
+def _(found: Finding) -> str:
     return own_title(found.name)
 
 

@@ -10,29 +10,13 @@ import numpy as np
 import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.planning  # noqa: F401
+from er3a.finding import Finding
 from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.language import N_, as_text
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, sentence, texts, word
-from er3a.pipeline.stages.vision.model import (
-    GraspCounts,
-)
-from er3a.vision.boards import AmbiguousTilt, BoardlessImage
-from er3a.vision.grasping import (
-    GraspCollides,
-    GraspUnlikely,
-    LineLeaves,
-    LineUnproven,
-    PathCollides,
-)
+from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, says, sentence, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
-from er3a.vision.vision_findings import (
-    Convention,
-    OtherConvention,
-    ParallelTurns,
-    RotationMismatch,
-    Suspect,
-)
+from er3a.vision.vision_findings import Convention, Suspect
 
 PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 MENDING = {
@@ -216,8 +200,8 @@ TEXTS = texts(
 )
 
 
-@say.register
-def _(found: GraspCounts) -> str:
+@says("grasp_counts")
+def _(found: Finding) -> str:
     grasped = say_as(found, "grasped", count=found.objects)
     percent = None if found.probability is None else math.floor(1000 * found.probability) / 10
     success = "" if percent is None else say_as(found, "success", percent=percent)
@@ -237,43 +221,43 @@ def _(found: GraspCounts) -> str:
     return joined([sentence("finding", finding=joined(sentences)), simulated], " ")
 
 
-@say.register
-def _(found: GraspUnlikely) -> str:
+@says("grasp_unlikely")
+def _(found: Finding) -> str:
     return say_as(found, p=100 * found.probability, level=100 * found.needed)
 
 
-@say.register
-def _(found: GraspCollides) -> str:
+@says("grasp_collides")
+def _(found: Finding) -> str:
     if found.clearance_mm < 0:
         return say_as(found, "overlap", depth=-found.clearance_mm)
     return say_as(found, "apart")
 
 
-@say.register
-def _(found: LineLeaves | LineUnproven) -> str:
+@says("line_leaves", "line_unproven")
+def _(found: Finding) -> str:
     return say_as(found, part=word("vision.part", PARTS, found.part))
 
 
-@say.register
-def _(found: PathCollides) -> str:
+@says("way_collides")
+def _(found: Finding) -> str:
     if found.clearance_mm < 0:
         return say_as(found, "overlap", part=word("vision.part", PARTS, found.part), depth=-found.clearance_mm)
     return say_as(found, "apart", part=word("vision.part", PARTS, found.part))
 
 
-@say.register
-def _(found: RotationMismatch) -> str:
+@says("rotation_mismatch")
+def _(found: Finding) -> str:
     return say_as(found, kind=word("vision.mending", MENDING, found.kind))
 
 
-@say.register
-def _(found: OtherConvention) -> str:
+@says("other_convention")
+def _(found: Finding) -> str:
     stream = word("vision.stream", STREAMS, found.stream)
     return say_as(found, stream=stream, convention=word("vision.convention", CONVENTIONS, found.convention))
 
 
-@say.register
-def _(found: ParallelTurns) -> str:
+@says("parallel_axes")
+def _(found: Finding) -> str:
     return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
 
 
@@ -283,7 +267,7 @@ def pose_words(setup: str) -> tuple[str, str]:
     return word("vision.pose", {"pose": first}, "pose"), word("vision.pose", {"pose": second}, "pose")
 
 
-def hand_eye_lines(found: HandEye, boardless: Sequence[BoardlessImage] = ()) -> str:
+def hand_eye_lines(found: HandEye, boardless: Sequence[Finding] = ()) -> str:
     """A calibration as lines of text for a terminal; ``boardless``: images that it leaves out."""
     spread, turned = spread_of(found)
     about = {"roll": "x", "pitch": "y", "yaw": "z"}
@@ -319,15 +303,15 @@ def hand_eye_lines(found: HandEye, boardless: Sequence[BoardlessImage] = ()) -> 
 
 def hand_eye_record(
     found: HandEye,
-    boardless: Sequence[BoardlessImage] = (),
-    open_tilts: Sequence[AmbiguousTilt] = (),
+    boardless: Sequence[Finding] = (),
+    open_tilts: Sequence[Finding] = (),
 ) -> dict[str, object]:
     """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg.
 
     ``boardless``: images that it leaves out; ``open_tilts``: those that leave open which way the board is tilted.
     """
 
-    def named(findings: Sequence[Suspect | BoardlessImage | AmbiguousTilt]) -> list[dict[str, str]]:
+    def named(findings: Sequence[Suspect | Finding]) -> list[dict[str, str]]:
         return [{"code": each.code, "sample": each.sample, "text": say(each)} for each in findings]
 
     def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:

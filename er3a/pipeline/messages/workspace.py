@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import Plural, joined, say, say_as, sentence, texts
+from er3a.pipeline.messages.say import Plural, joined, say, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
 from er3a.workspace.causes import (
@@ -198,8 +199,8 @@ def entry_word(change: SingleChange) -> str:
     return tr(ENTRIES[change.column], joint=change.joint)
 
 
-@say.register
-def _(found: model.VoidAtShoulder) -> str:
+@says("workspace.void_at_shoulder")
+def _(found: Finding) -> str:
     return say_as(found, **_place(found))
 
 
@@ -210,7 +211,7 @@ def _advice(cause: VoidCause) -> str:
     return sentence("void_advice#cause", cause=say(cause))
 
 
-def _place(found: model.VoidUnexpected | model.VoidAtShoulder) -> dict[str, str]:
+def _place(found: model.VoidUnexpected | Finding) -> dict[str, str]:
     shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
     return {"litres": at_least(found.litres, "L")} | {
         key: str(round(value)).replace("-", "−") for key, value in shown.items()
@@ -275,8 +276,8 @@ def _sum_extended(limit: Relaxed, shown: dict[str, int | str]) -> str:
     return sentence("limit_extended#sum_lower_deg", **shown)
 
 
-@say.register
-def _(found: model.CapabilityMissing) -> str:
+@says("workspace.capability_missing")
+def _(found: Finding) -> str:
     return say(found.lacks)
 
 
@@ -320,14 +321,14 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     larger open pocket. Empty where voids were not judged. ``confirmed``: whether independent documents settle the
     joints' limits."""
     finding = summary.verdict.finding
-    if isinstance(finding, model.NoVoid):
+    if is_one(finding, "workspace.no_void"):
         return joined([sentence("void.none"), say(finding)], " "), ""
-    if not isinstance(summary, model.WorkspaceSummary) or not isinstance(
-        finding, model.VoidAtShoulder | model.VoidUnexpected
+    if not isinstance(summary, model.WorkspaceSummary) or not (
+        is_one(finding, "workspace.void_at_shoulder") or isinstance(finding, model.VoidUnexpected)
     ):
         return "", ""
     voids, judged = summary.enclosed_voids, judged_void(summary)
-    normal = isinstance(finding, model.VoidAtShoulder)
+    normal = is_one(finding, "workspace.void_at_shoulder")
     where = "void.shoulder" if judged.holds_shoulder else "void.away"
     means = "void.normal" if normal else "void.not_normal"
     lead = joined([sentence(where, **_void_parts(judged)), sentence(means)], " ")

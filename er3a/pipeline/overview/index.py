@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -412,9 +412,7 @@ def _entry(
         "rates": rates,
         "box": joined([_without_box(), placed.compared], " ") if placed else "",
         "in_box": placed.met if placed else {},
-        "shapes": next(
-            (say(replace(shapes, near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""
-        ),
+        "shapes": next((say(shapes.but(near=())) for shapes in (head.shapes for head in heads.values()) if shapes), ""),
         "next": next_step(
             name,
             table,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from typing import Protocol
 
-from er3a.by_value import Finding
+from er3a.finding import Finding, fact
 from er3a.kinematics.solutions import TargetOutcome
 from er3a.pipeline.results import Status
 from er3a.planning.names import PathVerdict
@@ -13,29 +13,6 @@ from er3a.programs.program_names import ProgramOutcome
 from er3a.vision.vision_findings import GraspOutcome
 
 Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome
-
-
-class UnmetExpectation(Finding):
-    """Something came to another end than the file expects, or to more."""
-
-    name: str
-    expected: tuple[Outcome, ...]
-    found: tuple[Outcome, ...]
-
-
-class Demonstration(Finding):
-    """A target, a path or an object that fails as it is meant to: all that it came to, the first first."""
-
-    name: str
-    found: tuple[Outcome, ...]
-
-
-class ExpectationsUnmet(Finding):
-    """Of so many expectations these are not met; ``others``: of what expects nothing, what is not sound."""
-
-    expectations: int
-    unmet: tuple[UnmetExpectation, ...]
-    others: tuple[Demonstration, ...] = ()
 
 
 class Judged(Protocol):
@@ -104,7 +81,7 @@ def is_met(judged: Judged) -> bool:
     return set(expected_of(judged)) == set(came_to(judged))
 
 
-def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -> ExpectationsUnmet | None:
+def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -> Finding | None:
     """The expectations that are not met.
 
     Parameters
@@ -119,11 +96,15 @@ def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -
     all_judged = list(judged)
     expected = [each for each in all_judged if expected_of(each)]
     unmet = tuple(
-        UnmetExpectation(each.name, expected_of(each), came_to(each)) for each in expected if not is_met(each)
+        fact("unmet_expectation", name=each.name, expected=expected_of(each), found=came_to(each))
+        for each in expected
+        if not is_met(each)
     )
     rest = [each for each in all_judged if not expected_of(each)]
-    others = tuple(Demonstration(each.name, came_to(each)) for each in rest if sound and each.outcome != sound)
-    return ExpectationsUnmet(len(expected), unmet, others) if unmet else None
+    others = tuple(
+        fact("demonstration", name=each.name, found=came_to(each)) for each in rest if sound and each.outcome != sound
+    )
+    return fact("expectations_unmet", expectations=len(expected), unmet=unmet, others=others) if unmet else None
 
 
 def pass_of(asked: Collection[Judged]) -> Status:
@@ -140,7 +121,7 @@ def pass_of(asked: Collection[Judged]) -> Status:
     return "pass" if asked else "no_reference"
 
 
-def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstration, ...]:
+def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Finding, ...]:
     """What fails as it is meant to.
 
     Parameters
@@ -152,4 +133,8 @@ def demonstrations(judged: Iterable[Judged], sound: Outcome) -> tuple[Demonstrat
     -------
     found : with all that each came to
     """
-    return tuple(Demonstration(each.name, came_to(each)) for each in judged if is_met(each) and each.outcome != sound)
+    return tuple(
+        fact("demonstration", name=each.name, found=came_to(each))
+        for each in judged
+        if is_met(each) and each.outcome != sound
+    )

@@ -12,10 +12,10 @@ from typing import Any, Protocol
 
 from er3a.errors import Er3aError, InputError, ResultError, WriteError
 from er3a.files.units import noted_doubts
+from er3a.finding import fact
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
     AbsentResults,
-    NotComputed,
     Results,
     Stored,
     Summary,
@@ -98,7 +98,7 @@ def _computed(stage: Stage, study: Study, robot: str) -> Results[Any]:
     except Exception as error:  # a defect of one stage must not take the others with it; its trace goes to the log
         traceback.print_exc(file=sys.stderr)
         reason = f"{type(error).__name__}: {error}"
-    return AbsentResults(Summary(Verdict("not_computed", NotComputed(reason)), ()))
+    return AbsentResults(Summary(Verdict("not_computed", fact("stage.not_computed", reason=reason)), ()))
 
 
 def show(verb: str, name: str, study: Study, robot: str, folder: Path, output: Path) -> None:

@@ -10,12 +10,12 @@ import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
-from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
+from er3a.finding import fact
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
-from er3a.kinematics.wrist_partitioned import CoupledJoints, has_branches, wrist_partition_missing
+from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.kinematics import branch_word
@@ -352,7 +352,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
     ----------
     near : where the panel warns of a singularity
     """
-    missing = wrist_partition_missing(robot) or (None if robot.coupling is None else CoupledJoints())
+    missing = wrist_partition_missing(robot) or (None if robot.coupling is None else fact("coupled_joints"))
     thresholds = {kind: near.of(kind) for kind in TYPES}
     labels = [] if missing else [branch_word(label) for label in branch_labels(robot)]
     return {
@@ -388,7 +388,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
     shapes = shapes_assumed(robot, 0.0, {})
     return {
         "near": NEAR_TOUCH,
-        "unexamined": say(PairsUnexamined(left_out)) if left_out else None,
+        "unexamined": say(fact("pairs_unexamined", pairs=left_out)) if left_out else None,
         "assumed": say(shapes) if shapes else "",
         "allowed": [
             f"{body_word(row.first)} / {body_word(row.second)}" for row in found.matrix if row.state == "allowed"

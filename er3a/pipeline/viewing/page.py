@@ -24,9 +24,9 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from er3a.collision.pairs import ShapesAssumed
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
+from er3a.finding import Finding
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import (
@@ -250,9 +250,9 @@ class Head:
         return self.summary.verdict.finding
 
     @property
-    def shapes(self) -> ShapesAssumed | None:
+    def shapes(self) -> Finding | None:
         """On what assumed shapes of the arm the verdict rests."""
-        found: ShapesAssumed | None = self.summary.verdict.shapes
+        found: Finding | None = self.summary.verdict.shapes
         return found
 
     @property

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.finding import Finding
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
@@ -18,91 +18,10 @@ from er3a.planning.motion_faults import SingularEvent
 from er3a.planning.timing import JointLimits, NoTimeLaw, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
 
-
-class NothingToAvoid(Finding):
-    """The path can be reached, within the limits and away from singular poses, everywhere."""
-
-
-class NoSingularRegion(Finding):
-    """The path has no singular region to stop at, bend or go around."""
-
-
-class BeginsOutOfReach(Finding):
-    """The path begins out of reach."""
-
-
-class EndsOutOfReach(Finding):
-    """The path ends out of reach."""
-
-
-class PartlyOutOfReach(Finding):
-    """A part of the path is out of reach."""
-
-
-class BeginsInRegion(Finding):
-    """The path begins inside the singular region, where it can neither stop nor bend."""
-
-
-class EndsInRegion(Finding):
-    """The path ends inside the singular region, where it can't bend."""
-
-
-class BranchEnds(Finding):
-    """The branch in use ends, and no other continues it."""
-
-    t_s: float
-    joint: int
-
-
-class NoOtherBranch(Finding):
-    """The other branches are singular, beyond a limit or out of reach there too."""
-
-
-class NoShiftKeepsDistance(Finding):
-    """No shift of the tool point keeps the distance."""
-
-    up_to_mm: float
-
-
-class NoTiltKeepsDistance(Finding):
-    """No tilt of the tool keeps the distance."""
-
-    up_to_deg: float
-
-
-class BentPathSingular(Finding):
-    """The bent path runs into another singular region."""
-
-
-PathUnfit = NothingToAvoid | NoSingularRegion | BeginsOutOfReach | EndsOutOfReach | PartlyOutOfReach
-RegionUnfit = BeginsInRegion | EndsInRegion | BranchEnds | NoOtherBranch
-NoWay = NoShiftKeepsDistance | NoTiltKeepsDistance | BentPathSingular | NoTimeLaw
+PathUnfit = Finding
+RegionUnfit = Finding
+NoWay = Finding | NoTimeLaw
 NotPossible = PathUnfit | RegionUnfit | NoWay
-
-
-class PathNotFinished(Finding):
-    """Only a part of the path is done."""
-
-    done: float
-
-
-class EndsOffPath(Finding):
-    """The motion ends elsewhere than the path."""
-
-    distance_mm: float
-    angle_deg: float
-
-
-class SpeedExceeded(Finding):
-    """A joint needs so many times its maximum speed."""
-
-    ratio: float
-
-
-class AccelerationExceeded(Finding):
-    """A joint needs so many times its maximum acceleration."""
-
-    ratio: float
 
 
 AT_REST = 1e-6  # rad

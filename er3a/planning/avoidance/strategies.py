@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 
 from er3a.errors import PoseError
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import frame_along, moved
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward, frames
@@ -32,7 +33,7 @@ from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic
 from er3a.planning.timing import Timed, TimingError, joined, straight
 from er3a.planning.way_around import NoWayAround
-from er3a.robots.joint_limits import LimitsExceeded, limits_exceeded, within
+from er3a.robots.joint_limits import limits_exceeded, within
 
 Kind = Literal["shift", "tilt"]
 
@@ -162,11 +163,11 @@ def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoi
 
 def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance | avoidance.NotPossible:
     if not segment.regions:
-        return avoidance.NoSingularRegion()
+        return fact("no_singular_region")
     if segment.regions[0][0] == 0:
-        return avoidance.BeginsInRegion()
+        return fact("begins_in_region")
     if segment.regions[-1][1] == len(segment.t):
-        return avoidance.EndsInRegion()
+        return fact("ends_in_region")
     bends = [bends_of(segment, first, last, kind) for first, last in segment.regions]
     if not all(bends):
         return _none_far_enough(segment, kind)
@@ -180,7 +181,7 @@ def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance 
                 return avoidance.Avoidance(_carried_out(segment, other))
             fallback = fallback or other
     if fallback is None:
-        return avoidance.BentPathSingular()
+        return fact("bent_path_singular")
     return avoidance.Avoidance(_carried_out(segment, fallback))
 
 
@@ -319,8 +320,8 @@ def _smallest_bend(
 
 def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
     if kind == "shift":
-        return avoidance.NoShiftKeepsDistance(MAX_BEND["shift"] * characteristic_length(segment.robot) * 1000)
-    return avoidance.NoTiltKeepsDistance(float(np.degrees(MAX_BEND["tilt"])))
+        return fact("no_shift_keeps_distance", up_to_mm=MAX_BEND["shift"] * characteristic_length(segment.robot) * 1000)
+    return fact("no_tilt_keeps_distance", up_to_deg=float(np.degrees(MAX_BEND["tilt"])))
 
 
 def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
@@ -337,15 +338,15 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     found : the motion, which crosses the singular set by joint moves, or why there is none
     """
     if not segment.regions:
-        return avoidance.NoSingularRegion()
+        return fact("no_singular_region")
     count, at = len(segment.t), 0
     parts: list[Timed] = []
     for first, last in segment.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
         if np.isnan(segment.q[before, 0]):
-            return avoidance.BeginsOutOfReach()
+            return fact("begins_out_of_reach")
         if np.isnan(segment.q[after, 0]):
-            return avoidance.EndsOutOfReach()
+            return fact("ends_out_of_reach")
         if before > at:
             parts += [*(segment.begin() if at == 0 else []), segment.along(at, before)]
         leave = segment.q[before] if before > 0 else segment.first_joints
@@ -376,7 +377,7 @@ def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     """
     bad = ~(segment.good & within(segment.robot, segment.q))
     if not bad.any():
-        return avoidance.NothingToAvoid()
+        return fact("nothing_to_avoid")
     few = np.linspace(0.0, segment.followed.line.duration, COARSE)
     others = [_follow(segment, slot, few) for slot in range(SLOTS) if slot != segment.followed.slot[0]]
     begin = max(int(np.argmax(bad)) - 1, 0)
@@ -392,7 +393,7 @@ def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
             other = _follow(segment, slot, times)
             if other is not None and _keeps_clear(segment, other, segment.t[index]):
                 return _changed(segment, other, index, leave)
-    return avoidance.NoOtherBranch()
+    return fact("no_other_branch")
 
 
 def _follow(segment: avoidance.SingularSegment, slot: int, t: Reals) -> Followed | None:
@@ -430,10 +431,10 @@ def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
     found : the motion within the limits of speed and acceleration, or why there is none
     """
     if np.isnan(segment.q[:, 0]).any():
-        return avoidance.PartlyOutOfReach()
+        return fact("partly_out_of_reach")
     if segment.followed.jumps:
         jump = segment.followed.jumps[0]
-        return avoidance.BranchEnds(jump.t, jump.joint)
+        return fact("branch_ends", t_s=jump.t, joint=jump.joint)
     return avoidance.Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))
 
 
@@ -449,10 +450,10 @@ def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
     found : the motion to that pose with the share of the path done (0 to 1), or why there is none
     """
     if not segment.regions:
-        return avoidance.NoSingularRegion()
+        return fact("no_singular_region")
     last = segment.regions[0][0] - 1
     if last < 1:
-        return avoidance.BeginsInRegion()
+        return fact("begins_in_region")
     motion = joined([*segment.begin(), segment.along(0, last)])
     done = float(segment.followed.line.progress(segment.t[last])[0])
     return avoidance.Avoidance(motion, done, crosses_by_joints=True)
@@ -519,15 +520,7 @@ ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
-NotUsable = (
-    avoidance.NotPossible
-    | avoidance.PathNotFinished
-    | avoidance.EndsOffPath
-    | LimitsExceeded
-    | avoidance.SpeedExceeded
-    | avoidance.AccelerationExceeded
-    | NoWayAround
-)
+NotUsable = avoidance.NotPossible | Finding | NoWayAround
 
 
 @dataclass(frozen=True, eq=False)
@@ -627,16 +620,16 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))
     if found.done < 1.0:
-        reasons.append(avoidance.PathNotFinished(found.done))
+        reasons.append(fact("path_not_finished", done=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
-        reasons.append(avoidance.EndsOffPath(left * 1000, float(np.degrees(twisted))))
+        reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=float(np.degrees(twisted))))
     worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
     if exceeded := limits_exceeded(robot, motion.q[worst]):
         reasons.append(exceeded)
     if speed > 1 + OVER:
-        reasons.append(avoidance.SpeedExceeded(speed))
+        reasons.append(fact("speed_exceeded", ratio=speed))
     if acceleration > 1 + OVER:
-        reasons.append(avoidance.AccelerationExceeded(acceleration))
+        reasons.append(fact("acceleration_exceeded", ratio=acceleration))
     keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

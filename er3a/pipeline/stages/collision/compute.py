@@ -12,6 +12,7 @@ from er3a.collision.matrix import base_contacts
 from er3a.collision.pairs import Pair
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
@@ -26,13 +27,13 @@ from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import AllCollide, nearest
+from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
 
 
 def target_clearances(
     robot: Robot, bodies: Bodies, file: str
-) -> tuple[model.TargetClearances, list[model.Closest], tuple[model.CollidingTarget, ...]]:
+) -> tuple[model.TargetClearances, list[model.Closest], tuple[Finding, ...]]:
     """Clearance of the solutions of all targets.
 
     Parameters
@@ -73,9 +74,11 @@ def target_clearances(
         )
         choice = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
         chosen = choice.chosen
-        if isinstance(choice.reason, AllCollide):
+        if is_one(choice.reason, "all_collide"):
             expected = target.expect == "collides"
-            blocked.append(model.CollidingTarget(target.name, choice.reason.overlap.pair, expected))
+            blocked.append(
+                fact("colliding_target", name=target.name, pair=choice.reason.overlap.pair, expected=expected)
+            )
         if chosen is not None:
             at = int(np.flatnonzero(rows == chosen)[0])
             if pair[at] >= 0:
@@ -166,7 +169,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
-    wrong = model.ShapesOverlap(bodies.in_error, space.whole.value) if bodies.in_error else None
+    wrong = (
+        fact("collision.shapes_overlap", pairs=bodies.in_error, free_ratio=space.whole.value)
+        if bodies.in_error
+        else None
+    )
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     undecided = int((matrix.state == "undecided").sum())
@@ -221,21 +228,23 @@ def _home(bodies: Bodies) -> tuple[Reals, Pair | None, float]:
 
 def _colliding(
     motions: list[ListedMotion], on_paths: list[model.Closest], first_touch: dict[str, Pair]
-) -> tuple[model.CollidingPath, ...]:
+) -> tuple[Finding, ...]:
     """The paths on which something overlaps, with what touches first, and whether that is expected."""
     meant = {each.name for each in motions if "collides" in each.expected}
     return tuple(
-        model.CollidingPath(each.name, first_touch.get(each.name, each.between), each.name in meant)
+        fact(
+            "colliding_path", name=each.name, pair=first_touch.get(each.name, each.between), expected=each.name in meant
+        )
         for each in on_paths
         if each.clearance_mm < 0
     )
 
 
-def _nearest_target(closest: list[model.Closest]) -> model.NearestTarget | None:
+def _nearest_target(closest: list[model.Closest]) -> Finding | None:
     if not closest:
         return None
     least = min(closest, key=lambda each: each.clearance_mm)
-    return model.NearestTarget(least.name, least.clearance_mm, least.between)
+    return fact("nearest_target", name=least.name, clearance_mm=least.clearance_mm, pair=least.between)
 
 
 def _checked(study: Study, name: str, seen: Covered, motions: list[ListedMotion]) -> tuple[Coverage, ...]:
@@ -304,14 +313,16 @@ def _places_summary(places: free_space.ClearPlaces) -> model.PlacesSummary:
 def _verdict(
     pairs: model.PairShares,
     mounting: tuple[model.Mounting, ...],
-    wrong: model.ShapesOverlap | None,
+    wrong: Finding | None,
     found: model.FreeSpace,
     home: model.HomeCollides | None,
-) -> Verdict[model.NeverFree | model.ShapesOverlap | model.BaseInSolid | model.HomeCollides | model.FreeSpace]:
+) -> Verdict[Finding | model.HomeCollides | model.FreeSpace]:
     if pairs.always.any():
-        return Verdict("fail", model.NeverFree(tuple(pairs.between[pairs.always]), found.assumed))
+        return Verdict(
+            "fail", fact("collision.never_free", pairs=tuple(pairs.between[pairs.always]), assumed=found.assumed)
+        )
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
-        return Verdict("fail", model.BaseInSolid(inside))
+        return Verdict("fail", fact("collision.base_in_solid", solids=inside))
     if wrong:
         return Verdict("fail", wrong)
     blocked = not all(each.expected for each in found.blocked)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
+from er3a.finding import Finding
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -15,57 +16,7 @@ from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
 
-class NeverFree(Finding, code="collision.never_free"):
-    """Pairs that overlap in every joint vector within the limits, proven: the arm can't be used like this.
-
-    ``assumed``: whether the shapes are, so that nothing is proven of the arm itself.
-    """
-
-    pairs: tuple[Pair, ...]
-    assumed: bool
-
-
-class ShapesOverlap(Finding, code="collision.shapes_overlap"):
-    """Pairs whose shapes overlap in every joint vector for no reason; ``free_ratio``: of joint space, without them."""
-
-    pairs: tuple[Pair, ...]
-    free_ratio: float
-
-
-class BaseInSolid(Finding, code="collision.base_in_solid"):
-    """The base stands inside solids, in every pose."""
-
-    solids: tuple[str, ...]
-
-
-class NearestTarget(Finding):
-    """The target whose chosen solution is the nearest to anything."""
-
-    name: str
-    clearance_mm: float
-    pair: Pair
-
-
-class CollidingPath(Finding):
-    """A path on which two bodies overlap, the first to touch; ``expected``: whether its file expects that."""
-
-    name: str
-    pair: Pair
-    expected: bool = False
-
-
-class CollidingTarget(Finding):
-    """A target all of whose solutions within the limits collide, with the overlap of the one with the widest margin.
-
-    ``expected``: whether its file expects that.
-    """
-
-    name: str
-    pair: Pair
-    expected: bool = False
-
-
-class FreeSpace(Finding, code="collision.free_space"):
+class FreeSpace(Coded, code="collision.free_space"):
     """How much of joint space and of the reached places is free.
 
     Attributes
@@ -84,18 +35,18 @@ class FreeSpace(Finding, code="collision.free_space"):
     undecided: int
     assumed: bool = False
     targets: int = 0
-    nearest: NearestTarget | None = None
-    colliding: tuple[CollidingPath, ...] = ()
-    blocked: tuple[CollidingTarget, ...] = ()
+    nearest: Finding | None = None
+    colliding: tuple[Finding, ...] = ()
+    blocked: tuple[Finding, ...] = ()
 
     @property
-    def demonstrations(self) -> tuple[CollidingTarget | CollidingPath, ...]:
+    def demonstrations(self) -> tuple[Finding, ...]:
         """What collides as it is meant to."""
-        collide: tuple[CollidingTarget | CollidingPath, ...] = (*self.blocked, *self.colliding)
+        collide: tuple[Finding, ...] = (*self.blocked, *self.colliding)
         return tuple(each for each in collide if each.expected)
 
 
-class HomeCollides(Finding, code="collision.home_collides"):
+class HomeCollides(Coded, code="collision.home_collides"):
     """At home, all joints at 0 or as near to it as the limits allow, something overlaps; ``found``: what holds besides,
     but for what can be reached from there."""
 
@@ -104,7 +55,7 @@ class HomeCollides(Finding, code="collision.home_collides"):
     found: FreeSpace
 
     @property
-    def demonstrations(self) -> tuple[CollidingTarget | CollidingPath, ...]:
+    def demonstrations(self) -> tuple[Finding, ...]:
         """What collides as it is meant to."""
         return self.found.demonstrations
 
@@ -167,7 +118,7 @@ class CollisionSummary(Summary):
 
     needs = ("self_collision", "scene_collision", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[NeverFree | ShapesOverlap | BaseInSolid | HomeCollides | FreeSpace]
+    verdict: Verdict[Finding | HomeCollides | FreeSpace]
     scene: str | None
     samples: int
     of_itself: FreeShare

@@ -13,9 +13,10 @@ from er3a.collision.bodies import Bodies
 from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
-from er3a.dynamics.plausibility import MassFinding, MissingLink, has_mass, mass_findings
+from er3a.dynamics.plausibility import MassFinding, has_mass, mass_findings
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
@@ -38,7 +39,7 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
 
-DynamicsVerdict = Verdict[model.NoData | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
+DynamicsVerdict = Verdict[Finding | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
 
 
 def drive_uses(
@@ -74,7 +75,7 @@ def drive_uses(
     return tuple(found)
 
 
-def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[model.DataOpen, ...]:
+def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[Finding, ...]:
     """What the files leave open of masses, drives and wrist.
 
     Parameters
@@ -95,21 +96,27 @@ def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[model.DataOpe
         "friction": _open(drives.coulomb + drives.viscous),
     }
     found = [
-        model.DataOpen(what, () if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers)
+        fact(
+            "dynamics.unknown",
+            what=what,
+            numbers=() if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers,
+        )
         for what, numbers in open_joints.items()
         if numbers
     ]
     last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
     if wrist is None or not np.isfinite(wrist.payload):
-        found.append(model.DataOpen("payload"))
+        found.append(fact("dynamics.unknown", what="payload", numbers=()))
     asked: tuple[tuple[model.Need, set[int]], ...] = (
         ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
         ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
     )
-    found += [model.DataOpen(what, tuple(sorted(missing))) for what, missing in asked if missing]
+    found += [fact("dynamics.unknown", what=what, numbers=tuple(sorted(missing))) for what, missing in asked if missing]
     groups: tuple[tuple[model.Need, str], ...] = (("drives_guess", "drives"), ("wrist_guess", "wrist_load"))
-    found += [model.DataOpen(what) for what, group in groups if _is_guess(robot.sources.get(group))]
-    return (*found, *map(model.DataOpen, of_load))
+    found += [
+        fact("dynamics.unknown", what=what, numbers=()) for what, group in groups if _is_guess(robot.sources.get(group))
+    ]
+    return (*found, *(fact("dynamics.unknown", what=each, numbers=()) for each in of_load))
 
 
 def _is_guess(source: Source | LoadFields | None) -> bool:
@@ -155,7 +162,7 @@ def verdict_of(
     holding: tuple[model.HoldingTorque, ...],
     uses: tuple[model.Use, ...],
     findings: tuple[MassFinding, ...],
-    unknown: tuple[model.DataOpen, ...],
+    unknown: tuple[Finding, ...],
     masses: model.MassesUsed | None,
     *,
     skipped: tuple[str, ...] = (),
@@ -175,12 +182,12 @@ def verdict_of(
     verdict : fail if something is beyond its limit; no_reference if there is nothing to compare, or no limit to compare
         it with. It passes only if nothing that the files leave open could change that.
     """
-    missing = tuple(found.link for found in findings if isinstance(found, MissingLink))
+    missing = tuple(found.link for found in findings if is_one(found, "missing_link"))
     doubts = len(findings) - len(missing)
     shown = missing, doubts, None if masses is None or masses.grade in DOCUMENTED else masses.grade
     if not uses:
         if not holding:
-            return Verdict("no_reference", model.NoData(unknown))
+            return Verdict("no_reference", fact("dynamics.no_data", needs=unknown))
         return Verdict("no_reference", _no_limits([path.summary for path in paths], holding, *shown))
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
@@ -621,7 +628,7 @@ def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: Dyn
 
 def _assumed(
     robot: Robot,
-    unknown: tuple[model.DataOpen, ...],
+    unknown: tuple[Finding, ...],
 ) -> tuple[Open, ...]:
     """What the files leave open, and paths that count for nothing."""
     subjects: dict[model.Need, tuple[str, ...]] = {

@@ -10,9 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
@@ -35,13 +36,6 @@ Need = (
     | LoadPart
     | Guess
 )
-
-
-class DataOpen(Finding, code="dynamics.unknown"):
-    """Something that the files leave open, or guess, with the joints or links concerned; none: all."""
-
-    what: Need
-    numbers: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,13 +63,7 @@ class Use:
         return self.asked / self.allowed
 
 
-class NoData(Finding, code="dynamics.no_data"):
-    """Neither masses nor a load on a wrist with limits: nothing can be said."""
-
-    needs: tuple[DataOpen, ...]
-
-
-class NoLimits(Finding, code="dynamics.no_limits"):
+class NoLimits(Coded, code="dynamics.no_limits"):
     """Torques are known, and no limit that they could be compared with: the largest one.
 
     Attributes
@@ -123,15 +111,15 @@ class Compared:
     grade: Grade | None
 
 
-class AllWithin(Compared, Finding, code="dynamics.fits"):
+class AllWithin(Compared, Coded, code="dynamics.fits"):
     """All is within its limits, tolerances included."""
 
 
-class Marginal(Compared, Finding, code="dynamics.marginal"):
+class Marginal(Compared, Coded, code="dynamics.marginal"):
     """All is within the limits that are known: not with the tolerances of the masses, or not all was examined."""
 
 
-class Overload(Compared, Finding, code="dynamics.overload"):
+class Overload(Compared, Coded, code="dynamics.overload"):
     """Something is beyond its limit."""
 
 
@@ -343,11 +331,11 @@ class DynamicsSummary(Summary):
 
     needs = ("torque", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[NoData | NoLimits | AllWithin | Marginal | Overload]
+    verdict: Verdict[Finding | NoLimits | AllWithin | Marginal | Overload]
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]
-    unknown: tuple[DataOpen, ...]
+    unknown: tuple[Finding, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
     paths: tuple[PathLoad, ...]

@@ -9,10 +9,10 @@ import numpy as np
 import scipy
 
 from er3a.collision.along import bodies_of
-from er3a.collision.pairs import PairOverlaps
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
+from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.classes.chain_solvers import Unsolved
@@ -38,14 +38,14 @@ from er3a.pipeline.stages.covered import (
     gaps_in_solids,
     gaps_of_orientations,
 )
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
+from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import AllCollide, Choice, Refusal, nearest
+from er3a.selection.nearest import Choice, Refusal, nearest
 from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
 
@@ -91,10 +91,10 @@ def solve_target(
     if chosen is not None:
         advice = _what_to_know(robot, rows, chosen)
     else:
-        if isinstance(choice.reason, AllCollide):
-            obstacle = model.BranchesCollide(len(within))
+        if is_one(choice.reason, "all_collide"):
+            obstacle = fact("branches_collide", count=len(within))
             alone = scene is not None and _usable(robot, None, clearance)(solutions.q[solutions.within_limits]).any()
-            advice = (model.MoveObstacle(),) if alone else ()
+            advice = (fact("move_obstacle"),) if alone else ()
         else:
             obstacle = _obstacle(robot, target, len(found))
         if advise and has_branches(robot):
@@ -140,7 +140,7 @@ def collides(rows: model.SolutionRows) -> Flags:
     -------
     collides : (rows,); others may be refused for other reasons
     """
-    return np.array([isinstance(why, PairOverlaps) for why in rows.refusal], dtype=bool)
+    return np.array([is_one(why, "pair_overlaps") for why in rows.refusal], dtype=bool)
 
 
 def _rows(
@@ -200,23 +200,23 @@ def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
 def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
-        return model.BranchesLeaveLimits(branches)
+        return fact("branches_leave_limits", count=branches)
     if not has_branches(robot):
-        return model.NothingFound()
+        return fact("nothing_found")
     _, fault, gap = (batch[0] for batch in solve_slots(robot, target.T[None], target.q_ref[None]))
     smallest = int(gap.argmin())
     if fault[smallest] == ORIENTATION:
-        return model.TiltMissing(float(np.degrees(gap[smallest])))
-    return model.ReachMissing(float(gap[smallest] * 1000))
+        return fact("tilt_missing", angle_deg=float(np.degrees(gap[smallest])))
+    return fact("reach_missing", gap_mm=float(gap[smallest] * 1000))
 
 
 def _outcome(obstacle: model.Obstacle | None) -> TargetOutcome:
     match obstacle:
         case None:
             return "reached"
-        case model.BranchesLeaveLimits():
+        case Finding(code="branches_leave_limits"):
             return "leaves limits"
-        case model.BranchesCollide():
+        case Finding(code="branches_collide"):
             return "collides"
         case _:
             return "unreachable"
@@ -235,18 +235,32 @@ def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
 
 
 def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[model.Advice, ...]:
-    turn: model.Advice = model.TurningDoesNotHelp()
+    turn: model.Advice = fact("turning_does_not_help")
     if near.least_turn_deg is not None and near.turned_to_deg is not None:
-        kept = LITTLE_MARGIN_DEG, 1000 * clearance
-        turn = model.TurnTool(near.orientation_ratio, near.least_turn_deg, near.turned_to_deg, *kept)
-    shift: model.Advice = model.ShiftingDoesNotHelp()
+        turn = fact(
+            "turn_tool",
+            orientation_ratio=near.orientation_ratio,
+            least_turn_deg=near.least_turn_deg,
+            to_deg=near.turned_to_deg,
+            margin_deg=LITTLE_MARGIN_DEG,
+            clearance_mm=1000 * clearance,
+        )
+    shift: model.Advice = fact("shifting_does_not_help")
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
-        shift = model.ShiftTool(near.least_shift_mm, near.shifted_to_mm, LITTLE_MARGIN_DEG, 1000 * clearance)
+        shift = fact(
+            "shift_tool",
+            shift_mm=near.least_shift_mm,
+            to_mm=near.shifted_to_mm,
+            margin_deg=LITTLE_MARGIN_DEG,
+            clearance_mm=1000 * clearance,
+        )
     return turn, shift
 
 
 def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
-    found: list[model.Advice] = [model.AtSingularity(kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
+    found: list[model.Advice] = [
+        fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on
+    ]
     margin = float(rows.limit_margin_deg[chosen])
     near = model.NearEnd if robot.sliding.any() else model.NearLimit
     return (*found, near(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
@@ -459,23 +473,63 @@ def _is_certain(method: Method) -> bool:
 
 def _verdict(
     targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict[model.AllSolved | model.SomeUnsolved | model.NoneSolved | model.NotReproduced | ExpectationsUnmet]:
+) -> Verdict[Finding]:
     position, orientation = worst
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
-        return Verdict("fail", model.NotReproduced(position * 1000, float(np.degrees(orientation)), lost))
+        return Verdict(
+            "fail",
+            fact(
+                "inverse.not_reproduced", worst_mm=position * 1000, worst_deg=float(np.degrees(orientation)), lost=lost
+            ),
+        )
     if unmet := unmet_expectations(targets, "reached"):
         return Verdict("fail", unmet)
     shown = demonstrations(targets, "reached")
     asked = [target for target in targets if target.expect in (None, "reached")]
-    unsolved = tuple(model.UnsolvedTarget(target.name, target.obstacle) for target in asked if target.obstacle)
-    singular = tuple(each.name for each in asked if any(isinstance(it, model.AtSingularity) for it in each.advice))
+    unsolved = tuple(
+        fact("unsolved_target", name=target.name, obstacle=target.obstacle) for target in asked if target.obstacle
+    )
+    singular = tuple(each.name for each in asked if any(is_one(it, "at_singularity") for it in each.advice))
     count, solved = len(asked), len(asked) - len(unsolved)
     if not unsolved:
-        return Verdict(pass_of(asked), model.AllSolved(count, solved, unsolved, collisions, shown, singular))
+        return Verdict(
+            pass_of(asked),
+            fact(
+                "inverse.all_solved",
+                targets=count,
+                solved=solved,
+                unsolved=unsolved,
+                collisions=collisions,
+                demonstrations=shown,
+                singular=singular,
+            ),
+        )
     if not solved:
-        return Verdict("fail", model.NoneSolved(count, solved, unsolved, collisions, shown))
-    return Verdict("caution", model.SomeUnsolved(count, solved, unsolved, collisions, shown, singular))
+        return Verdict(
+            "fail",
+            fact(
+                "inverse.none_solved",
+                targets=count,
+                solved=solved,
+                unsolved=unsolved,
+                collisions=collisions,
+                demonstrations=shown,
+                singular=(),
+            ),
+        )
+    return Verdict(
+        "caution",
+        fact(
+            "inverse.some_unsolved",
+            targets=count,
+            solved=solved,
+            unsolved=unsolved,
+            collisions=collisions,
+            demonstrations=shown,
+            singular=singular,
+        ),
+    )
 
 
 def _figures(

@@ -8,92 +8,20 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
+from er3a.finding import Finding
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
 from er3a.selection.rule_names import RuleName
 
-
-class NothingFound(Finding):
-    """Iteration found no solution."""
+Obstacle = Finding
 
 
-class TiltMissing(Finding):
-    """The wrist would have to tilt further, by the branch that comes nearest."""
-
-    angle_deg: float
-
-
-class ReachMissing(Finding):
-    """The wrist centre is out of reach, of the branch that comes nearest."""
-
-    gap_mm: float
-
-
-class BranchesLeaveLimits(Finding):
-    """So many branches reach the target, all outside the limits."""
-
-    count: int
-
-
-class BranchesCollide(Finding):
-    """So many branches reach the target within the limits, and all collide."""
-
-    count: int
-
-
-Obstacle = NothingFound | TiltMissing | ReachMissing | BranchesLeaveLimits | BranchesCollide
-
-
-class TurnTool(Finding):
-    """Turning the tool helps: part of random orientations that have a solution, and the smallest turn found.
-
-    Attributes
-    ----------
-    to_deg : roll, pitch and yaw where it ends
-    margin_deg, clearance_mm : what the arm keeps there from the limits, and from what it may not touch
-    """
-
-    orientation_ratio: float
-    least_turn_deg: float
-    to_deg: tuple[float, float, float]
-    margin_deg: float
-    clearance_mm: float
-
-
-class TurningDoesNotHelp(Finding):
-    """No orientation tried at this position has a solution."""
-
-
-class ShiftTool(Finding):
-    """Moving the part or the base helps: the smallest shift of the tool found, and where it ends; see `TurnTool`."""
-
-    shift_mm: float
-    to_mm: tuple[float, float, float]
-    margin_deg: float
-    clearance_mm: float
-
-
-class ShiftingDoesNotHelp(Finding):
-    """No position tried has a solution with this orientation."""
-
-
-class MoveObstacle(Finding):
-    """Only what is around the arm is in the way: without it a solution keeps its margins."""
-
-
-class AtSingularity(Finding):
-    """The arm taken is at a singularity."""
-
-    kind: Literal["wrist", "elbow", "shoulder"]
-
-
-class NearLimit(Finding):
+class NearLimit(Coded):
     """A joint of the arm taken is near its limit."""
 
     margin_deg: float
@@ -103,53 +31,7 @@ class NearEnd(NearLimit):
     """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
 
 
-Advice = (
-    TurnTool | TurningDoesNotHelp | ShiftTool | ShiftingDoesNotHelp | MoveObstacle | AtSingularity | NearLimit | NearEnd
-)
-
-
-class UnsolvedTarget(Finding):
-    """A target without an admissible solution."""
-
-    name: str
-    obstacle: Obstacle
-
-
-class NotReproduced(Finding, code="inverse.not_reproduced"):
-    """The solver misses poses that it says it solves, or loses joint angles that made a pose."""
-
-    worst_mm: float
-    worst_deg: float
-    lost: int
-
-
-@dataclass(frozen=True)
-class TargetCounts:
-    """How many targets have an admissible solution, and which have none.
-
-    ``collisions``: a scene was given, so that the solutions touch nothing of it. The arm never touches itself.
-    ``demonstrations``, which are meant to have none, are not counted. ``singular``: targets whose chosen solution is at
-    a singularity.
-    """
-
-    targets: int
-    solved: int
-    unsolved: tuple[UnsolvedTarget, ...]
-    collisions: bool
-    demonstrations: tuple[Demonstration, ...]
-    singular: tuple[str, ...] = ()
-
-
-class AllSolved(TargetCounts, Finding, code="inverse.all_solved"):
-    """Every target has an admissible solution, but for those that are meant to have none (``demonstrations``)."""
-
-
-class SomeUnsolved(TargetCounts, Finding, code="inverse.some_unsolved"):
-    """Some targets have no admissible solution."""
-
-
-class NoneSolved(TargetCounts, Finding, code="inverse.none_solved"):
-    """No target has an admissible solution."""
+Advice = Finding | NearLimit | NearEnd
 
 
 SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
@@ -293,7 +175,7 @@ class InverseSummary(Summary):
 
     needs = ("reach", "limits", "self_collision", "scene_collision")
 
-    verdict: Verdict[AllSolved | SomeUnsolved | NoneSolved | NotReproduced | ExpectationsUnmet]
+    verdict: Verdict[Finding]
     mix: dict[RuleName, float]
     scene: str | None
     turns: bool

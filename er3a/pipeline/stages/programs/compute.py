@@ -8,23 +8,23 @@ from dataclasses import replace
 import numpy as np
 
 from er3a.collision.along import bodies_of
-from er3a.collision.pairs import PairsUnexamined
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, covered_collisions
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
+from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
 from er3a.program_check.motion_checks import AssumedRates
-from er3a.program_check.program_check_findings import Level, LoadAbovePayload, NotFollowed, StartNotKnown
+from er3a.program_check.program_check_findings import Level
 from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause, Place
 from er3a.programs.languages import read_program
@@ -68,7 +68,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
         check = check_program(read_program(entry.file), robot, replace(options, start=entry.start(robot)))
         motion, starts = _motion(entry.name, check, robot)
         summaries.append(_summary(entry, check, starts))
-        if any(isinstance(each.finding, StartNotKnown) for each in check.findings):
+        if any(is_one(each.finding, "way_not_known") for each in check.findings):
             unknown_starts.append(entry.name)
         arms += check.arms if entry.expect in (None, "pass") else ()
         lines.append(_lines(entry.name, check))
@@ -120,7 +120,7 @@ def _assumed(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[
     if outer:
         yield Open("outer_axes", outer)
     loads = [(each, at.finding) for each in programs for at in each.findings]
-    said = (f"{each.name}: {load.mass_kg:g} kg" for each, load in loads if isinstance(load, LoadAbovePayload))
+    said = (f"{each.name}: {load.mass_kg:g} kg" for each, load in loads if is_one(load, "load_above_payload"))
     if texts := tuple(dict.fromkeys(said)):
         yield Open("program_load", texts)
 
@@ -142,7 +142,7 @@ def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
 def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, float]) -> model.ProgramSummary:
     levels = [OUTCOMES[verdict.level] for verdict in check.verdicts]
     clear = [verdict.least_clearance_mm for verdict in check.verdicts if verdict.least_clearance_mm is not None]
-    found = [each for each in check.findings if not isinstance(each.finding, PairsUnexamined)]  # the verdict says it
+    found = [each for each in check.findings if not is_one(each.finding, "pairs_unexamined")]  # the verdict says it
     return model.ProgramSummary(
         name=entry.name,
         title=entry.title,
@@ -164,13 +164,13 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
 
 
 def _is_of_outer_axes(finding: object) -> bool:
-    return isinstance(finding, NotFollowed) and finding.reason == "external_axes"
+    return isinstance(finding, Finding) and finding.code == "not_followed" and finding.reason == "external_axes"
 
 
 def _not_followed(check: ProgramCheck) -> set[int]:
     """Lines of motions that were not followed each time, and of instructions that were not."""
     lines = {each.place.line for each in check.verdicts if not each.followed}
-    return lines | {each.place.line for each in check.findings if isinstance(each.finding, NotFollowed)}
+    return lines | {each.place.line for each in check.findings if is_one(each.finding, "not_followed")}
 
 
 def _lines(name: str, check: ProgramCheck) -> model.Lines:
@@ -243,21 +243,28 @@ def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.Program
 
 def _verdict(
     programs: list[model.ProgramSummary],
-) -> Verdict[
-    model.AllProgramsPass | model.SomeProgramsCaution | model.SomeProgramsFail | model.NoPrograms | ExpectationsUnmet
-]:
+) -> Verdict[Finding]:
     if not programs:
-        return Verdict("no_reference", model.NoPrograms())
+        return Verdict("no_reference", fact("programs.none"))
     if unmet := unmet_expectations(programs, "pass"):
         return Verdict("fail", unmet)
     asked = [each for each in programs if each.expect in (None, "pass")]
     caution, failed = (tuple(each.name for each in asked if each.outcome == outcome) for outcome in ("caution", "fail"))
-    finding = model.SomeProgramsFail if failed else model.SomeProgramsCaution if caution else model.AllProgramsPass
+    code = "programs.fail" if failed else "programs.caution" if caution else "programs.pass"
     status: Status = "fail" if failed else "caution" if caution else pass_of(asked)
     passed = len(asked) - len(caution) - len(failed)
     missed = tuple(each.name for each in asked if each.not_examined)
     shown = [each for each in programs if each.expect != "pass"]
-    return Verdict(status, finding(len(asked), passed, caution, failed, demonstrations(shown, "pass"), missed))
+    found = fact(
+        code,
+        programs=len(asked),
+        passed=passed,
+        caution=caution,
+        failed=failed,
+        demonstrations=demonstrations(shown, "pass"),
+        not_examined=missed,
+    )
+    return Verdict(status, found)
 
 
 def _figures(programs: list[model.ProgramSummary]) -> tuple[Figure, ...]:

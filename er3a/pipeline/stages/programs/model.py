@@ -7,50 +7,16 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from er3a.by_value import Finding
+from er3a.finding import Finding
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.scope import OF_MOTIONS
-from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import CheckFinding, Level
 from er3a.programs.instructions import Place
 from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.program_names import LanguageName, ProgramOutcome
-
-
-@dataclass(frozen=True)
-class ProgramCounts:
-    """How many programs there are, how many pass, and the names of the others.
-
-    ``demonstrations``, programs that fail as they are meant to, count for none of these. ``not_examined``: names of
-    those of which something was not examined.
-    """
-
-    programs: int
-    passed: int
-    caution: tuple[str, ...]
-    failed: tuple[str, ...]
-    demonstrations: tuple[Demonstration, ...]
-    not_examined: tuple[str, ...] = ()
-
-
-class AllProgramsPass(ProgramCounts, Finding, code="programs.pass"):
-    """Every program passes."""
-
-
-class SomeProgramsCaution(ProgramCounts, Finding, code="programs.caution"):
-    """No program fails, but some are to be looked at."""
-
-
-class SomeProgramsFail(ProgramCounts, Finding, code="programs.fail"):
-    """Some programs can't be carried out as they are written."""
-
-
-class NoPrograms(Finding, code="programs.none"):
-    """The robot's file of programs names none."""
-
 
 NO_STEPS: Mapping[int, Any] = MappingProxyType({})
 
@@ -141,7 +107,7 @@ class ProgramsSummary(Summary):
 
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
-    verdict: Verdict[AllProgramsPass | SomeProgramsCaution | SomeProgramsFail | NoPrograms | ExpectationsUnmet]
+    verdict: Verdict[Finding]
     scene: str | None
     assumed_speed: tuple[bool, ...]
     programs: tuple[ProgramSummary, ...]

@@ -11,9 +11,9 @@ import numpy as np
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PairOverlaps, PairTooNear, ShapesAssumed
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
+from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import NearSingular, characteristic_length, conditioning, factors_where_defined
@@ -25,7 +25,7 @@ from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.scope import OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, assumed_tool, covered_collisions, gaps_of_orientations
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
+from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.programs.model import finding_at
 from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
@@ -172,9 +172,7 @@ class AvoidanceTask:
             StrategyResult("slow", StrategyCost(slower, 1.0, nothing, nothing, speed, acceleration, False))
         ]
 
-    def _meets(
-        self, cost: StrategyCost, margin: float
-    ) -> tuple[PairOverlaps | PairTooNear | None, model.MinClearance | None]:
+    def _meets(self, cost: StrategyCost, margin: float) -> tuple[Finding | None, model.MinClearance | None]:
         """The deepest overlap on a motion, or what comes nearer than a margin (m), and its smallest clearance (None if
         nothing can meet)."""
         curve = cost.motion.curve
@@ -186,9 +184,11 @@ class AvoidanceTask:
         if smallest is None:
             return None, None
         if along.contacts:
-            return PairOverlaps(smallest.between, -smallest.least_mm), smallest
+            return fact("pair_overlaps", pair=smallest.between, depth_mm=-smallest.least_mm), smallest
         near = smallest.least_mm < 1000 * margin
-        return PairTooNear(smallest.between, smallest.least_mm, 1000 * margin) if near else None, smallest
+        return fact(
+            "pair_too_near", pair=smallest.between, clearance_mm=smallest.least_mm, margin_mm=1000 * margin
+        ) if near else None, smallest
 
     def _margin_of(self, along: ClearanceAlong) -> float:
         """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""
@@ -274,7 +274,7 @@ def _quickest(segment: SingularSegment) -> Timed | None:
 def _tried(
     robot: Robot,
     result: StrategyResult,
-    meets: PairOverlaps | PairTooNear | None,
+    meets: Finding | None,
     clearance: model.MinClearance | None,
 ) -> model.TriedStrategy:
     reasons = (*result.reasons, meets) if meets else result.reasons
@@ -564,8 +564,8 @@ def _checks(
 
 
 def _verdict(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: ShapesAssumed | None
-) -> Verdict[model.AllSafe | model.SomeUnsafe | model.NoneSafe | ExpectationsUnmet]:
+    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: Finding | None
+) -> Verdict[Finding]:
     if unmet := unmet_expectations([*paths, *skipped], "safe"):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.meant_safe]
@@ -575,13 +575,14 @@ def _verdict(
         return tuple(path.name for path in asked if path.verdict == verdict)
 
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
-    finding = model.AllSafe if safe == count else model.SomeUnsafe if safe else model.NoneSafe
+    code = "trajectory.safe" if safe == count else "trajectory.some_unsafe" if safe else "trajectory.none_safe"
     failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = (
         pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
     )
     judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
-    counts = finding(
+    counts = fact(
+        code,
         paths=count,
         safe=safe,
         unreachable=named("unreachable"),
@@ -607,7 +608,7 @@ def _fails(path: model.PathSummary) -> bool:
 
 
 def _figures(
-    paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: ShapesAssumed | None
+    paths: list[model.PathSummary], length: float, limits: model.LimitsUsed, shapes: Finding | None
 ) -> tuple[Figure, ...]:
     asked = [path for path in paths if path.meant_safe]  # demonstrations are counted apart
     events = [event for path in asked for event in path.singularities]

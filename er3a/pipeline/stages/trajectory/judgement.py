@@ -10,6 +10,7 @@ import scipy
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
@@ -18,7 +19,7 @@ from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning import motion_faults
 from er3a.planning.names import PathVerdict, gravest
 from er3a.planning.timing import JointLimits
-from er3a.planning.tool_curve import Undecided, open_stretches
+from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -44,7 +45,7 @@ class Faults:
     events: list[motion_faults.SingularEvent]
     limits: list[motion_faults.Interval[motion_faults.LimitCause]]
     fast: list[motion_faults.Interval[motion_faults.RateCause]]
-    undecided: list[motion_faults.Interval[Undecided]]
+    undecided: list[motion_faults.Interval[Finding]]
     max_rates: tuple[Reals, Reals] | None
 
 
@@ -60,7 +61,7 @@ class Judgement(Faults):
     """
 
     verdict: PathVerdict
-    beyond: list[motion_faults.Interval[motion_faults.PathOutOfReach]]
+    beyond: list[motion_faults.Interval[Finding]]
     times: Reals
     q: Reals
     velocity: Reals
@@ -175,7 +176,10 @@ def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.Bodie
             contact.start,
             contact.end,
             model.BodiesOverlap(
-                tuple(model.PairTouches(each.pair, each.start, each.depth * 1000, each.at) for each in contact.touches)
+                tuple(
+                    fact("pair_touches", pair=each.pair, t0_s=each.start, depth_mm=each.depth * 1000, t_s=each.at)
+                    for each in contact.touches
+                )
             ),
         )
         for contact in along.contacts

@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
-from er3a.by_value import Finding
-from er3a.collision.pairs import Pair, PairOverlaps, PairTooNear, ShapesAssumed
+from er3a.by_value import Coded
+from er3a.collision.pairs import Pair
+from er3a.finding import AnyFinding, Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
@@ -18,19 +19,11 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.scope import OF_MOTIONS
-from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.motion_faults import (
-    AccelerationTooGreatIfAssumed,
-    LimitCause,
-    PathOutOfReach,
-    RateCause,
-    TooFastIfAssumed,
-)
+from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, LimitCause, RateCause, TooFastIfAssumed
 from er3a.planning.names import PathVerdict, StrategyName
-from er3a.planning.tool_curve import Undecided
 from er3a.planning.way_around import NoWayAround
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
@@ -46,43 +39,7 @@ AT_EDGE, AROUND_EDGE = 0.001, 0.1
 """Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
 joints may be too fast because of it."""
 
-CauseT = TypeVar("CauseT", bound=Finding)
-
-
-@dataclass(frozen=True)
-class PathCounts:
-    """How many paths there are, how many are safe, and the names of the others by their verdict.
-
-    Paths as near to assumed shapes as these may be wrong count as none of these, and neither do ``demonstrations``,
-    paths that fail as they are meant to. ``of_program``: nothing is wrong with the path, but with the program.
-    """
-
-    paths: int
-    safe: int
-    unreachable: tuple[str, ...]
-    none_found: tuple[str, ...]
-    leaves_limits: tuple[str, ...]
-    collides: tuple[str, ...]
-    too_fast: tuple[str, ...]
-    singular: tuple[str, ...]
-    too_fast_if_assumed: tuple[str, ...]
-    undecided: tuple[str, ...]
-    near_singular: tuple[str, ...]
-    demonstrations: tuple[Demonstration, ...]
-    not_followed: tuple[str, ...] = ()
-    of_program: tuple[str, ...] = ()
-
-
-class AllSafe(PathCounts, Finding, code="trajectory.safe"):
-    """Every path is safe."""
-
-
-class SomeUnsafe(PathCounts, Finding, code="trajectory.some_unsafe"):
-    """Some paths are safe."""
-
-
-class NoneSafe(PathCounts, Finding, code="trajectory.none_safe"):
-    """No path counts as safe."""
+CauseT = TypeVar("CauseT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
@@ -150,19 +107,10 @@ class Jump:
     angle_deg: float
 
 
-class PairTouches(Finding):
-    """Two bodies that overlap: from when on, and by how much at most, at what time."""
-
-    pair: Pair
-    t0_s: float
-    depth_mm: float
-    t_s: float
-
-
-class BodiesOverlap(Finding):
+class BodiesOverlap(Coded):
     """What overlaps, the first to touch first."""
 
-    touches: tuple[PairTouches, ...]
+    touches: tuple[Finding, ...]
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -273,7 +221,7 @@ class TriedStrategy:
 
     name: StrategyName
     usable: bool
-    reasons: tuple[NotUsable | PairOverlaps | PairTooNear, ...]
+    reasons: tuple[NotUsable | Finding, ...]
     motion: StrategyMotion | None
 
 
@@ -319,10 +267,10 @@ class PathSummary:
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[PathOutOfReach], ...]
+    unreachable: tuple[Stretch[Finding], ...]
     out_of_limits: tuple[Stretch[LimitCause], ...]
     too_fast: tuple[Stretch[RateCause], ...]
-    undecided: tuple[Stretch[Undecided], ...]
+    undecided: tuple[Stretch[Finding], ...]
     jumps: tuple[Jump, ...]
     max_joint_speed_deg_s: tuple[float, ...] | None
     max_joint_speed_ratio: float | None
@@ -442,7 +390,7 @@ class PathNotFollowed:
         return (self.outcome,)
 
 
-def is_safe(path: PathSummary, shapes: ShapesAssumed | None) -> bool:
+def is_safe(path: PathSummary, shapes: Finding | None) -> bool:
     """Whether a path may be run as it is.
 
     Parameters
@@ -468,7 +416,7 @@ class TrajectorySummary(Summary):
 
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
-    verdict: Verdict[AllSafe | SomeUnsafe | NoneSafe | ExpectationsUnmet]
+    verdict: Verdict[Finding]
     characteristic_length_m: float
     near: NearThresholds
     joint_limits: LimitsUsed

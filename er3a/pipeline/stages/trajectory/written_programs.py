@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.collision.shapes import shapes_assumed
+from er3a.finding import fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
@@ -24,13 +25,7 @@ from er3a.planning.stated_rates import StatedMotion
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_findings import (
-    SpeedsOfAssumed,
-    WriteFinding,
-    WrittenBesidePoints,
-    WrittenNearAssumed,
-    WrittenUnsafe,
-)
+from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
@@ -63,7 +58,9 @@ def written(
     start = motion.q[0]
     if not np.isfinite(start).all():
         raise ValueError(f"{motion.entry.name}: the start can't be reached")
-    unsafe: tuple[WriteFinding, ...] = near if verdict == "safe" else (WrittenUnsafe(motion.entry.name, verdict),)
+    unsafe: tuple[WriteFinding, ...] = (
+        near if verdict == "safe" else (fact("written_unsafe", path=motion.entry.name, verdict=verdict),)
+    )
     head = (
         f"path {motion.entry.name} for {ascii_text(robot.title)}: {ascii_text(motion.entry.title)}",
         *_of_its_program(motion),
@@ -92,7 +89,7 @@ def written(
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
     made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends=ends, load=load)
     missed = missed_points(robot, motion.built)
-    beside = (WrittenBesidePoints(motion.entry.name, missed),) if missed else ()
+    beside = (fact("written_beside_points", path=motion.entry.name, missed=missed),) if missed else ()
     options = WriteOptions(robot, start, notes=(*unsafe, *beside, *made.findings), head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
@@ -121,7 +118,11 @@ def near_assumed_shapes(
     """
     if clearance is None or not (shapes := shapes_assumed(robot, margin, {name: clearance.least_mm / 1000})):
         return ()
-    return (WrittenNearAssumed(name, clearance.least_mm, 1000 * margin),) if shapes.near else ()
+    return (
+        (fact("written_near_assumed", path=name, clearance_mm=clearance.least_mm, margin_mm=1000 * margin),)
+        if shapes.near
+        else ()
+    )
 
 
 def repair_name(path: str) -> str:
@@ -181,7 +182,7 @@ def program_files(
 
 
 def _assumed(findings: tuple[WriteFinding, ...]) -> str:
-    return next((each.assumed for each in findings if isinstance(each, SpeedsOfAssumed)), "")
+    return next((each.assumed for each in findings if is_one(each, "written_speeds_of_assumed")), "")
 
 
 def _repair(

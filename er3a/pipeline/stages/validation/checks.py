@@ -9,9 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.diagnosis.faults import CONVENTIONS, WrongLimit
+from er3a.diagnosis.faults import CONVENTIONS
 from er3a.files.robot_file import LONGEST_LENGTH_MM, MIN_LONGEST_MM
 from er3a.files.units import WIDEST_IN_RADIANS
+from er3a.finding import Finding, fact, is_one
 from er3a.identifiability.entries import GROUP_OF, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import GRAVEST, PART_OF_GROUP, PartName, together
@@ -47,7 +48,7 @@ def against_itself(
     measured: float,
     tolerance: float,
     unit: str = "",
-    note: model.NearSingularLeftOut | None = None,
+    note: Finding | None = None,
 ) -> model.ModelCheck:
     """A check that needs no document.
 
@@ -76,7 +77,7 @@ def checks_of_set(
     stated = _Stated(references.name, references.checkable, values, bases, size)
     checks = [stated.check(i) for i in range(len(values))]
     aside = [
-        _without_value(references.name, reference, model.NotOfThisArm(why, len(slides)))
+        _without_value(references.name, reference, fact("not_of_this_arm", reason=why, joints=len(slides)))
         for row, why in references.set_aside
         for reference in row.references()
     ]
@@ -117,10 +118,12 @@ class _Stated:
         """
         reference, value, expected = self.references[i], float(self.values[i]), float(self.expected[i])
         if math.isnan(value):
-            return _without_value(self.set_name, reference, model.NotInRobotFile())
+            return _without_value(self.set_name, reference, fact("not_in_robot_file"))
         bound = undecided_from(reference.quantity, expected, self.size)
         if self.met[i] and reference.uncertainty >= bound:
-            return _without_value(self.set_name, reference, model.TooUncertain(reference.uncertainty, bound))
+            return _without_value(
+                self.set_name, reference, fact("too_uncertain", uncertainty=reference.uncertainty, undecided_from=bound)
+            )
         return model.ReferenceCheck(
             measured=value,
             expected=expected,
@@ -182,10 +185,10 @@ def _without_value(set_name: str, reference: Reference, note: model.Note) -> mod
 
 def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[model.Unjudged]:
     """What the set says nothing about."""
-    name, note = references.name, model.SetHasNoData(references.name)
+    name, note = references.name, fact("set_has_no_data", reference_set=references.name)
     stated = {reference.quantity for reference in references.checkable}
     gaps = [
-        _without_value(name, reference, model.SourceGivesNone())
+        _without_value(name, reference, fact("source_gives_none"))
         for reference in references.references
         if reference.expected is None and reference.quantity not in stated
     ]
@@ -241,7 +244,7 @@ def table_checks(robot: Robot) -> list[model.Check]:
         "limit_unit": int(turning.shape[1] > 1 and 0 < np.degrees(np.nanmax(turning)) < WIDEST_IN_RADIANS),
     }
     checks = [against_itself(name, "table_sanity", float(count), NONE_ALLOWED) for name, count in faults.items()]
-    missing = model.NumbersMissing() if checks[0].status == "fail" else wrist_partition_missing(robot)
+    missing = fact("numbers_missing") if checks[0].status == "fail" else wrist_partition_missing(robot)
     if missing:
         return [*checks, model.Unjudged(model.SelfCheck("closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, NONE_ALLOWED)]
@@ -263,7 +266,9 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     missing = wrist_partition_missing(robot)
     if missing and not round_trips.has_class(robot):
         return [
-            model.Unjudged(model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", model.NoClosedForm(missing))
+            model.Unjudged(
+                model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", fact("no_closed_form", missing=missing)
+            )
         ], None
     by_class = missing is not None or robot.coupling is not None
     poses = min(poses, round_trips.MAX_BY_CLASS) if by_class else poses
@@ -279,7 +284,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
         return checks, None
     joints, regular = float(np.degrees(found.worst_regular)), poses - found.near_singular
     wrist, elbow, shoulder = round_trips.NEAR_WRIST_DEG, round_trips.NEAR_ELBOW_DEG, round_trips.NEAR_SHOULDER_MM
-    note = model.NearSingularLeftOut(regular, poses, wrist, shoulder)
+    note = fact("near_singular_left_out", judged=regular, poses=poses, wrist_deg=wrist, shoulder_mm=shoulder)
     checks.insert(1, against_itself("joint_error", GROUP, joints, JOINT_TOLERANCE_DEG, "deg", note))
     margins = model.Margins(wrist, elbow, shoulder)
     errors = (poses, found.near_singular, joints, millimetres, degrees, found.unsolved)
@@ -397,7 +402,7 @@ def verdict_of(
     named = {
         name: diagnosis.conclusion
         for name, diagnosis in diagnoses.items()
-        if isinstance(diagnosis.conclusion, model.LikelyFault)
+        if is_one(diagnosis.conclusion, "named", "mostly")
     }
     common: dict[str, Any] = {
         "counts": counts_of(checks),
@@ -555,8 +560,8 @@ def _missed(
         return model.AnotherArm(**common, described=own.described)
     found = named.get(quoted.reference_set)
     faults = found.faults if found else ()
-    chosen = any(isinstance(fault, CONVENTIONS) for fault in faults)
-    chosen &= all(isinstance(fault, (*CONVENTIONS, WrongLimit)) for fault in faults)
+    chosen = any(is_one(fault, *CONVENTIONS) for fault in faults)
+    chosen &= all(is_one(fault, "wrong_limit", *CONVENTIONS) for fault in faults)
     return model.DefinedOtherwise(**common) if chosen else model.Contradicted(**common)
 
 
@@ -566,20 +571,20 @@ def _zero_pose_error(poses: model.KeyPoses, set_name: str) -> float | None:
     return float(poses.deviation_mm[own].max()) if own.any() else None
 
 
-def _claims(sets: tuple[model.SetSummary, ...]) -> tuple[model.Claims, ...]:
+def _claims(sets: tuple[model.SetSummary, ...]) -> tuple[Finding, ...]:
     """Of sets of claims alone, and of claims among documents that do not hold."""
     found = [(each, each.counts.claims) for each in sets]
     return tuple(
-        model.Claims(each.name, claims.total, claims.failed)
+        fact("claims", reference_set=each.name, claims=claims.total, failed=claims.failed)
         for each, claims in found
         if (claims.failed if each.is_authoritative else claims.total)
     )
 
 
-def _contradiction(conflicts: list[model.Conflict]) -> model.Contradiction:
+def _contradiction(conflicts: list[model.Conflict]) -> Finding:
     first = conflicts[0]
     stated = tuple(statement.expected for statement in first.statements)
-    return model.Contradiction(first.subject, first.unit, stated, len(conflicts) - 1)
+    return fact("contradiction", subject=first.subject, unit=first.unit, stated=stated, more=len(conflicts) - 1)
 
 
 def _grades(checks: list[model.ReferenceCheck]) -> tuple[Grade, ...]:

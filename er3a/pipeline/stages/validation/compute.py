@@ -9,6 +9,7 @@ import numpy as np
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import check_robot_origins, load_references
+from er3a.finding import fact, is_one
 from er3a.identifiability.evidence import evidence_of
 from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.reactions import bases_of, undeclared_bases
@@ -111,7 +112,15 @@ def key_poses_table(robot: Robot, sets: list[ReferenceSet]) -> model.KeyPoses:
             modelled = quantities.point_of(frames(robot, meant(robot, np.array(pose))), row.point)
             # A source may give some coordinates only: the others are the model's, and so make no difference.
             stated = given if np.isnan(given).all() else np.where(np.isnan(given), modelled, given)
-            head = (references.name, row.source, row.grade, row.group, model.NamedPose(row.name), row.point, pose)
+            head = (
+                references.name,
+                row.source,
+                row.grade,
+                row.group,
+                fact("named_pose", name=row.name),
+                row.point,
+                pose,
+            )
             rows.append((*head, stated, modelled, float(np.linalg.norm(modelled - stated))))
     table = model.KeyPoses.of_rows(rows)
     return table.take(np.argsort((table.q_deg != 0).any(axis=1), kind="stable"))
@@ -238,7 +247,7 @@ def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator
     }
     if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
         yield Open("references", unstated)
-    if loose := tuple(dict.fromkeys(check.group for check in checks if isinstance(check.note, model.TooUncertain))):
+    if loose := tuple(dict.fromkeys(check.group for check in checks if is_one(check.note, "too_uncertain"))):
         yield Open("loose_references", loose)
     names = tuple(name for name in ("tool", "base") if not np.array_equal(getattr(placed, name), getattr(robot, name)))
     if names:
@@ -303,7 +312,7 @@ def _without_reference(
     stated = {check.subject for check in checks}
     subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in always_searched(robot)}
     return [
-        model.Unjudged(subject, "reach", "mm", model.InNoSet(), measured=values[distance])
+        model.Unjudged(subject, "reach", "mm", fact("in_no_set"), measured=values[distance])
         for subject, distance in subjects.items()
         if subject not in stated
     ]

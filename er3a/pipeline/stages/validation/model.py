@@ -6,21 +6,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Self, get_args
 
-from er3a.by_value import Finding
-from er3a.diagnosis.conclusions import Conclusion, MainFault, MostLikelyFault, RankedHypothesis
+from er3a.by_value import Coded
+from er3a.diagnosis.conclusions import Conclusion, RankedHypothesis
 from er3a.files.robot_library import robot_of
+from er3a.finding import Finding
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
 from er3a.identifiability.evidence import PartName, PartStatus
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, CheckKind
-from er3a.identifiability.statements import InconsistentWithOwnText, NotTheRobotDescribed, ToolOff
+from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.references.quantities import NotOfArm
 from er3a.references.subjects import ReferenceSubject, Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
 
@@ -55,96 +55,10 @@ class WholeGroup(Subject):
 CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
 
 
-class NamedPose(Finding):
-    """A pose by the name that its source gives it."""
-
-    name: str
+Note = Finding | ClosedFormMissing | Finding
 
 
-class NotInRobotFile(Finding):
-    """The robot's file gives no value."""
-
-
-class SourceGivesNone(Finding):
-    """The source says that it gives no value."""
-
-
-class NotOfThisArm(Finding):
-    """The arm does not have what the reference is about, which was set aside."""
-
-    reason: NotOfArm
-    joints: int
-
-
-class TooUncertain(Finding):
-    """The model is within what the source leaves open, which is as much as ``undecided_from`` or more: a value taken at
-    random would be so as often as not."""
-
-    uncertainty: float
-    undecided_from: float
-
-
-class SetHasNoData(Finding):
-    """A reference set says nothing about it."""
-
-    reference_set: str
-
-
-class InNoSet(Finding):
-    """None of the robot's reference sets says anything about it."""
-
-
-class NumbersMissing(Finding):
-    """The table lacks numbers, so nothing can be computed from it."""
-
-
-class NoClosedForm(Finding):
-    """The arm has no closed-form inverse."""
-
-    missing: ClosedFormMissing
-
-
-class NearSingularLeftOut(Finding):
-    """Joint errors are judged of those random poses only that are not near a singularity."""
-
-    judged: int
-    poses: int
-    wrist_deg: float
-    shoulder_mm: float
-
-
-Note = (
-    NotInRobotFile
-    | SourceGivesNone
-    | NotOfThisArm
-    | TooUncertain
-    | SetHasNoData
-    | InNoSet
-    | NumbersMissing
-    | ClosedFormMissing
-    | NoClosedForm
-    | NearSingularLeftOut
-)
-
-
-LikelyFault = MostLikelyFault | MainFault
-
-
-class Contradiction(Finding):
-    """References that no model can meet all: the first such number, and how many more there are."""
-
-    subject: ReferenceSubject
-    unit: str
-    stated: tuple[float, ...]
-    more: int
-
-
-class Claims(Finding):
-    """How many of a set's claims fail."""
-
-    reference_set: str
-    claims: int
-    failed: int
+LikelyFault = Finding
 
 
 @dataclass(frozen=True)
@@ -162,18 +76,18 @@ class JudgedTable:
     counts: CheckCounts
     conflicts: int
     sets: tuple[str, ...]
-    claims: tuple[Claims, ...]
-    own_text: tuple[InconsistentWithOwnText, ...]
+    claims: tuple[Finding, ...]
+    own_text: tuple[Finding, ...]
 
 
-class Confirmed(JudgedTable, Finding, code="validation.confirmed"):
+class Confirmed(JudgedTable, Coded, code="validation.confirmed"):
     """The model meets all that it can, and independent documents settle all that moves the tool."""
 
     grades: tuple[Grade, ...]
-    contradiction: Contradiction | None
+    contradiction: Finding | None
 
 
-class PartFound(Finding):
+class PartFound(Coded):
     """What is known of a part of the table.
 
     Attributes
@@ -195,7 +109,7 @@ class PartFound(Finding):
     off: ToolOff
 
 
-class LeftOpen(JudgedTable, Finding, code="validation.left_open"):
+class LeftOpen(JudgedTable, Coded, code="validation.left_open"):
     """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
 
     Attributes
@@ -214,14 +128,14 @@ class LeftOpen(JudgedTable, Finding, code="validation.left_open"):
     at_least: bool
     unbounded: tuple[str, ...]
     next_measurement: Proposal | None
-    contradiction: Contradiction | None
+    contradiction: Finding | None
 
 
-class NothingToCompare(JudgedTable, Finding, code="validation.no_reference"):
+class NothingToCompare(JudgedTable, Coded, code="validation.no_reference"):
     """No authoritative document speaks about the model."""
 
 
-class ModelUnsound(JudgedTable, Finding, code="validation.model_unsound"):
+class ModelUnsound(JudgedTable, Coded, code="validation.model_unsound"):
     """The model fails a check that needs no document."""
 
     check: SelfCheck
@@ -250,17 +164,17 @@ class _Missed(JudgedTable):
     contradicted: tuple[str, ...]
 
 
-class Contradicted(_Missed, Finding, code="validation.contradicted"):
+class Contradicted(_Missed, Coded, code="validation.contradicted"):
     """The model contradicts documents about its arm."""
 
 
-class AnotherArm(_Missed, Finding, code="validation.another_arm"):
+class AnotherArm(_Missed, Coded, code="validation.another_arm"):
     """The documents describe another arm; ``described``: what no one or two corrections remove."""
 
-    described: NotTheRobotDescribed | None
+    described: Finding | None
 
 
-class DefinedOtherwise(_Missed, Finding, code="validation.defined_otherwise"):
+class DefinedOtherwise(_Missed, Coded, code="validation.defined_otherwise"):
     """The documents describe this arm, with zeros, directions, base or flange that ``diagnosis`` names."""
 
 
@@ -293,7 +207,7 @@ class ModelCheck(_Compared):
     subject: SelfCheck
     group: ModelGroup
     status: Literal["pass", "fail"]
-    note: NearSingularLeftOut | None = None
+    note: Finding | None = None
     kind: None = None
     reference_set: None = None
     source: None = None
@@ -436,8 +350,8 @@ class SetSummary:
     grades: tuple[Grade, ...]
     counts: CheckCounts
     another_arm: bool
-    described: NotTheRobotDescribed | None
-    own_text: InconsistentWithOwnText | None
+    described: Finding | None
+    own_text: Finding | None
     zero_pose_flange_off_mm: float | None
 
     @property
@@ -608,7 +522,7 @@ class KeyPoses(Table):
     source: Texts = column("source of the point")
     grade: Texts = column("grade of the source")
     group: Texts = column("group of the references")
-    pose: Findings = findings("the pose", NamedPose)
+    pose: Findings = findings("the pose", Finding)
     point: Texts = column("flange or wrist_centre")
     q_deg: Reals = per_joint("joint angle")
     point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated")

@@ -10,13 +10,13 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import ShapesAssumed
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile, SeenImages, read_calibration
 from er3a.files.vision_file import ObjectEntry, VisionFile, load_vision
 from er3a.files.yaml_file import load
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import inverted, quaternion_of, rpy_of
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -25,7 +25,7 @@ from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.scope import GAPS, Check, Open, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import assumed_rates, assumed_tool, covered_collisions, gaps_in_solids
-from er3a.pipeline.stages.expectations import ExpectationsUnmet, demonstrations, pass_of, unmet_expectations
+from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.entry import VisionSettings
@@ -40,7 +40,7 @@ from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
 from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
-from er3a.vision.vision_findings import HandEyeError, TouchContradicts, grave_warnings
+from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 
 def calibration_result(
@@ -161,9 +161,7 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 STAGE_NAME = "vision"
 LEG_ROWS = 13
 
-Found = (
-    model.CalibrationImpossible | model.CalibrationDoubtful | TouchContradicts | model.GraspCounts | ExpectationsUnmet
-)
+Found = Finding
 
 
 def compute(study: Study, name: str) -> model.VisionResults:
@@ -265,7 +263,7 @@ def _without_calibration(
     error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings
 ) -> model.VisionResults:
     """What is written where the samples allow no calibration: why, and no rows."""
-    verdict: Verdict[Found] = Verdict("fail", model.CalibrationImpossible(error.finding))
+    verdict: Verdict[Found] = Verdict("fail", fact("calibration_impossible", why=error.finding))
     summary = model.VisionSummary(verdict, (), file.title, scene, settings.least_success, None, ())
     return model.VisionResults(
         summary,
@@ -343,7 +341,7 @@ def _open_frames(samples: CalibrationSet, head: HandEyeFile) -> tuple[Open, ...]
     return tuple(Open(each) for each in samples.open_frames(head.simulated) if each == camera_in)
 
 
-def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> ShapesAssumed | None:
+def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float) -> Finding | None:
     """What assumed shapes, ``margin`` (m) around them, leave open of the grasps; None where no grasp was tried."""
     clear = {each.name: each.grasp.clearance_mm for each in objects if each.grasp}
     near = {name: None if mm is None else mm / 1000 for name, mm in clear.items()}
@@ -356,12 +354,10 @@ def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
     return placed
 
 
-def _doubt(
-    found: model.CalibrationResult, touch: TouchCheck | None
-) -> model.CalibrationDoubtful | TouchContradicts | None:
+def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding | None:
     """Why no grasp may rest on a calibration; None if nothing contradicts it."""
     if doubts := grave_warnings(found.warnings):
-        return model.CalibrationDoubtful(doubts)
+        return fact("calibration_doubtful", warnings=doubts)
     return touch.contradiction if touch else None
 
 
@@ -468,23 +464,24 @@ def verdict_of(
     if unmet := unmet_expectations(objects, "grasped"):
         return Verdict("fail", unmet)
     asked = [each for each in objects if each.expect in (None, "grasped")]
-    missed = tuple(model.NotGraspedObject(each.name, each.refusal) for each in asked if each.refusal)
+    missed = tuple(fact("not_grasped_object", name=each.name, why=each.refusal) for each in asked if each.refusal)
     boardless = (each.sample for each in calibration.boardless)
     worst = max((each.error_mm.together for each in asked if each.error_mm), default=None)
     shown = demonstrations(objects, "grasped")
     assumed = tuple(each.name for each in asked if each.name in near)
     grasped = [each for each in asked if each.grasp]
     sound = len(grasped) - len(assumed)
-    counts = model.GraspCounts(
-        len(asked),
-        sound,
-        missed,
-        (*calibration.rejected, *calibration.copies, *boardless),
-        worst,
-        shown,
-        calibration.simulated,
-        assumed,
-        _least_success(asked),
+    counts = fact(
+        "grasp_counts",
+        objects=len(asked),
+        grasped=sound,
+        missed=missed,
+        left_out=(*calibration.rejected, *calibration.copies, *boardless),
+        point_mm=worst,
+        demonstrations=shown,
+        simulated=calibration.simulated,
+        assumed=assumed,
+        probability=_least_success(asked),
     )
     if asked and not grasped:
         return Verdict("fail", counts)

@@ -4,66 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from er3a.by_value import Finding
 from er3a.collision.pairs import Pair
+from er3a.finding import Finding
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.stages.expectations import Demonstration, ExpectationsUnmet
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.vision.boards import AmbiguousTilt, BoardlessImage
 from er3a.vision.calibration_set import Setup
 from er3a.vision.grasping import GraspRefusal
-from er3a.vision.vision_findings import (
-    CalibrationWarning,
-    GraspOutcome,
-    NotCalibratable,
-    Suspect,
-    TouchContradicts,
-)
-
-
-class CalibrationImpossible(Finding):
-    """The samples don't determine where the camera is."""
-
-    why: NotCalibratable
-
-
-class CalibrationDoubtful(Finding):
-    """The samples contradict each other, or this robot's table."""
-
-    warnings: tuple[CalibrationWarning, ...]
-
-
-class NotGraspedObject(Finding):
-    """An object that the arm can't grasp."""
-
-    name: str
-    why: GraspRefusal
-
-
-class GraspCounts(Finding):
-    """What came of the objects that are to be grasped.
-
-    Attributes
-    ----------
-    objects, grasped : of those that are asked for, and that can be grasped at all distances that are required
-    assumed : those that are clear by less than the margin of assumed shapes, and so not settled
-    left_out : samples that the calibration does not rest on
-    point_mm : 95 % of errors at the worst grasp stay below; None where nothing is grasped
-    simulated : whether no camera took the samples
-    probability : of success, the lowest of what can be grasped; None where nothing can
-    """
-
-    objects: int
-    grasped: int
-    missed: tuple[NotGraspedObject, ...]
-    left_out: tuple[str, ...]
-    point_mm: float | None
-    demonstrations: tuple[Demonstration, ...]
-    simulated: bool
-    assumed: tuple[str, ...] = ()
-    probability: float | None = None
-
+from er3a.vision.vision_findings import CalibrationWarning, GraspOutcome, Suspect
 
 Three = tuple[float, float, float]
 ROTATIONS = ("rx", "ry", "rz")
@@ -136,8 +84,8 @@ class CalibrationResult:
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
-    open_tilts: tuple[AmbiguousTilt, ...] = ()
-    boardless: tuple[BoardlessImage, ...] = ()
+    open_tilts: tuple[Finding, ...] = ()
+    boardless: tuple[Finding, ...] = ()
     copies: tuple[str, ...] = ()
     intrinsics_estimated: bool = False
     intrinsics_given: bool = False
@@ -225,7 +173,7 @@ class VisionSummary(Summary):
 
     needs = ("camera", "reach", "limits", "self_collision", "scene_collision")
 
-    verdict: Verdict[CalibrationImpossible | CalibrationDoubtful | TouchContradicts | GraspCounts | ExpectationsUnmet]
+    verdict: Verdict[Finding]
     title: str
     scene: str | None
     least_success: float

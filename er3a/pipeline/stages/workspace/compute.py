@@ -9,9 +9,9 @@ import numpy as np
 
 from er3a.collision.along import bodies_of
 from er3a.collision.matrix import solids_met
-from er3a.collision.pairs import ShapesAssumed
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import shapes_assumed
+from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
@@ -47,16 +47,17 @@ def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdic
     undecided : ratio of the volume that the proof leaves undecided
     """
     if hull_volume == 0:
-        return Verdict("caution", model.Flat())
+        return Verdict("caution", fact("workspace.flat"))
     enclosed = [void for void in voids if void.kind == "enclosed"]
     unexpected = [void for void in enclosed if not void.holds_shoulder]
     if unexpected:
         return Verdict("caution", model.VoidUnexpected(*_size_and_place(unexpected[0]), unexpected[0].cause))
     if undecided > SETTLED:
-        return Verdict("caution", model.Unsettled(100 * undecided))
+        return Verdict("caution", fact("workspace.unsettled", undecided_percent=100 * undecided))
     if enclosed:
-        return Verdict("pass", model.VoidAtShoulder(*_size_and_place(enclosed[0])))
-    return Verdict("pass", model.NoVoid(100 * undecided))
+        litres, x, y, z = _size_and_place(enclosed[0])
+        return Verdict("pass", fact("workspace.void_at_shoulder", litres=litres, x_mm=x, y_mm=y, z_mm=z))
+    return Verdict("pass", fact("workspace.no_void", undecided_percent=100 * undecided))
 
 
 def _size_and_place(void: Void) -> tuple[float, float, float, float]:
@@ -136,14 +137,14 @@ def _summary(
     tool: ToolCapability,
     *,
     scene: Scene | None,
-    assumed: ShapesAssumed | None,
+    assumed: Finding | None,
 ) -> model.WorkspaceSummary:
     settings, grid, hull = study.section(WorkspaceSettings), samples.grid, samples.hull
     judged = judge(hull.volume, voids, proven.proof.width)
     if isinstance(judged.finding, model.VoidUnexpected) and not wrist_partition_missing(robot):
         tried = single_changes(robot, judged.finding.cause, study.seed)
         judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
-    examined = not isinstance(tool.capability, model.CapabilityMissing)
+    examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_kept)
     return model.WorkspaceSummary(
@@ -188,7 +189,7 @@ def _checked(joints: tuple[int, int], proven: Proven, seen: Covered, gaps: Seque
 def _assumed(tool: ToolCapability) -> Iterator[Open]:
     """What the kind of arm leaves out of what its tool can do."""
     found, placement = tool.capability, tool.placement
-    if isinstance(found, model.CapabilityMissing):
+    if is_one(found, "workspace.capability_missing"):
         yield Open("capability")
     elif isinstance(placement, model.PlacementTooLong):
         yield Open("places")

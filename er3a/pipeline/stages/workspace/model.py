@@ -10,8 +10,9 @@ import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import Finding
+from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
+from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -25,18 +26,7 @@ from er3a.workspace.causes import SingleChange, VoidCause
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import Proven
-from er3a.workspace.tool_inverse import MapsMissing
 from er3a.workspace.voids import Void, VoidKind
-
-
-class Flat(Finding, code="workspace.flat"):
-    """The tool point moves on a surface, on a line or not at all."""
-
-
-class Unsettled(Finding, code="workspace.unsettled"):
-    """The proof leaves too much undecided to judge voids."""
-
-    undecided_percent: float
 
 
 @dataclass(frozen=True)
@@ -49,24 +39,14 @@ class VoidFound:
     z_mm: float
 
 
-class VoidUnexpected(VoidFound, Finding, code="workspace.void_unexpected"):
+class VoidUnexpected(VoidFound, Coded, code="workspace.void_unexpected"):
     """An enclosed void away from the shoulder, proven empty."""
 
     cause: VoidCause
     single_changes: tuple[SingleChange, ...] = ()
 
 
-class VoidAtShoulder(VoidFound, Finding, code="workspace.void_at_shoulder"):
-    """An enclosed void about the shoulder, as every arm leaves that can't fold onto itself."""
-
-
-class NoVoid(Finding, code="workspace.no_void"):
-    """No enclosed void; ``undecided_percent`` is what the proof leaves undecided of the volume."""
-
-    undecided_percent: float
-
-
-WorkspaceFinding = Flat | Unsettled | VoidUnexpected | VoidAtShoulder | NoVoid
+WorkspaceFinding = Finding | VoidUnexpected | Finding
 
 
 Singles = NDArray[np.float32]
@@ -296,12 +276,6 @@ class CapabilitySummary:
     coarse: bool
 
 
-class CapabilityMissing(Finding, code="workspace.capability_missing"):
-    """Capability and placement were not computed, and why."""
-
-    lacks: MapsMissing
-
-
 @dataclass(frozen=True)
 class TaskSummary:
     """What was asked of places for the tray, as in the study."""
@@ -314,14 +288,14 @@ class TaskSummary:
     clear_of_axis_mm: float
 
 
-class ToolPointsElsewhere(Finding, code="workspace.tool_points_elsewhere"):
+class ToolPointsElsewhere(Coded, code="workspace.tool_points_elsewhere"):
     """The tray is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
 
     task: TaskSummary
     direction: Triple
 
 
-class PlacementTooLong(Finding, code="workspace.placement_too_long"):
+class PlacementTooLong(Coded, code="workspace.placement_too_long"):
     """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the tray."""
 
     task: TaskSummary
@@ -448,7 +422,7 @@ class WorkspaceSummary(Summary):
     section_cell_m: float
     voids: tuple[VoidSummary, ...]
     pocket_block_m: float
-    capability: CapabilitySummary | CapabilityMissing
+    capability: CapabilitySummary | Finding
     placement: Placement | None
 
     @property

@@ -16,6 +16,7 @@ import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
+from er3a.finding import Finding, fact
 from er3a.kinematics.solutions import slot_labels
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -47,12 +48,7 @@ from er3a.workspace.placement import (
     survey,
 )
 from er3a.workspace.proven import Proven
-from er3a.workspace.tool_inverse import (
-    OrientationsUnknown,
-    lacking_for_maps,
-    pose_cost,
-    tried_values,
-)
+from er3a.workspace.tool_inverse import lacking_for_maps, pose_cost, tried_values
 
 SAME_HEIGHT = 1e-9  # m
 MAX_ACROSS, MAX_ACROSS_REDUNDANT = 64, 28
@@ -156,7 +152,7 @@ LISTED = 5
 class ToolCapability:
     """This part's entries of the summary, and its tables."""
 
-    capability: model.CapabilitySummary | model.CapabilityMissing
+    capability: model.CapabilitySummary | Finding
     placement: model.Placement | None
     cells: model.CapabilityCells
     places: model.BoxPlaces
@@ -184,7 +180,9 @@ def tool_capability(
     asked, lacks = asked_of(robot, settings.rolls), lacking_for_maps(robot)
     if lacks or asked is None:
         missing = (
-            model.CapabilityMissing(lacks) if lacks else model.CapabilityMissing(OrientationsUnknown(robot.joints))
+            fact("workspace.capability_missing", lacks=lacks)
+            if lacks
+            else fact("workspace.capability_missing", lacks=fact("orientations_unknown", joints=robot.joints))
         )
         return ToolCapability(missing, None, model.CapabilityCells.empty(), model.BoxPlaces.empty())
     task = _task(settings.placement)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
 from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, say
@@ -17,7 +18,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
-from er3a.robots.joint_limits import LimitsExceeded, meant, size_of
+from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 NOTE = """# Joint solutions of each target
@@ -101,5 +102,5 @@ def _about(target: TargetResult, branches: SolutionRows) -> str:
 def _outcome(branches: SolutionRows, k: int) -> str:
     refusal = branches.refusal[k]
     if refusal is not None:
-        return limits_in_short(refusal) if isinstance(refusal, LimitsExceeded) else say(refusal)
+        return limits_in_short(refusal) if is_one(refusal, "limits_exceeded") else say(refusal)
     return "taken" if branches.rank[k] == 1 else "within limits"

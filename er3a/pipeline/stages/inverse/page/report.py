@@ -12,6 +12,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
 from er3a.kinematics.solutions import ClosedForm
 from er3a.pipeline.language import tr, with_unit
@@ -32,7 +33,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
-from er3a.robots.joint_limits import LimitsExceeded, meant, shown
+from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
 
@@ -402,7 +403,7 @@ def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list
 def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
     refusal = branches.refusal[k]
     if refusal is not None:
-        return limits_in_short(refusal) if isinstance(refusal, LimitsExceeded) else say(refusal)
+        return limits_in_short(refusal) if is_one(refusal, "limits_exceeded") else say(refusal)
     taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
         taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
@@ -17,18 +18,11 @@ from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
-from er3a.planning.motion_faults import AboveLimit, BelowLimit
-from er3a.program_check.program_check_findings import (
-    RANKS,
-    Level,
-    MeetsSingularity,
-    MotionCollides,
-    PassesSingularity,
-)
+from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-SINGULAR = MeetsSingularity | PassesSingularity
+SINGULAR = Finding
 MOMENT = 1e-6  # s
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
@@ -60,12 +54,12 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     """A finding as long as its line lasts, a singular pose at its moment; none of a rate after its line's first."""
     start = found.program_s or 0.0
     finding, weight = found.finding, WEIGHTS[found.level]
-    if isinstance(finding, SINGULAR):
+    if is_one(finding, "meets_singularity", "passes_singularity"):
         return [PlayedEvent(start, start, singular_cause(finding), weight)]
     end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
     if not isinstance(finding, Pace):
         joint = getattr(finding, "joint", None)
-        joints = ((joint, ""),) if joint and isinstance(finding, AboveLimit | BelowLimit) else ()
+        joints = ((joint, ""),) if joint and is_one(finding, "above_limit", "below_limit") else ()
         return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
     paces = _paces(program, found)
     if (start, finding) != min(paces, key=itemgetter(0)):
@@ -93,7 +87,12 @@ def _same_line(program: ProgramSummary, found: FindingAt) -> list[FindingAt]:
 def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
     """The order of a line's findings: a singular pose, then what weighs most, of that joints that are too
     fast last."""
-    return not isinstance(found.finding, SINGULAR), -RANKS[found.level], isinstance(found.finding, Pace), when(found)
+    return (
+        not is_one(found.finding, "meets_singularity", "passes_singularity"),
+        -RANKS[found.level],
+        isinstance(found.finding, Pace),
+        when(found),
+    )
 
 
 def worst_first(programs: Sequence[ProgramSummary]) -> list[ProgramSummary]:
@@ -138,7 +137,7 @@ def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
     said = [
         tr("{where}: {text}", where=_where(program, each), text=singular_cause(each.finding))
         for each in here
-        if isinstance(each.finding, SINGULAR)
+        if is_one(each.finding, "meets_singularity", "passes_singularity")
     ]
     return next(iter(said), None)
 

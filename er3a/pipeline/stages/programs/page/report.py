@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
+from er3a.finding import is_one
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
@@ -20,7 +21,6 @@ from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.page.played import (
-    SINGULAR,
     cause_first,
     faults,
     line_id,
@@ -94,7 +94,11 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
 def _remark(name: str, each: model.FindingAt) -> Markup:
     """What was found, after the moment at which it begins: a link to it where the player shows it."""
     often = tr("{times} times that the line is carried out", times=each.times) if each.times > 1 else ""
-    said = singular_cause(each.finding) if isinstance(each.finding, SINGULAR) else say(each.finding)
+    said = (
+        singular_cause(each.finding)
+        if is_one(each.finding, "meets_singularity", "passes_singularity")
+        else say(each.finding)
+    )
     text = escape(bracketed(said, often))
     if each.motion_s is None:
         return text

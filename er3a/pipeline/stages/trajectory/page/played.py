@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.collision.pairs import ShapesAssumed
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
@@ -40,7 +40,6 @@ from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import NeededAcceleration, NeededSpeed, RateCause
 from er3a.planning.names import FAULTS, PathVerdict
-from er3a.program_check.program_check_findings import ClearOfAssumed
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -236,7 +235,7 @@ def advised(
     motions: model.AvoidanceRows,
     limits: model.LimitsUsed,
     *,
-    shapes: ShapesAssumed | None = None,
+    shapes: Finding | None = None,
 ) -> str | None:
     """What to do about a path; None where nothing is to be done.
 
@@ -267,7 +266,7 @@ def repaired(path: model.PathSummary) -> str:
     return tr("{path}, repaired", path=path.name)
 
 
-def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple[Weight, str]:
+def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
     if path.verdict == "safe" and path.of_program:
         weight = _weight_of(path)
@@ -277,12 +276,17 @@ def shown_verdict(path: model.PathSummary, near: ClearOfAssumed | None) -> tuple
     return weight_of(path.verdict), outcome_words(path.outcomes)
 
 
-def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> ClearOfAssumed | None:
+def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> Finding | None:
     """That a path is clear of assumed shapes by less than these may be wrong by."""
     shapes = summary.verdict.shapes
     if shapes is None or path.name not in shapes.near or path.clearance is None:
         return None
-    return ClearOfAssumed(path.clearance.between, path.clearance.least_mm, shapes.margin_mm)
+    return fact(
+        "clear_of_assumed",
+        pair=path.clearance.between,
+        clearance_mm=path.clearance.least_mm,
+        margin_mm=shapes.margin_mm,
+    )
 
 
 def events(path: model.PathSummary) -> list[PlayedEvent]:
@@ -311,9 +315,7 @@ def _few_words(part: model.Stretch[Any]) -> str:
     return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(part)
 
 
-def _near_events(
-    path: model.PathSummary, near: ClearOfAssumed | None, clearance: model.Clearances
-) -> list[PlayedEvent]:
+def _near_events(path: model.PathSummary, near: Finding | None, clearance: model.Clearances) -> list[PlayedEvent]:
     """From when to when a path is as near to assumed shapes as these may be wrong, at its nearest."""
     if near is None or path.clearance is None:
         return []

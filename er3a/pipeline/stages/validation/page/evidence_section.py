@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from er3a.finding import is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
-from er3a.identifiability.proposals import MeasureAngle
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
@@ -131,7 +131,7 @@ def evidence_section(
     )
     proposals = {
         proposal.entry: by_pose.format(measurement=say(proposal))
-        if read and isinstance(proposal, MeasureAngle)
+        if read and is_one(proposal, "measure_angle")
         else say(proposal)
         for proposal in evidence.proposals
     }

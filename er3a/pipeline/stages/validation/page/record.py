@@ -9,9 +9,10 @@ import numpy as np
 import rerun as rr
 
 import er3a.pipeline.messages.validation  # noqa: F401
+from er3a.finding import fact
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.model import Axes, KeyPoses, NamedPose, ValidationResults, model_of
+from er3a.pipeline.stages.validation.model import Axes, KeyPoses, ValidationResults, model_of
 from er3a.pipeline.stages.validation.page.validation_figures import corrected_robot
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
@@ -68,7 +69,20 @@ def _stations(robot: Robot, poses: KeyPoses) -> list[KeyPoses]:
         nowhere = (np.nan,) * 3
         return [
             KeyPoses.of_rows(
-                [("", "", "", "", NamedPose("zero pose"), "", (0.0,) * robot.joints, nowhere, nowhere, np.nan)]
+                [
+                    (
+                        "",
+                        "",
+                        "",
+                        "",
+                        fact("named_pose", name="zero pose"),
+                        "",
+                        (0.0,) * robot.joints,
+                        nowhere,
+                        nowhere,
+                        np.nan,
+                    )
+                ]
             )
         ]
     rounded = poses.q_deg.round(6)

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes as PlotAxes
 from matplotlib.figure import Figure
 
-from er3a.diagnosis.conclusions import MainFault, MostLikelyFault
+from er3a.finding import is_one
 from er3a.kinematics.forward import forward, frames, skeleton
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
@@ -200,7 +200,7 @@ def diagnosis_stories(summary: model.ValidationSummary) -> list[dict[str, Any]]:
 
 
 def _diagnosis_story(diagnosis: model.SetDiagnosis, own_claims: bool) -> dict[str, Any]:
-    named = isinstance(diagnosis.conclusion, MostLikelyFault | MainFault)
+    named = is_one(diagnosis.conclusion, "named", "mostly")
     best = diagnosis.hypotheses[0] if named else None
     return dict(
         reference_set=diagnosis.reference_set,
@@ -247,7 +247,7 @@ def _hypothesis_row(hypothesis: model.RankedHypothesis) -> list[str]:
 def corrected_robot(robot: Robot, diagnoses: Iterable[model.SetDiagnosis]) -> tuple[Robot | None, str]:
     """The robot with the first named fault corrected, and its label; None if no fault is named."""
     for diagnosis in diagnoses:
-        if diagnosis.corrected and isinstance(diagnosis.conclusion, MostLikelyFault | MainFault):
+        if diagnosis.corrected and is_one(diagnosis.conclusion, "named", "mostly"):
             label = sentence("corrected", faults=typographic(both(diagnosis.conclusion.faults)))
             return robot.replace(**asdict(diagnosis.corrected)), label
     return None, ""

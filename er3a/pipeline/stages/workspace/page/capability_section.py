@@ -16,6 +16,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.scene import Plane, Scene, Solid, Sphere
 from er3a.collision.shapes import solid_pieces
+from er3a.finding import Finding
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import own_title, tr
@@ -370,7 +371,7 @@ def capability_context(
 ) -> dict[str, Any]:
     """What the template include ``capability.html.j2`` needs; ``placing``: where to put the tray, if anywhere."""
     capability, placement = results.summary.capability, results.summary.placement
-    if isinstance(capability, model.CapabilityMissing) or placement is None:
+    if isinstance(capability, Finding) or placement is None:
         return {"missing": say(capability)}
     return {
         "missing": "",

@@ -1,0 +1,181 @@
+"""What was found, as data: a code with parameters, where, how grave, and on what it rests.
+
+A finding is no sentence: texts stand in ``er3a.pipeline.messages``, one for each code, and are filled in with the
+parameters. A number with a unit is a :class:`Amount`, so that one code serves joints that turn and joints that slide.
+Code decides by code, level and parameters, never by a text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from er3a.by_value import KINDS, Coded, ReadOnly, crude_hash
+
+Level = Literal["pass", "note", "caution", "fail"]
+Basis = Literal["documented", "assumed"]
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A number with its unit.
+
+    Attributes
+    ----------
+    value : in the unit
+    unit : as it is printed: ``mm``, ``deg``, ``deg/s``; empty for a ratio
+    """
+
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where something was found, as far as that says something.
+
+    Attributes
+    ----------
+    item : a path, a target, a program or an object, by its name
+    t_s : time along it
+    line : of a program, from 1
+    joint : from 1
+    pair : two bodies, as ``link_2/table``
+    """
+
+    item: str = ""
+    t_s: float | None = None
+    line: int | None = None
+    joint: int | None = None
+    pair: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that was found.
+
+    Attributes
+    ----------
+    code : what; its text stands under it
+    params : by name, what the text says of it: amounts, words, numbers, other findings, and tuples of these. They
+        can be read as attributes
+    level : how grave it is for the question that was asked
+    where : the place
+    basis : ``assumed`` where it rests on a value that no document gives
+    """
+
+    code: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+    level: Level = "note"
+    where: Where = Where()
+    basis: Basis = "documented"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "params", ReadOnly({name: _revived(value) for name, value in self.params.items()}))
+
+    def __hash__(self) -> int:
+        return hash((self.code, *map(crude_hash, self.params.values())))
+
+    def __getattr__(self, name: str) -> Any:
+        """A parameter by its name."""
+        if not name.startswith("_") and name != "params" and name in self.params:
+            return self.params[name]
+        raise AttributeError(f"'{name}' is no parameter of this finding")
+
+    def but(self, **params: Any) -> Finding:
+        """The same with other parameters.
+
+        Parameters
+        ----------
+        params : in place of its own, or besides these
+        """
+        return replace(self, params={**self.params, **params})
+
+
+def fact(code: str, /, **params: Any) -> Finding:
+    """A finding, its parameters given by name.
+
+    Parameters
+    ----------
+    code : what was found
+    params : what its text says of it
+
+    Returns
+    -------
+    finding : equal to any other with the same content
+    """
+    return Finding(code, params)
+
+
+def is_one(found: object, *codes: str) -> bool:
+    """Whether something is a finding with one of these codes.
+
+    Parameters
+    ----------
+    found : anything
+    codes : of findings
+    """
+    return isinstance(found, Finding) and found.code in codes
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON has it.
+
+    Parameters
+    ----------
+    value : dataclasses, mappings, sequences, arrays and numpy's numbers, however deep; of a finding what is not usual
+
+    Returns
+    -------
+    value : dicts, lists and plain values; a NaN stays
+    """
+    if isinstance(value, Finding):
+        usual, found = Finding(value.code), {"code": value.code, "params": plain(value.params)}
+        for name in ("level", "where", "basis"):
+            if (own := getattr(value, name)) != getattr(usual, name):
+                found[name] = plain(own)
+        return found
+    if is_dataclass(value) and not isinstance(value, type):
+        return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _revived(value: Any) -> Any:
+    """A parameter out of what JSON has of it."""
+    if isinstance(value, list | tuple):
+        return tuple(_revived(part) for part in value)
+    if not isinstance(value, dict):
+        return value
+    if value.keys() == {"value", "unit"}:
+        return Amount(**value)
+    if (kind := KINDS.get(value.get("code", ""))) is not None:
+        return kind(**{name: _revived(part) for name, part in value.items()})
+    if "code" in value:
+        where = Where(**value.get("where", {}))
+        return Finding(**(value | {"where": where}))
+    return {name: _revived(part) for name, part in value.items()}
+
+
+def turned_or_moved(value: float, slides: bool, per: str = "") -> Amount:
+    """A joint's value, or its rate, with the unit that suits the joint.
+
+    Parameters
+    ----------
+    value : in deg, or mm if the joint ``slides``
+    slides : whether the joint is prismatic
+    per : of a rate ``/s``, ``/s²`` or ``/s³``
+    """
+    return Amount(value, ("mm" if slides else "deg") + per)
+
+
+AnyFinding = Coded | Finding
+"""What has a code and a text."""
