@@ -387,7 +387,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
         "offset 2 is 0 deg, −90 deg fits. Residual: 1433 mm, corrected 0.0 mm.",
         "source&#39;s statements alone, which are no evidence about a real robot: don&#39;t use the corrected",
         "turns the other way</td><td>no bound",
-        "of one fault or two, explains the data",
+        "of one fault or two explains the data",
         "It is another arm, has more faults, or a reference is wrong",
         "Against er3a_c60: another arm",
         "What has no reference",

@@ -161,8 +161,9 @@ ITEMS = (
         "er3a.conditioning(robot, q)",
         N_("Joint 5 near 0"),
         N_(
-            "With axes 4 and 6 nearly in line, a small move of joint 4 or 6 is said to change the orientation "
-            "violently, or a slider to move the tool hardly at all (again in 6.2)."
+            "With axes 4 and 6 nearly in line, joints 4 and 6 are said to turn the tool violently, or hardly to "
+            "move it (again "
+            "in 6.2)."
         ),
         N_(
             "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. At joint 5 = 1° a "

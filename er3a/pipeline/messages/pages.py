@@ -48,8 +48,7 @@ SIDES = {"lower": N_("lower limit"), "upper": N_("upper limit")}
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
     N_("branch and bound"): N_(
-        "a search that divides what is possible and drops the parts that bounds exclude, until the rest is small; not "
-        "the arm's branches"
+        "a search that divides what is possible and drops what bounds exclude; not the arm's branches"
     ),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
@@ -72,25 +71,22 @@ GLOSSARY = {
     ),
     N_("most likely fault"): N_("the table entry whose correction explains the differences best"),
     N_("authoritative"): N_("of a source: official, CAD or exported; a verdict rests on such sources alone"),
-    N_("settled"): N_(
-        "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
-    ),
+    N_("settled"): N_("of a table entry: independent documents give it to within the tolerance"),
     N_("but for signs"): N_(
-        "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
-        "may fit as well"
+        "of a settled table entry: keep it, unless an open entry turns out otherwise, which may change a sign or "
+        "half turn here"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
     N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
     N_("tray"): N_(
-        "the space, as of a bin or of a pallet's load, for which the workspace page looks for a place: the tool has to "
-        "reach every point of it"
+        "the space, as of a bin or a pallet's load, that the workspace page places where the tool reaches all of it"
     ),
     N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
     N_("undecided"): N_("what the computed bounds can't decide; never called safe"),
     N_("allowed collision matrix"): N_(
-        "which pairs of bodies are checked for collisions: pairs that never collide are proven so, adjacent "
-        "ones touch at their joint only; all others are checked"
+        "which pairs of bodies are checked for collisions: all but those proven never to collide and neighbours at "
+        "their joint"
     ),
     N_("penetration tolerance"): N_(
         "the depth of overlap below which a contact between checked points may go unnoticed"

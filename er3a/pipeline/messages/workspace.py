@@ -47,20 +47,20 @@ TEXTS = texts(
         "workspace.unsettled": "Voids can't be judged: {undecided_percent:.2g} % of the volume is undecided.",
         "workspace.no_void": "No enclosed void is found; {undecided_percent:.2g} % of the volume is undecided.",
         "workspace.void_unexpected": (
-            "An enclosed void of at least {litres} L lies at ({x}, {y}, {z}) mm, away from the shoulder."
+            "An enclosed void of at least {litres} L lies away from the shoulder, at ({x}, {y}, {z}) mm."
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres} L surrounds the shoulder, which is normal. Its centre is ({x}, {y}, "
-            "{z}) mm; no other enclosed void was found."
+            "An enclosed void of at least {litres} L surrounds the shoulder: normal. Its centre is ({x}, {y}, {z}) mm; "
+            "no other was found."
         ),
         "void_changes": (
             "Single changes of the table that leave less than a tenth of it: {named} ({count} of {tried}; undecided: "
             "{undecided}). References must tell which is right."
         ),
-        "void_disappears": "{limits}, without which the void disappears",
+        "void_disappears": "{limits}; it disappears at {extended}",
         "void_of_several_limits": "several limits together",
         "void_of_geometry": "geometry: {percent:.0f} % of it stays without any joint limit",
-        "void_shrinks": "shrinks by {percent:.0f} % without {limit}",
+        "void_shrinks": "it shrinks by {percent:.0f} % at {limit}",
         "workspace.pockets": "open pockets: {count}",
         "workspace.voids": "enclosed voids: {count}",
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
@@ -74,7 +74,6 @@ TEXTS = texts(
         "stand.too_small": "Not on {name}: there is no room for it.",
         "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the tray.",
         "stand.in_the_way": "Not on {name}: the arm comes within {margin} mm of the scene or of itself.",
-        "void.none": "None.",
         "void.at": "{lower} to {upper} L, centred at ({centre}) mm: no target there can be reached.",
         "void.normal": "It surrounds the shoulder, which is normal.",
         "void.not_normal": "That is not normal: a limit, a zero or a direction of joint 2 or 3 may be wrong.",
@@ -82,7 +81,6 @@ TEXTS = texts(
         "void.rests": "The bounds hold for {limits}, which nothing confirms.",
         "void.cause": "Cause: {cause}. Never widen a limit of the arm for it.",
         "void.larger": "It is larger where the arm collides: that is not counted.",
-        "void.no_tool": "With a tool it lies elsewhere.",
         "void.pocket": "Open pocket besides: {lower} to {upper} L, within {box} mm.",
         "void.more": "Other enclosed voids: {count}.",
         "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
@@ -150,7 +148,8 @@ def _place(found: model.VoidUnexpected | Finding) -> dict[str, str]:
 
 @say.register
 def _(found: Disappears) -> str:
-    return say_as(found, limits=tr(" or ").join(map(_limit, found.limits)))
+    extended = tr(" or ").join(_limit(limit, limit.extended) for limit in found.limits)
+    return say_as(found, limits=_limits(found), extended=extended)
 
 
 @say.register
@@ -164,12 +163,12 @@ def _(found: Geometry) -> str:
 
 
 def _shrinks(limit: Relaxed | None) -> str:
-    return sentence("void_shrinks", percent=100 * limit.filled, limit=_limit(limit)) if limit else ""
+    return sentence("void_shrinks", percent=100 * limit.filled, limit=_limit(limit, limit.extended)) if limit else ""
 
 
-def _limit(limit: Relaxed) -> str:
-    """A limit, such as "J3 ≤ 65 deg"."""
-    value = with_unit(as_text(limit.limit, ".4g"), limit.unit)
+def _limit(limit: Relaxed, at: float) -> str:
+    """A limit at a value, such as "J3 ≤ 65 deg"."""
+    value = with_unit(as_text(at, ".4g"), limit.unit)
     return f"{sum_of_joints(limit.joints, limit.factors)} {'≤' if limit.side == 'upper' else '≥'} {value}"
 
 
@@ -215,7 +214,7 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     joints' limits."""
     finding = summary.verdict.finding
     if is_one(finding, "workspace.no_void"):
-        return joined([sentence("void.none"), say(finding)], " "), ""
+        return say(finding), ""
     normal = is_one(finding, "workspace.void_at_shoulder")
     if not isinstance(summary, model.WorkspaceSummary) or not (normal or isinstance(finding, model.VoidUnexpected)):
         return "", ""
@@ -223,14 +222,12 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     means = sentence("void.normal" if normal else "void.not_normal")
     lead = joined([sentence("void.at", **_void_parts(judged)), means], " ")
     limits = _limits(judged.cause)
-    bare = normal and any(each.reason == "tool" for each in summary.assumed)
     pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
     texts = [
         sentence("void.within", **_void_parts(judged)),
         _cause(judged.cause),
         sentence("void.rests", limits=limits) if limits and not confirmed else "",
         sentence("void.larger") if normal else "",
-        sentence("void.no_tool") if bare else "",
         sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else "",
         sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else "",
     ]
@@ -252,7 +249,7 @@ def _limits(cause: VoidCause) -> str:
         return ""
     else:
         limits = (cause.most,)
-    return joined(map(_limit, limits), ", ")
+    return joined([_limit(limit, limit.limit) for limit in limits], ", ")
 
 
 def _void_parts(void: model.VoidSummary) -> dict[str, str]:
