@@ -531,9 +531,9 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
         ),
     )
     lead, rest = dynamics.payload_text(unknown, robot)
-    assert lead.startswith("Not known, for lack of 2 quantities: mount nothing until the manufacturer gives the rated")
+    assert lead.startswith("Quantities not known: 2. Mount nothing until the manufacturer gives the rated payload.")
     assert rest == "Ask for: mass, centre of mass and inertia of the links (link 6); peak torques of the drives."
-    assert dynamics.payload_text(None, robot)[0].startswith("Not examined in this study: mount nothing")
+    assert dynamics.payload_text(None, robot)[0].startswith("Not examined. Mount nothing")
 
 
 @pytest.mark.parametrize("grade", ["official", "claim"])
@@ -543,9 +543,9 @@ def test_a_rated_payload_counts_as_its_source_does(grade):
     robot = er3a.load_robot("er3_600")
     source = replace(robot.sources["wrist_load"], grade=grade)
     said, _ = dynamics.payload_text(None, robot.replace(sources={**robot.sources, "wrist_load": source}))
-    official = "Quick manual (EC2-S cabinet), table 2-2 gives a rated payload of 3 kg; what moments and inertias the"
+    official = "Rated payload: 3 kg (Quick manual (EC2-S cabinet), table 2-2); wrist moments and inertias unknown"
     assert (official in said) == (grade == "official")
-    assert ("mount nothing" in said and "nothing confirms" in said) == (grade == "claim")
+    assert ("Mount nothing" in said and "nothing confirms" in said) == (grade == "claim")
 
 
 def test_the_loads_moments_along_a_path_have_tolerances(full):
