@@ -706,7 +706,7 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
         return
     lone = replace(rows[0], plane="lone"), replace(rows[9], plane="lone")
     found = er3a.calibrate(robot, [*rows, *lone])
-    assert idle_texts(found) == ["plane lone: 2 poses, 4 or more are needed"]
+    assert idle_texts(found) == ["plane lone: 2 poses; 4 needed"]
     alone = [each.correction for each in er3a.calibrate(robot, rows).estimates]
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 

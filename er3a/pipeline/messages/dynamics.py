@@ -72,7 +72,7 @@ WHY: dict[NoBody, str] = {
 
 TEXTS = texts(
     {
-        "dynamics.use": "{what:, }: {asked:.3g} of {allowed:.3g} {unit} ({percent:.0f} %)",
+        "dynamics.use": "{what}: {asked:.3g} of {allowed:.3g} {unit} ({percent:.0f} %)",
         "dynamics.no_data": "Torques need data: {needs:, }.",
         "dynamics.no_limits": "Motors not judged: no drive's limits known. Greatest torque: {torques:; }.",
         "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
@@ -194,7 +194,8 @@ def quantity_word(quantity: model.Quantity) -> str:
 
 def use_text(use: model.Use) -> str:
     """What is asked for and allowed, where."""
-    what = [quantity_word(use.quantity), *([f"J{use.joint}"] if use.joint else []), *([use.path] if use.path else [])]
+    joint = f"J{use.joint}" if use.joint else ""
+    what = joined([quantity_word(use.quantity), joint, use.path or ""], ", ")
     parts = {"asked": use.asked, "allowed": use.allowed, "unit": use.unit, "percent": 100 * use.ratio}
     return sentence("dynamics.use", what=what, **parts)
 

@@ -171,7 +171,7 @@ def sentence(key: str, /, **parts: Any) -> str:
 def _as_text(part: Any, spec: str) -> str:
     """A part of a text: findings as sentences, words out of tables, several parts joined as the format says."""
     if spec in WORDS:
-        return word(spec, WORDS[spec], part)
+        part, spec = word(spec, WORDS[spec], part), ""
     if isinstance(part, tuple | list):
         return joined([_as_text(each, "") for each in part], spec or "; ")
     if hasattr(part, "code"):
