@@ -34,8 +34,7 @@ CARRIED_OUT = {
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
     **{f"not_followed.{reason}": OF_PROGRAMS for reason in NOT_FOLLOWED},
     "remedy.zone_too_large": OF_PROGRAMS,
-    "remedy.limit#above": OF_PROGRAMS,
-    "remedy.limit#below": OF_PROGRAMS,
+    "remedy.limit": OF_PROGRAMS,
     **{f"remedy.collision#{form}": OF_PROGRAMS for form in ("solid", "links", "solid_at_target")},
     "left_out.units": "test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read",
     "remedy.slower": "test_a_line_at_the_pace_advised_passes",
@@ -64,9 +63,10 @@ CARRIED_OUT = {
     "move_obstacle": "test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins",
     "box.run_again": AT_PLACES,
     **{f"{code}": OF_SETS for code in ("board_scale", "little_motion", "few_samples", "no_rotation", "parallel_axes")},
-    **dict.fromkeys(("all_samples_equal#flange", "not_converged", "focal_length", "principal_point"), OF_SETS),
+    **dict.fromkeys(
+        ("all_samples_equal", "moved_between", "not_converged", "focal_length", "principal_point"), OF_SETS
+    ),
     "joint_zero": "test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined",
-    **{f"moved_between#{what}": OF_SETS for what in ("camera", "board")},
     "measure": MEASURED,
     "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
     "more_positions": "test_too_few_positions_ask_for_poses_that_settle_more",
@@ -79,9 +79,9 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("clearance_not_proven", "program_not_understood", "singular.elbow", "singular.shoulder", "not_followed.too_far"),
     *("program_nothing_moves", "written_tool_not_given"),
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
-    *("all_samples_equal#target", "no_correction_fits", "contradiction"),
+    *("no_correction_fits", "contradiction"),
     *("read_limit", "time_joint"),
-    *("payload.unknown", "payload.not_examined", "payload.ask"),
+    *("payload.none", "payload.ask"),
     *("validation.off#tip", "validation.defined_otherwise", "far_from_table"),
 }
 NO_ADVICE = {"not_of_this_arm"}

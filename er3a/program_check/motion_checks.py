@@ -14,7 +14,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.errors import PoseError
-from er3a.finding import Finding, fact
+from er3a.finding import Finding, fact, turned_or_moved
 from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
@@ -409,7 +409,7 @@ def _stopped(path: MotionPath, target: Reals) -> found_in.CheckFinding:
     other = solutions.q[int(away.argmin())] - last
     joint = int(np.abs(other).argmax())
     turned, slides = joint_shown(arm, joint, float(other[joint]))
-    return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, angle_deg=turned, slides=slides)
+    return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, jump=turned_or_moved(turned, slides))
 
 
 def _proper(T: Reals) -> Reals:
@@ -557,13 +557,12 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
         size = np.abs(values)
         for a, b in runs(near.is_near(kind, size)):
             at = a + int(size[a:b].argmin())
-            share, scale = float(path.share[at]), 1000.0 if kind == "shoulder" else float(np.degrees(1.0))
+            share, moves = float(path.share[at]), kind == "shoulder"
+            distance = turned_or_moved(float(size[at]) * (1000.0 if moves else float(np.degrees(1.0))), moves)
             if a < at + 1 < len(values) and values[max(at - 1, 0)] * values[at + 1] < 0:
                 found[fact("meets_singularity", type=kind, at_mm=path.along_mm(share), bounded=True)] = share
             else:
-                found[
-                    fact("passes_singularity", type=kind, at_mm=path.along_mm(share), distance=float(size[at]) * scale)
-                ] = share
+                found[fact("passes_singularity", type=kind, at_mm=path.along_mm(share), distance=distance)] = share
     return found
 
 
@@ -582,4 +581,4 @@ def arrives_otherwise(path: MotionPath, given: Reals) -> found_in.CheckFinding |
         return None
     joint = int(np.argmax(np.abs(path.end - given)))
     differs, slides = joint_shown(path.arm, joint, float(path.end[joint] - given[joint]))
-    return fact("arrives_otherwise", joint=joint + 1, difference_deg=differs, slides=slides)
+    return fact("arrives_otherwise", joint=joint + 1, difference=turned_or_moved(differs, slides))

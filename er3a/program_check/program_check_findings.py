@@ -8,7 +8,7 @@ from typing import Literal
 
 from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
-from er3a.finding import Finding, is_one
+from er3a.finding import Amount, Finding, is_one
 from er3a.planning.motion_faults import AccelerationTooGreat, TooFast, TooFastIfAssumed
 from er3a.programs.instructions import Unresolved
 from er3a.programs.program_findings import ProgramFinding
@@ -119,9 +119,7 @@ def level_of(finding: CheckFinding) -> Level:
             return "fail" if reason in WRONG else "caution"
         case Finding(code="speed_not_given", word=word, refused=refused):
             return "fail" if refused else "caution" if word else "note"
-        case (
-            Finding(code="suspect_number", kind="impossible_speed") | Finding(code="suspect_number", unit="mm" | "mm/s")
-        ):
+        case Finding(code="suspect_number", kind="impossible_speed" | "mm" | "mm/s"):
             return "fail"
         case MotionCollides(touches=touches, assumed=assumed):
             return "fail" if not assumed and any(touch.is_certain for touch in touches) else "caution"
@@ -144,11 +142,12 @@ def gravity(finding: CheckFinding) -> float:
     if is_one(finding, "clear_of_assumed"):
         return float(-finding.clearance_mm)
     if is_one(finding, "passes_singularity"):
-        return float(-finding.distance)
+        return float(-finding.distance.value)
     if is_one(finding, "zone_too_large"):
         return float(finding.zone_mm / max(finding.motion_mm, 1e-9))
-    sizes = ("depth_mm", "needed_deg_s", "needed_deg_s2", "excess_mm", "excess", "angle_deg", "difference_deg")
-    return max((abs(getattr(finding, name, None) or 0.0) for name in sizes), default=0.0)
+    names = ("depth_mm", "needed_deg_s", "needed_deg_s2", "excess_mm", "excess", "angle_deg", "jump", "difference")
+    sizes = (getattr(finding, name, None) for name in names)
+    return max(abs(float(size.value if isinstance(size, Amount) else size or 0.0)) for size in sizes)
 
 
 def worst_of(levels: Iterable[Level]) -> Level:

@@ -43,7 +43,7 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
     for which in ("tool", "base"):
         frames = [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)]
         yield from (
-            (step, fact("suspect_number", kind=which, text=text, usual=usual, unit=""))
+            (step, fact("suspect_number", kind=which, text=text, usual=usual))
             for step, text, usual in _used_once(frames)
         )  # type: ignore[arg-type]
 
@@ -62,10 +62,9 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: boo
                     step,
                     fact(
                         "suspect_number",
-                        kind="unit",
+                        kind=meant,
                         text=_listed(xyz * scale, unit),
                         usual=_listed(xyz * scale * other, unit),
-                        unit=meant,
                     ),
                 )
         elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
@@ -76,10 +75,9 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: boo
                     step,
                     fact(
                         "suspect_number",
-                        kind="unit",
+                        kind="rad",
                         text=_listed(degrees, "deg"),
                         usual=_listed(np.degrees(degrees).round(), "deg"),
-                        unit="rad",
                     ),
                 )
             elif not in_mm and MOST_TURNED < np.abs(q).max() <= 360:
@@ -87,10 +85,9 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: boo
                     step,
                     fact(
                         "suspect_number",
-                        kind="unit",
+                        kind="deg",
                         text=_listed(q, "rad"),
                         usual=_listed(np.radians(q).round(3), "rad"),
-                        unit="deg",
                     ),
                 )
 
@@ -114,15 +111,13 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
     quickest = 2 * float(robot.speed.max()) if known else np.inf
     for step, motion in motions:
         if motion.speed and motion.speed.unit == "share" and motion.speed.text.endswith(" %"):
-            yield step, fact("suspect_number", kind="share", text=motion.speed.text, usual="100 %", unit="")
+            yield step, fact("suspect_number", kind="share", text=motion.speed.text, usual="100 %")
         along, turning = _value(motion.speed, "m/s"), _value(motion.speed, "rad/s")
         if along is not None and along > fastest:
             if along / MM < fastest:
                 yield (
                     step,
-                    fact(
-                        "suspect_number", kind="unit", text=f"{along:g} m/s", usual=f"{along / MM:g} m/s", unit="mm/s"
-                    ),
+                    fact("suspect_number", kind="mm/s", text=f"{along:g} m/s", usual=f"{along / MM:g} m/s"),
                 )
             else:
                 yield (
@@ -132,7 +127,6 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
                         kind="impossible_speed",
                         text=f"{MM * along:g} mm/s",
                         usual=f"{MM * fastest:.0f} mm/s",
-                        unit="",
                     ),
                 )
         if turning is not None and turning > quickest > np.radians(turning):
@@ -140,10 +134,9 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
                 step,
                 fact(
                     "suspect_number",
-                    kind="unit",
+                    kind="deg/s",
                     text=f"{turning:g} rad/s",
                     usual=f"{np.radians(turning):.2f} rad/s",
-                    unit="deg/s",
                 ),
             )
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
@@ -159,7 +152,6 @@ def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tup
                         kind="speed",
                         text=f"{1000 * value:g} mm/s",
                         usual=f"{1000 * usual:g} mm/s",
-                        unit="",
                     ),
                 )
 

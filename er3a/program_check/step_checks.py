@@ -24,7 +24,7 @@ from er3a.collision.pairs import CarriedAndSolid, Pair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by
 from er3a.errors import PoseError
-from er3a.finding import fact, is_one
+from er3a.finding import Amount, fact, is_one
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import forward
@@ -178,10 +178,10 @@ class Judge:
             self._to_joints(checked, target)
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
-            value, unit = (assumed.tool_speed, "m/s") if of_tool else (assumed.joint_share, "share")
+            speed = Amount(assumed.tool_speed, "m/s") if of_tool else Amount(100 * assumed.joint_share, "%")
             number = word.rpartition("=")[2]
             refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
-            checked.add(fact("speed_not_given", assumed=value, unit=unit, word=word, refused=refused))  # type: ignore[arg-type]
+            checked.add(fact("speed_not_given", assumed=speed, word=word, refused=refused))
         return checked
 
     def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:

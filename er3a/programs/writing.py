@@ -447,7 +447,7 @@ class Writer(ABC):
                     "written_arcs_split",
                     arcs=count["arcs"],
                     lines=count["chords"],
-                    deviation_m=self.options.arc_deviation,
+                    deviation_mm=1000 * self.options.arc_deviation,
                 )
             )
         if self.listing.one_sided:
@@ -473,7 +473,7 @@ COUNTED: dict[str, tuple[str, str]] = {
 
 
 HEADS = {
-    "written_arcs_split": "{arcs} arc(s) as {lines} lines that stay within {mm:g} mm",
+    "written_arcs_split": "{arcs} arc(s) as {lines} lines that stay within {deviation_mm:g} mm",
     "written_zones_dropped": "{zones} zone(s) without equal in this language: the arm stops there",
     "written_speeds_estimated": "{motions} duration(s) as speeds: the controller's ramps decide the time",
     "written_speeds_cut": "{motions} speed(s) above 100 %, which was taken",
@@ -516,9 +516,7 @@ def head_line(finding: program_findings.WriteFinding) -> str:
     -------
     line : plain ASCII, in English
     """
-    values = dict(finding.params)
-    values["mm"] = 1000 * values.get("deviation_m", 0.0)
-    return ascii_text(HEADS[finding.code].format(**values))
+    return ascii_text(HEADS[finding.code].format(**finding.params))
 
 
 HEAD_LINE = re.compile(rf"(?m)^(<rem>\n<text>|[ ]*(?:;|#|!|\(\*) ){HEAD}.*?(</text>\n</rem>| \*\)|)$")

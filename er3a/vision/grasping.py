@@ -17,12 +17,11 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import Coded
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.finding import Finding, fact
+from er3a.finding import Amount, Finding, fact
 from er3a.geometry.transforms import rot_z, skew, translation
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import solve
@@ -92,21 +91,9 @@ class GraspNeeds:
     probability: float = 0.0
 
 
-class GraspNearLimits(Coded):
-    """Every solution is nearer to a joint's limits than asked, or beyond them; the best of them by this much."""
-
-    solutions: int
-    margin_deg: float
-    needed_deg: float
-
-
-class GraspNearEnds(GraspNearLimits):
-    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
-
-
-GraspRefusal = Finding | GraspNearLimits | GraspNearEnds | Finding
+GraspRefusal = Finding
 _FAR = (
-    *("grasp_out_of_reach", "grasp_near_limits", "grasp_near_ends", "grasp_singular", "grasp_collides"),
+    *("grasp_out_of_reach", "grasp_near_limits", "grasp_singular", "grasp_collides"),
     *("line_leaves", "line_unproven", "way_collides", "no_transfer", "grasp_unlikely"),
 )
 
@@ -241,9 +228,9 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
     limit = limit_margin(robot, q)
     inside = np.flatnonzero(limit >= needs.limit_margin)
     if not inside.size:
-        most = float(np.degrees(limit.max()))
-        near = GraspNearEnds if robot.sliding.any() else GraspNearLimits
-        return [], near(len(q), most, float(np.degrees(needs.limit_margin)))
+        unit = "deg (mm of a prismatic joint)" if robot.sliding.any() else "deg"
+        margin, needed = (Amount(float(np.degrees(each)), unit) for each in (limit.max(), needs.limit_margin))
+        return [], fact("grasp_near_limits", solutions=len(q), margin=margin, needed=needed)
     value = conditioning(robot, q[inside]).smallest_singular_value
     regular = inside[value >= needs.singular_value]
     if not regular.size:

@@ -597,7 +597,7 @@ def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, f
     apart = float(np.arctan2(size[1], size[0]))
     if apart < MIN_SPREAD:
         raise vision_findings.HandEyeError(
-            fact("parallel_axes", axis=tuple(axes[0].tolist()), spread_deg=float(np.degrees(apart)))
+            fact("parallel_axes", axis=tuple(axes[0].round(2).tolist()), spread_deg=float(np.degrees(apart)))
         )
     return greatest, apart
 

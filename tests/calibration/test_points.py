@@ -426,13 +426,13 @@ def test_held_back_positions_that_contradict_the_fit_are_told_first(random):
     assert lines_of(found, rows, beside).startswith(f"{len(inside)} positions held back contradict the calibration")
     assert warning == calibration_record(found, bench.robot, rows, beside)["held_back_warning"]
     (warning,) = held_back_warning(found, rows, rows[:5])
-    assert warning.startswith("All positions held back are at poses that were fitted too")
+    assert warning.startswith("All positions held back are at fitted poses")
     told = held_back_warning(found, rows, [*rows[:5], *beside])
-    assert told[0].startswith("5 positions held back are at poses that were fitted too")
+    assert told[0].startswith("5 positions held back are at fitted poses")
     assert told[1].startswith(f"{len(inside)} positions held back contradict the calibration")
     near = [each for each in rows if each.pose[0] < 0]
     (warning,) = held_back_warning(found, near, [each for each in beside if each.pose[0] > 0])
-    assert warning.startswith("The calibration does not hold beyond the fitted joint values")
+    assert "beyond the fitted joint values" in warning
 
 
 @pytest.mark.long
@@ -706,7 +706,7 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
         return
     lone = replace(rows[0], plane="lone"), replace(rows[9], plane="lone")
     found = er3a.calibrate(robot, [*rows, *lone])
-    assert idle_texts(found) == ["plane lone: 2 poses, 4 or more are needed"]
+    assert idle_texts(found) == ["plane lone: 2 poses; 4 needed"]
     alone = [each.correction for each in er3a.calibrate(robot, rows).estimates]
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 

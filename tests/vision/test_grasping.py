@@ -17,14 +17,14 @@ from er3a.files.hand_eye_file import load_hand_eye
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.vision_file import load_vision
-from er3a.finding import fact, is_one
+from er3a.finding import Amount, fact, is_one
 from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
 from er3a.pipeline.messages.vision import say
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
-from er3a.vision.grasping import DetectedObject, Grasp, GraspNearEnds, GraspNeeds, GraspTask, plan_grasp
+from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
 from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
 from testing.arms import scara
@@ -349,7 +349,8 @@ def test_a_margin_asked_for_in_degrees_is_millimetres_of_a_slide():
         target = DetectedObject("t", T, 1e-12 * np.eye(6), 1, (Grasp("g", np.eye(4)),), 0.02, 0.02)
         plan = plan_grasp(task, target, T, lambda _: 1e-12 * np.eye(6))
         if margin < 2:
-            assert plan.refusal == GraspNearEnds(4, pytest.approx(1), 2.0)
-            assert "1.0 deg (mm of a prismatic joint) from the joint limits; 2 are required" in say(plan.refusal)
+            assert (plan.refusal.code, plan.refusal.solutions) == ("grasp_near_limits", 4)
+            unit = "deg (mm of a prismatic joint)"
+            assert (plan.refusal.margin, plan.refusal.needed) == (Amount(pytest.approx(1), unit), Amount(2.0, unit))
         else:
             assert np.degrees(plan.chosen.limit_margin) == pytest.approx(margin, abs=0.1)

@@ -235,7 +235,7 @@ def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_
         rows = [",".join(map(str, row)) for row in np.hstack([on_board, touched]).tolist()]
         (tmp_path / "touched.csv").write_text("\n".join([",".join(POINT_NAMES), *rows]) + "\n")
         found = CliRunner().invoke(app, ["hand-eye", str(file)])
-        codes.append((found.exit_code, "touched points contradict the calibration" in found.output))
+        codes.append((found.exit_code, "Touched points contradict the calibration" in found.output))
         record = json.loads(CliRunner().invoke(app, ["hand-eye", str(file), "--json"]).stdout)
         assert record["touch_contradicts"] == (beside > 0)
         told = [

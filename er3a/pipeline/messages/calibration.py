@@ -56,8 +56,8 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         f"{len(found.estimates) + len(found.held)} numbers",
         *(
             [
-                "not settled, by intervals wider than an arm's table may be off, or because quite another arm meets "
-                f"the positions as well: {', '.join(found.open)}"
+                "not settled, by too wide intervals, or because quite another arm meets the positions as well: "
+                f"{', '.join(found.open)}"
             ]
             * bool(found.open)
         ),
@@ -77,12 +77,9 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
     lines += [f"says nothing: {text}" for text in idle_texts(found)]
     if found.scatter > MUCH_SCATTER:
-        lines.append("warning: the residuals exceed the stated standard deviations, so errors may exceed the intervals")
+        lines.append("warning: residuals exceed the stated standard deviations; errors may exceed the intervals")
     if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
-        lines.append(
-            "warning: the residuals are far below the stated standard deviations, which can't be those of these "
-            "measurements; intervals rest on them"
-        )
+        lines.append("warning: residuals are far below the stated standard deviations, on which the intervals rest")
     if found.left_out:
         lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
     lines += _tried_lines("tried", found.tried)
@@ -98,17 +95,9 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
 def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
     """What the corrections take for granted, and what ``others``, held back, can't tell."""
     untold = others and not (found.beyond.left_out if found.beyond else found.left_out)
-    texts = [tr("whether positions held back contradict the result: too few poses were fitted to leave some out")]
-    return [*(texts if untold else []), *(_scale_not_examined() if found.scale_is_assumed else [])]
-
-
-def _scale_not_examined() -> list[str]:
-    return [
-        tr(
-            "the scale of the measuring device, or of lengths stated with the measurements: it counts as exact, and "
-            "all lengths of the arm are off by the same share as it is"
-        )
-    ]
+    texts = [tr("positions held back: too few poses were fitted to leave some out")] if untold else []
+    scale = [tr("the scale of the measurements: all lengths of the arm are off by the same share as it is")]
+    return [*texts, *(scale if found.scale_is_assumed else [])]
 
 
 def warning_texts(found: Calibration) -> list[str]:
@@ -117,8 +106,7 @@ def warning_texts(found: Calibration) -> list[str]:
     if found.repeated:
         texts.append(
             tr(
-                "There are {poses} distinct poses; {repeated} more lines read one of them again. A pose counts once, "
-                "with the mean of its lines.",
+                "{poses} distinct poses; lines that repeat one: {repeated}. A pose counts once, with their mean.",
                 poses=found.poses,
                 repeated=found.repeated,
             )
@@ -126,8 +114,8 @@ def warning_texts(found: Calibration) -> list[str]:
     if found.deviation_mm is not None and found.freedom == 1:
         texts.append(
             tr(
-                "Nothing is settled: there is only one coordinate more than numbers, which doesn't tell how large "
-                "errors are. Measure more poses, or state the standard deviation."
+                "Nothing is settled with one coordinate more than numbers. Measure more poses, or state the standard "
+                "deviation."
             )
         )
     return texts
@@ -194,10 +182,9 @@ def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others:
     """That positions held back were fitted, that others contradict the fit, or that it does not hold elsewhere."""
     unseen = _unseen(fitted, others)
     if (seen := len(others) - len(unseen)) and not unseen:
-        return [tr("All positions held back are at poses that were fitted too: they test nothing. Hold others back.")]
+        return [tr("All positions held back are at fitted poses and test nothing. Hold others back.")]
     also = tr(
-        "{count} positions held back are at poses that were fitted too: they test nothing, and make the error of the "
-        "others look small. Take them out of one of the files.",
+        "{count} positions held back are at fitted poses and test nothing. Take them out of one of the files.",
         count=seen,
     )
     return [*([also] if seen else []), *_held_back_contradicts(found, fitted, unseen)]
@@ -228,8 +215,8 @@ def _held_back_contradicts(
     if inside.any() and (mean := float(distances[inside].mean())) > CONTRADICTING * usual:
         return [
             tr(
-                "{count} positions held back contradict the calibration: they are {mean} mm off on average, poses left "
-                "out {usual} mm. Check that both files have the same frame, point of the tool and units.",
+                "{count} positions held back contradict the calibration: {mean} mm off on average, poses left out "
+                "{usual} mm. Check that both files have the same frame, tool point and units.",
                 count=int(inside.sum()),
                 mean=f"{mean:.3g}",
                 **numbers,
@@ -238,8 +225,8 @@ def _held_back_contradicts(
     if not inside.all() and (mean := float(distances[~inside].mean())) > CONTRADICTING * usual:
         return [
             tr(
-                "The calibration does not hold beyond the fitted joint values: {count} positions held back from there "
-                "are {mean} mm off on average, poses left out {usual} mm. Measure there, too.",
+                "{count} positions beyond the fitted joint values are {mean} mm off on average, poses left out "
+                "{usual} mm. Measure there, too.",
                 count=int((~inside).sum()),
                 mean=f"{mean:.3g}",
                 **numbers,
@@ -261,7 +248,7 @@ def idle_texts(found: Calibration) -> list[str]:
     """What was touched at too few poses."""
     return [
         tr(
-            "{kind} {name}: {poses} poses, {least} or more are needed",
+            "{kind} {name}: {poses} poses; {least} needed",
             kind=tr(KINDS[each.kind]),
             name=each.name,
             poses=each.poses,
@@ -276,8 +263,8 @@ def file_text(found: Calibration) -> str | None:
     if found.beyond is None or found.left_out is None or found.beyond.left_out is None:
         return None
     return tr(
-        "A robot file can hold ratios and couplings of joints, as its coupling, and no other terms beyond the table: "
-        "at poses left out it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm.",
+        "A robot file holds no terms but couplings: at poses left out it errs by {table:.3g} mm, all terms by "
+        "{model:.3g} mm on average.",
         table=found.left_out.mean_mm,
         model=found.beyond.left_out.mean_mm,
     )

@@ -12,8 +12,8 @@ from er3a.dynamics.margins import Binding
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, own_title
 from er3a.pipeline.messages.numbers import at_least
-from er3a.pipeline.messages.say import Plural, by, joined, say, say_as, says, sentence, texts, word
-from er3a.pipeline.messages.scope import names_in_words
+from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.scope import body_word, names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
@@ -59,6 +59,7 @@ GRADED: dict[Grade, str] = {
     "cad": N_("taken from a CAD model"),
     "export": N_("exported from a CAD model"),
     "claim": N_("claimed by others"),
+    "inferred": N_("inferred (orders of magnitude only)"),
 }
 BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("RMS"), "speed": N_("speed")}
 WHY: dict[NoBody, str] = {
@@ -71,117 +72,63 @@ WHY: dict[NoBody, str] = {
 
 TEXTS = texts(
     {
-        "dynamics.use#path": (
-            "{what} at J{joint} on {path}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)"
-        ),
-        "dynamics.use#value": "{what} {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
-        "dynamics.use#joint": "{what} at J{joint}: {asked:.3g} {unit} of {allowed:.3g} {unit} ({percent:.0f} %)",
-        "dynamics.no_data": "No data: torques need masses. Needed: {needs}.",
-        "dynamics.no_limits#path": (
-            "No drive's limits are known, so the motors can't be judged. On the paths that the model does not rule "
-            "out the greatest torque is {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint} on path {path}."
-        ),
-        "dynamics.no_limits#holding": (
-            "No drive's limits are known, so the motors can't be judged. The greatest holding torque is {torque:.3g} "
-            "± {tolerance:.2g} {unit}, at J{joint}."
-        ),
-        "dynamics.no_limits#at_rest": (
-            "Holding still in the worst pose found takes {torque:.3g} ± {tolerance:.2g} {unit}, at J{joint}."
-        ),
-        "dynamics.fits": "Fits: every quantity with a stated limit is within it; highest utilisation: {use}.",
-        "dynamics.unlimited": "Unknown, wholly or in part: {what}.",
-        "dynamics.marginal": (
-            "Marginal: within the limits, but masses are too uncertain or doubtful to rely on it; highest "
-            "utilisation: {use}."
-        ),
-        "dynamics.marginal#open": (
-            "Within the limits that are stated, but not everything was examined; highest utilisation: {use}."
-        ),
-        "dynamics.overload": Plural(
-            "count",
-            "Overload: {beyond} of {count} comparison is beyond its limit; worst: {use}.",
-            "Overload: {beyond} of {count} comparisons are beyond their limits; worst: {use}.",
-        ),
-        "dynamics.massless": Plural(
-            "count",
-            "Link {links} has no mass in the file and counts as massless.",
-            "Links {links} have no mass in the file and count as massless.",
-        ),
-        "dynamics.doubts": Plural(
-            "count", "{count} finding casts doubt on the masses.", "{count} findings cast doubt on the masses."
-        ),
-        "dynamics.inferred": "Masses are inferred: the results are orders of magnitude only.",
-        "dynamics.graded": (
-            "The masses are {grade}, neither measured nor given by the manufacturer, so the torques are just as "
-            "uncertain."
-        ),
-        "dynamics.not_run": Plural(
-            "count",
-            "{count} path may not be run as it is and counts for nothing: {names}.",
-            "{count} paths may not be run as they are and count for nothing: {names}.",
-        ),
-        "dynamics.unknown#joints": "{what} (J{numbers})",
-        "dynamics.unknown#links": "{what} (link {numbers})",
-        "missing_link": by(
-            "singular",
-            false="link {link}: no mass is given; it counts as massless",
-            true=(
-                "link {link}: no mass, inertia or rotor is given; its joint's torque counts as 0, and accelerations "
-                "under given torques (forward dynamics) have no value"
-            ),
-        ),
+        "dynamics.use": "{what}: {asked:.3g} of {allowed:.3g} {unit} ({percent:.0f} %)",
+        "dynamics.no_data": "Torques need data: {needs:, }.",
+        "dynamics.no_limits": "Motors not judged: no drive's limits known. Greatest torque: {torques:; }.",
+        "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
+        "dynamics.fits": "Within all stated limits; highest utilisation: {use}.",
+        "dynamics.marginal": "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {use}.",
+        "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {use}.",
+        "dynamics.unlimited": "Unknown, wholly or in part: {unknown:, }.",
+        "dynamics.massless": "Links without mass in the file, counted as massless: {links:, }.",
+        "dynamics.doubts": "Doubts about the masses: {doubts}.",
+        "dynamics.graded": "Masses {grade:dynamics.graded_as}: torques are as uncertain.",
+        "dynamics.not_run": "Paths that may not be run, not counted: {names:, }.",
+        "missing_link": "link {link}: no mass given; {singular:dynamics.massless}",
         "point_mass": "link {link}: mass without inertia",
-        "inertia_without_mass": "link {link}: inertia without mass; it is used as given",
-        "centre_outside": (
-            "link {link}: the centre of mass is {outside_mm:.0f} mm outside the link's shape; check its frame and unit"
-        ),
+        "inertia_without_mass": "link {link}: inertia without mass, used as given",
+        "centre_outside": "link {link}: centre of mass {outside_mm:.0f} mm outside its shape; check frame and unit",
         "unlikely_density": (
-            "link {link}: {mass_kg:.4g} kg in the link's shape make {density_kg_m3:.3g} kg/m³; check g against kg"
+            "link {link}: {mass_kg:.4g} kg in its shape make {density_kg_m3:.3g} kg/m³; check g against kg"
         ),
         "unlikely_inertia": (
-            "link {link}: the radius of gyration is {gyration_mm:.3g} mm, that of the link's shape {shape_mm:.3g} mm; "
-            "check the unit of the inertia (kg m²)"
+            "link {link}: radius of gyration {gyration_mm:.3g} mm, of its shape {shape_mm:.3g} mm; check the "
+            "inertia's unit (kg m²)"
         ),
         "about_origin": (
-            "link {link}: the inertia looks as if it were about the frame's origin, not the centre of mass: "
-            "{given_kg_m2:.3g} kg m² given, {about_centre_kg_m2:.3g} if so, {shape_kg_m2:.3g} by the link's shape"
+            "link {link}: inertia about the frame's origin? Given {given_kg_m2:.3g} kg m²; about the centre "
+            "{about_centre_kg_m2:.3g}, by its shape {shape_kg_m2:.3g}"
         ),
-        "sum_off_weight": "the links' masses add to {sum_kg:.4g} kg, and the manufacturer states {weight_kg:.4g} kg",
-        "payload.bounded": (
-            "At most {kg} kg on the paths that the model does not rule out, limited by torques on {path}."
-        ),
-        "payload.bounded#joint": (
-            "At most {kg} kg, limited by the {by} torque of J{joint} on {path}, on the paths that the model does not "
-            "rule out."
-        ),
-        "payload.partly": Plural(
-            "count", "{count} quantity is not known and left out.", "{count} quantities are not known and left out."
-        ),
-        "payload.guessed": "It rests on guesses: {what}.",
+        "sum_off_weight": "links' masses: {sum_kg:.4g} kg; the manufacturer's weight: {weight_kg:.4g} kg",
+        "payload.bounded": "At most {kg} kg, limited by torques: {by:, }.",
+        "payload.unknown": "Quantities not known: {count}.",
+        "payload.guessed": "It rests on guesses: {what:; }.",
         "payload.guessed_masses": "the masses of the links",
-        "payload.left_out": "Left out, because not known: {what}.",
-        "payload.unknown": Plural(
-            "count",
-            "Not known, for lack of {count} quantity: mount nothing until the manufacturer gives the rated payload.",
-            "Not known, for lack of {count} quantities: mount nothing until the manufacturer gives the rated payload.",
-        ),
-        "payload.ask": "Ask for: {what}.",
-        "payload.not_examined": (
-            "Not examined in this study: mount nothing until the manufacturer gives the rated payload."
-        ),
-        "payload.not_examined#rated": "Not examined in this study.",
-        "payload.unknown#rated": Plural(
-            "count", "Not known, for lack of {count} quantity.", "Not known, for lack of {count} quantities."
-        ),
-        "payload.rated#official": "{source} gives a rated payload of {kg:.3g} kg; don't rely on it alone.",
-        "payload.rated#official_alone": (
-            "{source} gives a rated payload of {kg:.3g} kg; what moments and inertias the wrist allows is not given: "
-            "don't rely on it alone."
-        ),
-        "payload.rated": (
-            "The robot's file gives a rated payload of {kg:.3g} kg, which nothing confirms: don't rely on it."
-        ),
-        "impossible_inertia": "link {link}: no body can have this inertia ({why})",
+        "payload.left_out": "Left out, because not known: {what:; }.",
+        "payload.ask": "Ask for: {what:; }.",
+        "payload.not_examined": "Not examined.",
+        "payload.none": "Mount nothing until the manufacturer gives the rated payload.",
+        "payload.rated": "Rated payload: {kg:.3g} kg ({source:payload.source}); {doubt:payload.doubt}.",
+        "impossible_inertia": "link {link}: no body can have this inertia ({why:dynamics.why})",
+    }
+)
+WORDS.update(
+    {
+        "dynamics.need": NEEDS,
+        "dynamics.graded_as": GRADED,
+        "dynamics.why": WHY,
+        "dynamics.path": {None: N_("holding still")},
+        "dynamics.masses": {True: N_("masses are uncertain"), False: N_("not everything was examined")},
+        "dynamics.massless": {
+            False: N_("it counts as massless"),
+            True: N_("its joint's torque counts as 0, and forward dynamics has no value"),
+        },
+        "payload.source": {"": N_("the robot's file")},
+        "payload.doubt": {
+            "official": N_("don't rely on it alone"),
+            "official_alone": N_("wrist moments and inertias unknown: don't rely on it alone"),
+            "claim": N_("nothing confirms it: don't rely on it"),
+        },
     }
 )
 
@@ -199,20 +146,19 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
     open_of = getattr(summary, "unknown", ())
     missing = [say(each) for each in open_of if each.what not in get_args(model.Guess)]
     official = _rated(robot, official=True)
+    unknown = sentence("payload.unknown", count=len(missing)) if missing else ""
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
-        by = word("dynamics.binding", BINDING, path.payload.by) if path.payload and path.payload.by else ""
-        joint = path.payload.joint if path.payload else None
-        form = "payload.bounded#joint" if by and joint else "payload.bounded"
-        known = sentence(form, kg=at_least(value, "kg"), path=path.name, by=by, joint=joint)
-        open_ = sentence("payload.partly", count=len(missing)) if missing else ""
-        known = joined([known, _guesses(summary), open_], " ")
-        rest = sentence("payload.left_out", what=joined(missing)) if missing else ""
-    elif missing:
-        known = sentence(f"payload.unknown{official and '#rated'}", count=len(missing))
-        rest = sentence("payload.ask", what=joined(missing))
+        most = path.payload
+        by = word("dynamics.binding", BINDING, most.by) if most and most.by else ""
+        of_joint = [bracketed(f"J{most.joint}", by)] if most and most.joint else []
+        known = sentence("payload.bounded", kg=at_least(value, "kg"), by=[*of_joint, path.name])
+        known = joined([known, _guesses(summary), unknown], " ")
+        rest = sentence("payload.left_out", what=missing) if missing else ""
     else:
-        known, rest = sentence(f"payload.not_examined{official and '#rated'}"), ""
+        none = "" if official else sentence("payload.none")
+        known = joined([unknown or sentence("payload.not_examined"), none], " ")
+        rest = sentence("payload.ask", what=missing) if missing else ""
     return joined([known, official or _rated(robot)], " "), rest
 
 
@@ -221,7 +167,7 @@ def _guesses(summary: Summary | None) -> str:
     masses = getattr(summary, "masses", None)
     found = [sentence("payload.guessed_masses")] if masses and masses.grade == "inferred" else []
     found += [say(each) for each in getattr(summary, "unknown", ()) if each.what in get_args(model.Guess)]
-    return sentence("payload.guessed", what=joined(found)) if found else ""
+    return sentence("payload.guessed", what=found) if found else ""
 
 
 def _rated(robot: Robot, *, official: bool = False) -> str:
@@ -230,10 +176,10 @@ def _rated(robot: Robot, *, official: bool = False) -> str:
     if wrist is None or not np.isfinite(wrist.payload):
         return ""
     if source is None or source.grade != "official":
-        return "" if official else sentence("payload.rated", kg=wrist.payload)
+        return "" if official else sentence("payload.rated", kg=wrist.payload, source="", doubt="claim")
     document, *_ = re.split("[;；]", own_title(source.source))
-    form = "official" if len(wrist.moment) and len(wrist.inertia) else "official_alone"
-    return sentence(f"payload.rated#{form}", source=document, kg=wrist.payload)
+    doubt = "official" if len(wrist.moment) and len(wrist.inertia) else "official_alone"
+    return sentence("payload.rated", kg=wrist.payload, source=document, doubt=doubt)
 
 
 def need_word(need: model.Need) -> str:
@@ -248,82 +194,48 @@ def quantity_word(quantity: model.Quantity) -> str:
 
 def use_text(use: model.Use) -> str:
     """What is asked for and allowed, where."""
-    parts = {
-        "what": quantity_word(use.quantity),
-        "asked": use.asked,
-        "allowed": use.allowed,
-        "unit": use.unit,
-        "percent": 100 * use.ratio,
-        "joint": use.joint,
-        "path": use.path,
-    }
-    if use.joint is None:
-        return sentence("dynamics.use#value", **parts)
-    if use.path is None:
-        return sentence("dynamics.use#joint", **parts)
-    return sentence("dynamics.use#path", **parts)
+    joint = f"J{use.joint}" if use.joint else ""
+    what = joined([quantity_word(use.quantity), joint, use.path or ""], ", ")
+    parts = {"asked": use.asked, "allowed": use.allowed, "unit": use.unit, "percent": 100 * use.ratio}
+    return sentence("dynamics.use", what=what, **parts)
 
 
 @says("dynamics.no_data")
 def _(found: Finding) -> str:
     needs: list[model.Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
-    return say_as(found, needs=joined(map(need_word, needs), ", "))
+    return say_as(found, needs=[*map(need_word, needs)])
 
 
 @say.register
 def _(found: model.NoLimits) -> str:
-    parts = {"joint": found.joint, "torque": found.torque, "tolerance": found.tolerance, "unit": found.unit}
-    greatest = say_as(found, "path" if found.path else "holding", **parts)
-    held = say_as(found, "at_rest", **vars(found.held) | {"torque": abs(found.held.torque)}) if found.held else ""
-    return joined([greatest, held, *_reservations(found)], " ")
+    held = [vars(found.held) | {"torque": abs(found.held.torque), "path": None}] if found.held else []
+    torques = [sentence("dynamics.torque", **each) for each in (vars(found), *held)]
+    return joined([say_as(found, torques=torques), *_reservations(found)], " ")
 
 
 @say.register
 def _(found: model.Compared) -> str:
-    tightest = use_text(found.tightest)
-    if isinstance(found, model.AllWithin):
-        verdict = sentence("dynamics.fits", use=tightest)
-    elif isinstance(found, model.Marginal):
-        masses = found.unsettled or found.doubts or found.grade == "inferred"
-        verdict = sentence("dynamics.marginal" if masses else "dynamics.marginal#open", use=tightest)
-    else:
-        verdict = sentence("dynamics.overload", count=found.compared, beyond=found.beyond, use=tightest)
-    open_ = not_run = ""
-    if found.unknown:
-        open_ = sentence("dynamics.unlimited", what=joined(map(need_word, found.unknown), ", "))
-    if found.not_run:
-        not_run = sentence("dynamics.not_run", count=len(found.not_run), names=joined(found.not_run, ", "))
-    return joined([verdict, open_, not_run, *_reservations(found)], " ")
+    masses = bool(found.unsettled or found.doubts or found.grade == "inferred")
+    unknown = [*map(need_word, found.unknown)]
+    sentences = [
+        say_as(found, use=use_text(found.tightest), masses=masses),  # type: ignore[arg-type]
+        sentence("dynamics.unlimited", unknown=unknown) if unknown else "",
+        sentence("dynamics.not_run", names=found.not_run) if found.not_run else "",
+    ]
+    return joined([*sentences, *_reservations(found)], " ")
 
 
 def _reservations(found: model.Compared | model.NoLimits) -> list[str]:
-    missing = ", ".join(map(str, found.missing_links))
     return [
-        sentence("dynamics.massless", count=len(found.missing_links), links=missing) if missing else "",
-        sentence("dynamics.doubts", count=found.doubts) if found.doubts else "",
-        _graded(found.grade),
+        sentence("dynamics.massless", links=found.missing_links) if found.missing_links else "",
+        sentence("dynamics.doubts", doubts=found.doubts) if found.doubts else "",
+        sentence("dynamics.graded", grade=found.grade) if found.grade else "",
     ]
-
-
-def _graded(grade: Grade | None) -> str:
-    if grade is None:
-        return ""
-    if grade == "inferred":
-        return sentence("dynamics.inferred")
-    return sentence("dynamics.graded", grade=word("dynamics.graded_as", GRADED, grade))
 
 
 @says("dynamics.unknown")
 def _(found: Finding) -> str:
-    if not found.numbers:
-        return need_word(found.what)
-    parts = {"what": need_word(found.what), "numbers": ", ".join(map(str, found.numbers))}
-    if found.what == "masses":
-        return sentence("dynamics.unknown#links", **parts)
-    return sentence("dynamics.unknown#joints", **parts)
-
-
-@says("impossible_inertia")
-def _(found: Finding) -> str:
-    why = word("dynamics.why", WHY, found.why)
-    return say_as(found, why=why)
+    links = found.what == "masses"
+    return bracketed(
+        need_word(found.what), ", ".join(body_word(f"link_{k}") if links else f"J{k}" for k in found.numbers)
+    )

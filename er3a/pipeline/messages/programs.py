@@ -9,19 +9,18 @@ from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
-from er3a.finding import AnyFinding, Finding, is_one
+from er3a.finding import Amount, AnyFinding, Finding
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.expectations import demonstrated, outcome_word
-from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed, unit_of
+from er3a.pipeline.messages.expectations import OUTCOMES, demonstrated
+from er3a.pipeline.messages.kinematics import SINGULARITIES, singular_pose
+from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed
 from er3a.pipeline.messages.say import (
+    WORDS,
     Maker,
-    Plural,
-    by,
+    bracketed,
     by_code,
     joined,
-    listed,
     say,
     say_as,
     says,
@@ -119,175 +118,91 @@ KEY_FIGURES = {
 
 TEXTS = texts(
     {
-        "programs.none": "The robot's list of programs is empty.",
-        "programs.programs": Plural(
-            "count", "{passed} of {count} program passes in the model", "{passed} of {count} programs pass in the model"
-        ),
-        "programs.not_examined": "not all examined ({names})",
-        "programs.fault": "{count} {word} ({names})",
-        "not_followed": "not followed: {text} ({reason})",
-        "not_followed.course": "not followed on from here: {reason}",
-        "way_not_known": "the start of the motion is not known; only the target was checked",
-        "configuration_guessed": "{solutions} solutions are possible, as the joints before are not known",
+        "programs.none": "The list of programs is empty.",
+        "programs.programs": "{passed} of {count} programs pass",
+        "programs.not_examined": "not all examined ({names:, })",
+        "programs.fault": "{count} {word:trajectory.path} ({names:, })",
+        "not_followed": "not followed: {text:not_followed} ({reason:target_reason})",
+        "way_not_known": "start of the motion unknown; only the target was checked",
+        "configuration_guessed": "{solutions} solutions possible: the joints before are not known",
         "configuration_not_met": "no solution within the limits, or not the line's end, has the configuration {text}",
         "whole_turn": "J{joint} turns by {angle_deg:.1f} deg; its nearest equivalent is {nearest_deg:.1f} deg away",
-        "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves by {moved_mm:.1f} mm",
-        "clear_of_assumed": (
-            "clear of {pair} by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by {margin_mm:g} mm"
-        ),
-        "clearance_not_proven": "clear at points of the way; between them that was not settled in the given time",
-        "zone_collides": "a corner path that the blending zone allows collides: {pair}, {depth_mm:.1f} mm deep",
-        "zone_collides.assumed": (
-            "a corner path that the blending zone allows collides, by assumed shapes: {pair}, {depth_mm:.1f} mm deep"
-        ),
-        "zone_too_large": "the zone of {zone_mm:.1f} mm is larger than half of a motion of {motion_mm:.1f} mm",
-        "target_out_of_reach": "the target is out of reach: {reasons:; }",
-        "way_out_of_reach": "out of reach after {at_mm:.1f} mm; at worst, {reasons}",
-        "configuration_ends": (
-            "the configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {angle_deg:.1f} {unit}"
-        ),
-        "meets_singularity": "meets the {type} singularity after {at:.1f} mm, where joint speeds have no bound",
-        "meets_singularity.bounded": "meets the {type} singularity after {at:.1f} mm",
-        "passes_singularity": "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm",
-        "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
-        "programs.rates": Plural(
-            "joints",
-            "{named} exceeds {limits}: {worst:, }",
-            "{named} exceed {limits}: {worst:, }",
-        ),
-        "programs.rates#far": Plural(
-            "joints",
-            "{named} exceeds {limits}, at worst by more than {times:g} times",
-            "{named} exceed {limits}, at worst by more than {times:g} times",
-        ),
+        "joint_jumps": "J{joint} turns by {angle_deg:.1f} deg while the tool moves {moved_mm:.1f} mm",
+        "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm",
+        "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
+        "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
+        "zone_too_large": "zone of {zone_mm:.1f} mm exceeds half of a motion of {motion_mm:.1f} mm",
+        "target_out_of_reach": "target out of reach: {reasons:; }",
+        "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons:; }",
+        "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",
+        "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds {bounded:bounded}",
+        "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
+        "programs.rates": "{named}: above {limits}; {worst:, }",
+        "programs.rates#far": "{named}: above {limits}, at worst by more than {times:g} times",
         "programs.cause": "{finding}: {pose}",
-        "arrives_otherwise": (
-            "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
-        ),
-        "motion_collides": "collision: {touches}",
-        "motion_collides.more": "collision: {touches}; and more later",
-        "motion_collides.assumed": "collision of assumed shapes: {touches}",
-        "motion_collides.assumed_more": "collision of assumed shapes: {touches}; and more later",
-        "bodies_touch": "{pair} after {at_mm:.1f} mm, up to {depth_mm:.1f} mm deep",
-        "bodies_touch.enlarged": "{touch} (these shapes are up to {enlarged_mm:.1f} mm larger than the meshes in them)",
-        "bodies_touch.joint": "{pair} after {t_s:.2f} s, up to {depth_mm:.1f} mm deep",
-        "speed_not_given": "the program gives no speed; {assumed:g} m/s were assumed for the duration",
-        "speed_not_given.share": "the program gives no speed; {percent:g} % were assumed for the duration",
-        "speed_not_given.word": (
-            "the speed '{word}' is not known, not above 0, or more than a controller takes; {assumed} was assumed for "
-            "duration and joint speeds"
-        ),
-        "suspect_number": by(
-            "kind",
-            unit="{text} looks like a number in {unit}; in the unit of this language that is {usual}",
-            impossible_speed="{text} is faster than any point of the arm can be ({usual})",
-            share="{text} of the joints' speed is more than there is, so that {usual} is taken",
-            speed="{text} is more than ten times the program's usual {usual}",
-            tool="the tool {text} is used here alone; the motions around have {usual}",
-            base="the base {text} is used here alone; the motions around have {usual}",
-        ),
-        "frames_from_robot_file": by(
-            "kind",
-            tool="no tool is set before this pose; the robot file's was taken, and the controller may have another",
-            base="no base is set before this pose; the robot's was taken, and the controller may have another",
-            both=(
-                "neither tool nor base is set before this pose; the tool of the robot file and the base of the robot "
-                "were taken, and the controller may have others"
-            ),
+        "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
+        "motion_collides": "collision ({assumed:shapes}): {touches:; }",
+        "bodies_touch": "{pair} after {at:.4g}, {depth_mm:.1f} mm deep",
+        "bodies_touch.enlarged": "shapes up to {enlarged_mm:.1f} mm larger than their meshes",
+        "speed_not_given": "no usable speed (given: {word:speed_given}); {assumed:g} assumed",
+        "suspect_number": "{text} looks like {kind:suspect}; expected: {usual}",
+        "frames_from_robot_file": (
+            "no {kind:frames} set before this pose: the robot file's was taken; the controller may have another"
         ),
         "program_not_understood": "not understood: {text}",
         "program_nothing_moves": "no instruction moves the arm",
-        "load_above_payload": "{mass_kg:g} kg on the flange, and the arm may carry {payload_kg:g} kg",
-        "written_zones_dropped": Plural(
-            "zones",
-            "{count} zone has no equivalent in this language: the arm stops there",
-            "{count} zones have no equivalent in this language: the arm stops there",
+        "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
+        "written_zones_dropped": "zones without equivalent (the arm stops there): {zones}",
+        "written_speeds_estimated": "durations written as speeds (ramps decide the time): {motions}",
+        "written_speeds_cut": "speeds above 100 % written as 100 %: {motions}",
+        "written_speeds_raised": "speeds raised to the least with a name, so faster than checked: {motions}",
+        "written_speeds_of_assumed": (
+            "speeds written with an assumed {assumed} as 100 % (the controller's may be far from that): {motions}"
         ),
-        "written_speeds_estimated": Plural(
-            "motions",
-            "{count} duration written as a speed: the controller's ramps decide the time",
-            "{count} durations written as speeds: the controller's ramps decide the time",
-        ),
-        "written_speeds_cut": Plural(
-            "motions",
-            "{count} speed above 100 % written as 100 %",
-            "{count} speeds above 100 % written as 100 %",
-        ),
-        "written_speeds_raised": Plural(
-            "motions",
-            "{count} speed below the least that has a name, which was taken: faster than what was checked",
-            "{count} speeds below the least that has a name, which was taken: faster than what was checked",
-        ),
-        "written_speeds_of_assumed": Plural(
-            "motions",
-            "{count} speed written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
-            "{count} speeds written with an assumed {assumed} as 100 %: the controller's 100 % may be far from that",
-        ),
-        "written_half_turns_split": Plural(
-            "lines",
-            "{count} line or arc that turns the tool by 180 deg written in two halves, which fixes the sense",
-            "{count} lines or arcs that turn the tool by 180 deg written in two halves, which fixes the sense",
-        ),
-        "written_targets_left_out": Plural(
-            "motions",
-            "{count} motion left out: its target is not known",
-            "{count} motions left out: their targets are not known",
-        ),
+        "written_half_turns_split": "lines or arcs with a turn by 180 deg halved, which fixes the sense: {lines}",
+        "written_targets_left_out": "motions left out (target unknown): {motions}",
         "written_tool_not_given": "set this tool or base on the controller: {name}",
-        "written_values_rounded": Plural(
-            "values",
-            "{count} speed or zone rounded down to the next that has a name",
-            "{count} speeds or zones rounded down to the next that has a name",
-        ),
-        "written_not_translated": Plural(
-            "instructions",
-            "{count} instruction of the other language kept as a comment",
-            "{count} instructions of the other language kept as comments",
-        ),
-        "written_one_side": Plural(
-            "branches",
-            "{count} branch of which one side alone was written: what the other does is left out",
-            "{count} branches of which one side alone was written: what the others do is left out",
-        ),
-        "written_external_axes_dropped": Plural(
-            "motions",
-            "{count} motion written without its external axes",
-            "{count} motions written without their external axes",
-        ),
-        "written_arcs_split": Plural(
-            "arcs",
-            "{count} arc written as {lines} lines that stay within {deviation:g} mm of it",
-            "{count} arcs written as {lines} lines that stay within {deviation:g} mm of them",
-        ),
-        "written_unsafe": "the path {path} is not safe: {verdict}",
+        "written_values_rounded": "speeds or zones rounded down to the next with a name: {values}",
+        "written_not_translated": "instructions of the other language kept as comments: {instructions}",
+        "written_one_side": "branches with one side written, the other left out: {branches}",
+        "written_external_axes_dropped": "motions written without external axes: {motions}",
+        "written_arcs_split": "arcs written as lines within {deviation_mm:g} mm: {arcs} as {lines}",
+        "written_unsafe": "path {path} is not safe: {verdict:trajectory.path}",
         "written_near_assumed": (
-            "the path {path} is clear by {clearance_mm:.1f} mm of assumed shapes only, which may be wrong by "
-            "{margin_mm:g} mm"
+            "path {path}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm"
         ),
         "written_beside_points": (
-            "the path {path} was checked with rounded corners that pass beside its points by up to {missed}; a "
-            "controller that stops at the points, or blends otherwise, moves elsewhere"
+            "path {path} was checked with corners rounded by up to {missed}; a controller that stops or blends "
+            "otherwise moves elsewhere"
         ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
-        "remedy.limit#above": (
-            "Give J{joint} {limit:g} {unit} at most; if the target is a pose, turn the tool otherwise there, or move "
-            "the target."
-        ),
-        "remedy.limit#below": (
-            "Give J{joint} {limit:g} {unit} at least; if the target is a pose, turn the tool otherwise there, or move "
-            "the target."
-        ),
-        "remedy.collision#solid": "Add a via point around {name}: the way meets it, the target does not.",
-        "remedy.collision#solid_at_target": "The arm overlaps {name} at the target: move the target away.",
+        "remedy.limit": "Keep J{joint} within {limit:g} deg; turn or move a target given as a pose.",
+        "remedy.collision#solid": "Add a via point around {name}: the target itself is clear.",
+        "remedy.collision#solid_at_target": "Move the target away from {name}: they overlap there.",
         "remedy.collision#links": (
-            "Keep these links apart: give the target another place, tool orientation or configuration, or add a via "
-            "point."
+            "Keep these links apart: give the target another place, orientation or configuration, or add a via point."
         ),
-        "remedy.slower": (
-            "Lower the speed of this line to {percent:g} % of its own or less, and its acceleration to "
-            "{acceleration:g} %."
-        ),
-        "programs.waits": Plural("count", "and {count} wait for a signal", "and {count} waits for signals"),
+        "remedy.slower": "Lower this line's speed to {percent:g} % or less, its acceleration to {acceleration:g} %.",
+        "programs.waits": "waits for signals: {count}",
+    }
+)
+WORDS.update(
+    {
+        "singularity": SINGULARITIES,
+        "trajectory.path": OUTCOMES,
+        "target_reason": REASONS,
+        "not_followed": {"": N_("from here on")},
+        "shapes": {True: N_("assumed shapes"), False: N_("stated shapes")},
+        "bounded": {True: N_("stay bounded"), False: N_("have no bound")},
+        "speed_given": {"": N_("none")},
+        "suspect": {
+            "impossible_speed": N_("more than any point of the arm can do"),
+            "share": N_("more than there is"),
+            "speed": N_("ten times the usual speed"),
+            "tool": N_("a tool used only here"),
+            "base": N_("a base used only here"),
+        },
+        "frames": {"tool": N_("tool"), "base": N_("base"), "both": N_("tool and base")},
     }
 )
 
@@ -296,16 +211,15 @@ TEXTS = texts(
 def _(found: Finding) -> str:
     passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
     unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
-    others = []
-    for outcome, names in unsound.items():
-        parts = {"count": len(names), "word": outcome_word(outcome), "names": joined(names, ", ")}
-        others.append(sentence("programs.fault", **parts) if names else "")
-    missed = joined(found.not_examined, ", ")
-    open_parts = sentence("programs.not_examined", names=missed) if missed else ""
+    others = [
+        sentence("programs.fault", count=len(names), word=outcome, names=names)
+        for outcome, names in unsound.items()
+        if names
+    ]
     sentences = [
         passed if found.programs else "",
         joined(others, ", "),
-        open_parts,
+        sentence("programs.not_examined", names=found.not_examined) if found.not_examined else "",
         demonstrated(found.demonstrations, found.programs),
     ]
     return sentence("finding", finding=joined(sentences))
@@ -316,84 +230,18 @@ def level_word(level: Level) -> str:
     return word("program_level", LEVELS, level)
 
 
-@says("not_followed")
-def _(found: Finding) -> str:
-    reason = word("target_reason", REASONS, found.reason)
-    if not found.text:
-        return sentence("not_followed.course", reason=reason)
-    return say_as(found, reason=reason)
-
-
-@says("way_out_of_reach")
-def _(found: Finding) -> str:
-    return say_as(found, reasons=joined(listed(found.reasons)))
-
-
-@says("configuration_ends", "arrives_otherwise")
-def _(found: Finding) -> str:
-    return say_as(found, unit=unit_of(found.slides))
-
-
-@says("meets_singularity")
-def _(found: Finding) -> str:
-    parts = {"type": singularity_word(found.type), "at": found.at_mm}
-    if found.bounded:
-        return sentence("meets_singularity.bounded", **parts)
-    return say_as(found, **parts)
-
-
-@says("passes_singularity")
-def _(found: Finding) -> str:
-    parts = {"type": singularity_word(found.type), "at": found.at_mm, "distance": found.distance}
-    if found.type == "shoulder":
-        return sentence("passes_singularity.mm", **parts)
-    return say_as(found, **parts)
-
-
 @say.register
 def _(found: found_in.MotionCollides) -> str:
-    parts = {"touches": joined(listed(found.touches[:MAX_PAIRS]))}
-    if len(found.touches) > MAX_PAIRS:
-        return sentence("motion_collides.assumed_more" if found.assumed else "motion_collides.more", **parts)
-    return sentence("motion_collides.assumed", **parts) if found.assumed else say_as(found, **parts)
-
-
-@says("zone_collides")
-def _(found: Finding) -> str:
-    code = "zone_collides.assumed" if found.assumed else "zone_collides"
-    return sentence(code, pair=say(found.pair), depth_mm=found.depth_mm)
+    rest = len(found.touches) - MAX_PAIRS
+    more = [sentence("more", count=rest)] if rest > 0 else []
+    return say_as(found, touches=(*found.touches[:MAX_PAIRS], *more))
 
 
 @say.register
 def _(found: found_in.BodiesTouch) -> str:
-    at = {"pair": say(found.pair), "depth_mm": found.depth_mm}
-    if found.at_mm is None:
-        touch = sentence("bodies_touch.joint", t_s=found.t_s, **at)
-    else:
-        touch = sentence("bodies_touch", at_mm=found.at_mm, **at)
-    if not found.enlarged_mm:
-        return touch
-    return sentence("bodies_touch.enlarged", touch=touch, enlarged_mm=found.enlarged_mm)
-
-
-@says("speed_not_given")
-def _(found: Finding) -> str:
-    if found.word:
-        assumed = f"{100 * found.assumed:g} %" if found.unit == "share" else f"{found.assumed:g} m/s"
-        return sentence("speed_not_given.word", word=found.word, assumed=assumed)
-    if found.unit == "share":
-        return sentence("speed_not_given.share", percent=found.assumed * 100)
-    return say_as(found)
-
-
-@says("written_arcs_split")
-def _(found: Finding) -> str:
-    return say_as(found, deviation=found.deviation_m * 1000)
-
-
-@says("written_unsafe")
-def _(found: Finding) -> str:
-    return say_as(found, verdict=outcome_word(found.verdict))
+    at = Amount(found.t_s, "s") if found.at_mm is None else Amount(found.at_mm, "mm")
+    enlarged = sentence("bodies_touch.enlarged", enlarged_mm=found.enlarged_mm) if found.enlarged_mm else ""
+    return bracketed(say_as(found, at=at), enlarged)
 
 
 ADVISED: dict[str, Maker] = {}
@@ -420,8 +268,7 @@ def _(found: Finding) -> str:
 
 @advises("above_limit", "below_limit")
 def _(found: Finding) -> str:
-    side = "above" if is_one(found, "above_limit") else "below"
-    return sentence(f"remedy.limit#{side}", joint=found.joint, limit=found.limit_deg, unit=tr("deg"))
+    return sentence("remedy.limit", joint=found.joint, limit=found.limit_deg)
 
 
 @remedy.register

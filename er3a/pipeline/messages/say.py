@@ -59,6 +59,8 @@ LONGEST, EXCERPT = 2_000, 200  # letters
 Text = str | Plural
 _texts: dict[str, Text] = {}
 Maker = Callable[[Found], str]
+WORDS: dict[str, Mapping[Any, str]] = {}
+"""Tables of words marked with ``N_``: a field whose format names one takes its word, as ``{reason:target_reason}``."""
 MAKERS: dict[str, Maker] = {}
 """What makes the texts of findings, by their codes, where a text alone can't."""
 _fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
@@ -167,7 +169,9 @@ def sentence(key: str, /, **parts: Any) -> str:
 
 
 def _as_text(part: Any, spec: str) -> str:
-    """A part of a text: findings as sentences, several parts joined as the format says."""
+    """A part of a text: findings as sentences, words out of tables, several parts joined as the format says."""
+    if spec in WORDS:
+        part, spec = word(spec, WORDS[spec], part), ""
     if isinstance(part, tuple | list):
         return joined([_as_text(each, "") for each in part], spec or "; ")
     if hasattr(part, "code"):
@@ -177,7 +181,7 @@ def _as_text(part: Any, spec: str) -> str:
     return language.as_text(excerpt(part) if isinstance(part, str) else part, spec)
 
 
-def word(code: str, words: Mapping[KeyT, str], key: KeyT) -> str:
+def word(code: str, words: Mapping[Any, str], key: Any) -> str:
     """The word for a code out of a table of words marked with ``N_``; a key without one stays as it is."""
     return language.translated(code, words[key]) if key in words else key
 

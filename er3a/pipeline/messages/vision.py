@@ -14,7 +14,7 @@ from er3a.finding import Finding
 from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.language import N_, as_text
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, joined, listed, say, say_as, says, sentence, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.vision_findings import Convention, Suspect
 
@@ -27,7 +27,13 @@ MENDING = {
     "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
     "rotation": N_("no typical detector error explains it"),
 }
-STREAMS = {"flange": N_("flange"), "target": N_("board"), "both": N_("flange and board")}
+STREAMS = {
+    "flange": N_("flange"),
+    "target": N_("board"),
+    "board": N_("board"),
+    "camera": N_("camera"),
+    "both": N_("flange and board"),
+}
 CONVENTIONS: dict[Convention, str] = {
     "inverted": N_("its poses are inverted"),
     "transposed": N_("its rotations are transposed"),
@@ -56,209 +62,120 @@ KEY_FIGURES = {
 
 TEXTS = texts(
     {
-        "calibration_impossible": "The samples determine no hand-eye pose: {why}.",
-        "calibration_doubtful": "The calibration can't be used, so no grasp rests on it: {warnings:; }.",
-        "touch_contradicts": Plural(
-            "points",
-            "{count} touched point contradicts the calibration: it is {largest_mm:.3g} mm off (probability "
-            "{probability:.1g}).",
-            "{count} touched points contradict the calibration: they are up to {largest_mm:.3g} mm off "
-            "(probability {probability:.1g}).",
+        "calibration_impossible": "No hand-eye pose: {why}.",
+        "calibration_doubtful": "The calibration can't be used for grasps: {warnings:; }.",
+        "touch_contradicts": (
+            "Touched points contradict the calibration: {points}, off by up to {largest_mm:.3g} mm (probability "
+            "{probability:.1g})."
         ),
         "not_grasped_object": "not {name} ({why})",
-        "grasp_out_of_reach": Plural(
-            "poses", "its only grasp is out of reach", "all {count} poses of its grasps are out of reach"
-        ),
-        "grasp_near_limits": Plural(
-            "solutions",
-            "the only solution is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are required",
-            "the best of {count} solutions is {margin_deg:.1f} deg from the joint limits; {needed_deg:g} deg are "
-            "required",
-        ),
-        "grasp_near_ends": Plural(
-            "solutions",
-            "the only solution is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; {needed_deg:g} "
-            "are required",
-            "the best of {count} solutions is {margin_deg:.1f} deg (mm of a prismatic joint) from the joint limits; "
-            "{needed_deg:g} are required",
-        ),
-        "grasp_singular": (
-            "all solutions within the limits are singular: the least singular value is {singular_value:.2g} at best, "
-            "and {needed:g} is required"
-        ),
-        "no_transfer": "the straight move to the approach collides, and there is no other: {why}",
-        "grasp_counts#grasped": Plural(
-            "count", "{grasped} of {count} object can be grasped", "{grasped} of {count} objects can be grasped"
-        ),
-        "grasp_counts#assumed": Plural(
-            "count",
-            "{count} more only if shapes that no document gives are right ({assumed:, })",
-            "{count} more only if shapes that no document gives are right ({assumed:, })",
-        ),
-        "grasp_counts#error": "at the worst grasp 95 % of errors stay below {point_mm:.2g} mm",
-        "grasp_counts#success": "the probability of success is at least {percent:g} %",
-        "grasp_counts#simulated": "The camera's samples are simulated.",
+        "grasp_out_of_reach": "grasp poses, all out of reach: {poses}",
+        "grasp_near_limits": "best of {solutions} solutions: {margin:.1f} from the joint limits; {needed:g} required",
+        "grasp_singular": "all solutions singular: singular value {singular_value:.2g} at best; {needed:g} required",
+        "no_transfer": "the straight move to the approach collides, and no other was found: {why}",
+        "grasp_counts#grasped": "{grasped} of {objects} objects can be grasped",
+        "grasp_counts#assumed": "{count} more only if undocumented shapes are right ({assumed:, })",
+        "grasp_counts#error": "95 % of errors below {point_mm:.2g} mm at the worst grasp",
+        "grasp_counts#success": "probability of success at least {percent:g} %",
         "grasp_counts#left_out": "calibrated without {left_out:, }",
-        "grasp_unlikely": (
-            "the gripper's tolerance is kept with a probability of {p:.3g} % at best, and {level:.3g} % is required"
-        ),
-        "grasp_collides#apart": (
-            "at the grasp {pair} are at most {clearance_mm:.1f} mm apart; {needed_mm:g} mm are required"
-        ),
-        "grasp_collides#overlap": "at the grasp {pair} overlap by at least {depth:.1f} mm",
-        "line_leaves": "the straight {part} exceeds limits or becomes singular {after_mm:.0f} mm from the grasp",
-        "line_unproven": (
-            "along the straight {part} the bounds can't decide whether limits, joint speeds and distances from "
-            "singularities are kept"
-        ),
-        "way_collides#apart": "on the {part} {pair} are {clearance_mm:.1f} mm apart; {needed_mm:g} mm are required",
-        "way_collides#overlap": "on the {part} {pair} overlap by {depth:.1f} mm",
+        "grasp_unlikely": "within the gripper's tolerance with probability {probability:.3g}; {needed:.3g} required",
+        "grasp_collides": "at the grasp, {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm required",
+        "line_leaves": "{part:vision.part} exceeds limits or becomes singular {after_mm:.0f} mm from the grasp",
+        "line_unproven": "{part:vision.part}: limits, joint speeds and distance from singularities not proven",
+        "way_collides": "{part:vision.part}, {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm required",
         "far_from_fit": (
-            "{sample}: {off_mm:.3g} mm and {off_deg:.2g} deg from what the other samples predict (probability "
+            "{sample}: {off_mm:.3g} mm, {off_deg:.2g} deg from the other samples' prediction (probability "
             "{probability:.1g})"
         ),
         "ambiguous_tilt": (
-            "{sample}: the flat board is seen almost head-on, or too small: the mirrored tilt fits with only "
-            "{ratio:.2g} times the error. Take the image from nearer, or tilt the board by 30 deg"
+            "{sample}: the mirrored tilt fits with only {ratio:.2g} times the error. Take the image from nearer, or "
+            "tilt the board by 30 deg"
         ),
-        "boardless_image": "{sample}: {corners} corners of the board are found in {image}; the sample is left out",
+        "boardless_image": "{sample}: left out; {corners} corners of the board found in {image}",
         "no_majority": (
-            "flange and board rotate by different angles in {pairs} of {of} pairs of samples ({median_deg:.3g} deg in "
-            "the median): the robot's table, the order of the samples, or the orientations of one stream are wrong"
+            "flange and board rotate differently in {pairs} of {of} pairs ({median_deg:.3g} deg in the median). "
+            "Suspects: the robot's table, samples' order, orientations of a stream"
         ),
         "board_scale": (
-            "the samples fit a board {factor:.4g} ± {half_width:.1g} times as large: check the stated size of its "
-            "squares, the units, or the camera's focal length"
+            "a board {factor:.4g} ± {half_width:.1g} times as large fits: check the size of its squares, the units, "
+            "or the focal length"
         ),
         "focal_length": (
-            "the samples fit with distances along the camera's axis {factor:.4g} ± {half_width:.1g} times as large, as "
-            "if the focal length, by which the board's poses were computed, had to be as many times as long: estimate "
-            "the camera's intrinsics again, check that they are of this image size, and compute the poses with them"
+            "a focal length {factor:.4g} ± {half_width:.1g} times as long fits. Check the intrinsics' image size, or "
+            "estimate them again, and compute the poses with them"
         ),
         "principal_point": (
-            "the samples fit with the board {percent:+.2g} ± {half_width_percent:.1g} % of its distance farther along "
-            "the camera's {axis}, as if the principal point, with which the board's poses were computed, were off by "
-            "that share of the focal length: estimate the camera's intrinsics again, and compute the poses with them"
+            "a principal point off along the camera's {axis} by {percent:+.2g} ± {half_width_percent:.1g} % of the "
+            "focal length fits. Estimate the intrinsics again, and compute the poses with them"
         ),
         "little_motion": (
-            "the samples rotate by at most {greatest_turn_deg:.3g} deg, about axes within {axes_apart_deg:.2g} deg of "
-            "one direction: add poses rotated by 30 deg or more about a second axis"
+            "samples rotate by at most {greatest_turn_deg:.3g} deg, axes within {axes_apart_deg:.2g} deg of one "
+            "direction. Add poses rotated by 30 deg or more about a second axis"
         ),
         "more_scatter": (
-            "the residuals are {scatter:.3g} times the stated standard deviations, where chance explains at most "
-            "{largest:.2f}: the arm's table, its repeatability or the camera is worse than stated"
+            "residuals are {scatter:.3g} times the stated standard deviations; chance explains {largest:.2f}: table, "
+            "repeatability or camera is worse than stated"
         ),
-        "moved_between": by(
-            "what",
-            camera="from {sample} on the camera stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one "
-            "of the two parts of the set alone, or take the samples again",
-            board="from {sample} on the board stands {moved_mm:.2g} mm and {moved_deg:.2g} deg elsewhere: give one of "
-            "the two parts of the set alone, or take the samples again",
+        "moved_between": (
+            "{what:vision.stream} moved by {moved_mm:.2g} mm, {moved_deg:.2g} deg before {sample}: give one part of "
+            "the set alone, or take the samples again"
         ),
         "not_converged": (
-            "the fit of the {samples} samples does not converge, so neither the poses nor their intervals hold: add "
-            "samples, and check that both streams belong together"
+            "the fit of {samples} samples does not converge: add samples, and check that both streams belong together"
         ),
         "joint_zero": (
-            "the zero of J{joint}, or another entry of the arm's table, is wrong: with the joint {offset_deg:+.2f} ± "
-            "{half_width_deg:.1g} deg from its recorded angle the residuals are {rms_other_mm:.2g} mm, as given "
-            "{rms_given_mm:.3g} mm. Set the joint's zero again and repeat the samples"
+            "zero of J{joint} (or another entry) off by {offset_deg:+.2f} ± {half_width_deg:.1g} deg: residuals "
+            "{rms_other_mm:.2g}, as given {rms_given_mm:.3g} mm. Set the zero again and repeat the samples"
         ),
-        "few_samples": (
-            "samples at only {samples} poses: a wrong one can't be found among so few, and the intervals rest on "
-            "little; add poses, ten or more are advised"
-        ),
-        "too_few_samples": "{samples} samples; {needed} are needed, and ten or more advised",
-        "all_samples_equal": by(
-            "stream",
-            target="the board is seen in the same pose in all samples: check what was recorded",
-            flange="the flange has the same pose in all samples: move the arm between them",
-        ),
+        "few_samples": "{samples} poses are too few to find a wrong one: add poses, ten or more",
+        "too_few_samples": "{samples} samples; {needed} needed, ten or more advised",
+        "all_samples_equal": "{stream:vision.stream}: same pose in all samples; check the record, move the arm between",
         "no_rotation": (
-            "the flange rotates by at most {greatest_turn_deg:.2g} deg, so the camera's position is undetermined: "
-            "rotate it by 30 deg or more"
+            "the flange rotates by at most {greatest_turn_deg:.2g} deg, so the camera's position stays open: rotate "
+            "it by 30 deg or more"
         ),
-        "nothing_fits": "no poses of camera and board fit the samples: the two streams don't belong together",
+        "nothing_fits": "no poses of camera and board fit: the streams don't belong together",
         "rotation_mismatch": (
-            "{sample}: flange and board rotate by different angles relative to the other samples, {off_deg:.1f} deg "
-            "in the median; {kind}"
+            "{sample}: rotates unlike the other samples, {off_deg:.1f} deg in the median; {kind:vision.mending}"
         ),
         "other_convention": (
-            "the samples fit if {stream} differs: {convention}. Residuals are then {rms_other_mm:.2g} mm and "
-            "{rms_other_deg:.2g} deg, as given {rms_given_mm:.3g} mm and {rms_given_deg:.3g} deg. Convert the poses, "
-            "or take the other setup"
+            "{stream:vision.stream}: {convention:vision.convention}. Residuals then {rms_other_mm:.2g} mm, "
+            "{rms_other_deg:.2g} deg; as given {rms_given_mm:.3g} mm, {rms_given_deg:.3g} deg. Convert the poses, or "
+            "take the other setup"
         ),
         "unexplained_residuals": (
-            "the residuals are {rms_mm:.3g} mm and {rms_deg:.2g} deg, and no common convention explains them: check "
-            "the order of the samples, the board's size, tool and base of the poses, and clocks (widest_s)"
+            "residuals {rms_mm:.3g} mm, {rms_deg:.2g} deg; no common convention explains them. Check samples' order, "
+            "board size, tool, base and clocks (widest_s)"
         ),
         "parallel_axes": (
-            "all motions rotate about one direction ({x:.2f}, {y:.2f}, {z:.2f}) within {spread_deg:.2g} deg, so the "
-            "translation along it is undetermined: add poses rotated about another axis by 30 deg or more"
+            "all motions rotate about ({axis:, }) within {spread_deg:.2g} deg, so the shift along it stays open. Add "
+            "poses rotated about another axis by 30 deg or more"
         ),
+    }
+)
+WORDS.update(
+    {
+        "vision.part": PARTS,
+        "vision.mending": MENDING,
+        "vision.stream": STREAMS,
+        "vision.convention": CONVENTIONS,
     }
 )
 
 
 @says("grasp_counts")
 def _(found: Finding) -> str:
-    grasped = say_as(found, "grasped", count=found.objects)
     percent = None if found.probability is None else math.floor(1000 * found.probability) / 10
-    success = "" if percent is None else say_as(found, "success", percent=percent)
-    error = say_as(found, "error") if found.point_mm is not None else ""
-    assumed = say_as(found, "assumed", count=len(found.assumed)) if found.assumed else ""
-    left = say_as(found, "left_out") if found.left_out else ""
     sentences = [
-        grasped if found.objects else "",
-        assumed,
-        success,
-        error,
+        say_as(found, "grasped") if found.objects else "",
+        say_as(found, "assumed", count=len(found.assumed)) if found.assumed else "",
+        "" if percent is None else say_as(found, "success", percent=percent),
+        say_as(found, "error") if found.point_mm is not None else "",
         *listed(found.missed),
-        left,
+        say_as(found, "left_out") if found.left_out else "",
         demonstrated(found.demonstrations, found.objects),
     ]
-    simulated = say_as(found, "simulated") if found.simulated else ""
-    return joined([sentence("finding", finding=joined(sentences)), simulated], " ")
-
-
-@says("grasp_unlikely")
-def _(found: Finding) -> str:
-    return say_as(found, p=100 * found.probability, level=100 * found.needed)
-
-
-@says("grasp_collides")
-def _(found: Finding) -> str:
-    if found.clearance_mm < 0:
-        return say_as(found, "overlap", depth=-found.clearance_mm)
-    return say_as(found, "apart")
-
-
-@says("line_leaves", "line_unproven")
-def _(found: Finding) -> str:
-    return say_as(found, part=word("vision.part", PARTS, found.part))
-
-
-@says("way_collides")
-def _(found: Finding) -> str:
-    if found.clearance_mm < 0:
-        return say_as(found, "overlap", part=word("vision.part", PARTS, found.part), depth=-found.clearance_mm)
-    return say_as(found, "apart", part=word("vision.part", PARTS, found.part))
-
-
-@says("rotation_mismatch")
-def _(found: Finding) -> str:
-    return say_as(found, kind=word("vision.mending", MENDING, found.kind))
-
-
-@says("other_convention")
-def _(found: Finding) -> str:
-    stream = word("vision.stream", STREAMS, found.stream)
-    return say_as(found, stream=stream, convention=word("vision.convention", CONVENTIONS, found.convention))
-
-
-@says("parallel_axes")
-def _(found: Finding) -> str:
-    return say_as(found, x=found.axis[0], y=found.axis[1], z=found.axis[2])
+    return sentence("finding", finding=joined(sentences))
 
 
 def pose_words(setup: str) -> tuple[str, str]:
