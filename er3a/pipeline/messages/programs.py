@@ -14,7 +14,7 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed, unit_of
+from er3a.pipeline.messages.planning import rate_needed, unit_of
 from er3a.pipeline.messages.say import (
     Maker,
     Plural,
@@ -30,7 +30,7 @@ from er3a.pipeline.messages.say import (
     word,
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
-from er3a.planning.motion_faults import AccelerationTooGreat, TooFast, TooFastIfAssumed
+from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, MotionCollides, NotFollowedReason
 from er3a.programs.program_names import ProgramOutcome
@@ -69,7 +69,7 @@ OTHER_SOLUTION = N_(
 )
 FRAMES = N_("Map the name to a frame under frames in the file that lists the programs (--frames).")
 REMEDIES: dict[str, str] = {
-    "slide_exceeded": OTHER_SOLUTION,
+    "limit_exceeded": OTHER_SOLUTION,
     "combination_exceeded": OTHER_SOLUTION,
     "target_out_of_reach": NEARER,
     "way_out_of_reach": NEARER,
@@ -106,7 +106,6 @@ SINGULAR: dict[SingularityType, str] = {
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
 }
-Pace = TooFast | TooFastIfAssumed
 MAX_PAIRS = 3  # that are named of a collision
 KEY_FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
@@ -150,16 +149,6 @@ TEXTS = texts(
         "meets_singularity.bounded": "meets the {type} singularity after {at:.1f} mm",
         "passes_singularity": "passes the {type} singularity at {distance:.2f} deg, after {at:.1f} mm",
         "passes_singularity.mm": "passes the {type} singularity at {distance:.1f} mm, after {at:.1f} mm",
-        "programs.rates": Plural(
-            "joints",
-            "{named} exceeds {limits}: {worst:, }",
-            "{named} exceed {limits}: {worst:, }",
-        ),
-        "programs.rates#far": Plural(
-            "joints",
-            "{named} exceeds {limits}, at worst by more than {times:g} times",
-            "{named} exceed {limits}, at worst by more than {times:g} times",
-        ),
         "programs.cause": "{finding}: {pose}",
         "arrives_otherwise": (
             "the arm arrives in other joint angles than the target's: J{joint} differs by {difference_deg:.2f} {unit}"
@@ -433,16 +422,17 @@ def _(found: MotionCollides) -> str:
     return sentence("remedy.collision#links")
 
 
-@remedy.register
-def _(found: TooFast | TooFastIfAssumed) -> str:
-    percent = math.floor(1000 / found.ratio) / 10
+@advises("too_fast")
+def _(found: Finding) -> str:
+    percent = math.floor(1000 / rate_ratio(found)) / 10
     return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
-@remedy.register
-def _(found: AccelerationTooGreat) -> str:
-    percent = math.floor(1000 / math.sqrt(found.ratio)) / 10
-    return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / found.ratio) / 10)
+@advises("acceleration_too_great")
+def _(found: Finding) -> str:
+    ratio = rate_ratio(found)
+    percent = math.floor(1000 / math.sqrt(ratio)) / 10
+    return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / ratio) / 10)
 
 
 @advises("zone_too_large")
@@ -450,17 +440,12 @@ def _(found: Finding) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
-def rates_text(paces: Sequence[Pace]) -> str:
+def rates_text(paces: Sequence[RateCause]) -> str:
     """What is too fast on a line, all joints together: the worst of them."""
     joints = sorted({each.joint for each in paces})
-    worst = max(paces, key=lambda each: each.ratio)
-    limits = sentence(
-        "rate_limits#known" if any(isinstance(each, TooFast) for each in paces) else "rate_limits#assumed"
-    )
-    parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
-    if worst.ratio > UNBOUNDED:
-        return sentence("programs.rates#far", times=UNBOUNDED, **parts)
-    return sentence("programs.rates", worst=(rate_needed(worst),), **parts)
+    worst = rate_needed(max(paces, key=rate_ratio))
+    named = ", ".join(f"J{joint}" for joint in joints)
+    return sentence("rates", named=named, worst=(worst,)) if len(joints) > 1 else worst
 
 
 def singular_cause(found: AnyFinding) -> str:
@@ -474,9 +459,9 @@ def remedies(findings: Sequence[CheckFinding | FindingAt]) -> list[str]:
     worst = max((RANKS[each.level] for each in located), default=0)
     kept: list[CheckFinding] = [each for each in findings if not isinstance(each, FindingAt)]
     kept += [each.finding for each in located if RANKS[each.level] == worst]
-    fast = [each for each in kept if isinstance(each, Pace)]
-    slowest = max(fast, key=lambda each: each.ratio, default=None)
-    said = (remedy(each) for each in kept if not isinstance(each, Pace) or each is slowest)
+    fast = [each for each in kept if is_one(each, "too_fast")]
+    slowest = max(fast, key=rate_ratio, default=None)
+    said = (remedy(each) for each in kept if not is_one(each, "too_fast") or each is slowest)
     return list(dict.fromkeys(filter(None, said)))
 
 
