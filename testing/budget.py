@@ -2,16 +2,20 @@
 
 ``make lint`` runs this. A room over its budget fails; budgets only fall. Tokens are counted without comments and
 docstrings: explaining a thing is free, writing it twice is not. Scripts and catalogues are counted in lines.
+
+Words that say little (``tool.er3a.words``: "beside", "apart" and the like) are counted, too, in names, comments and
+docstrings of the package and in the documents; there may be no more of them than the table says.
 """
 
 from __future__ import annotations
 
 import ast
 import io
+import re
 import sys
 import tokenize
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -71,9 +75,17 @@ def weights(budgets: dict[str, list[str]], root: Path = ROOT) -> Iterator[tuple[
         yield room, sum(weight(path) for path, (_, its) in room_of.items() if its == room)
 
 
+def uses(words: Iterable[str], root: Path = ROOT) -> dict[str, int]:
+    """How often words are used in modules and documents; part of a name counts, too (``_told_apart``)."""
+    files = [*(root / "er3a").rglob("*.py"), *(root / "docs").glob("*.md"), root / "README.md"]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    return {word: len(re.findall(rf"(?<![a-z]){word}(?![a-z])", text, re.IGNORECASE)) for word in words}
+
+
 def main() -> int:
-    """Print the rooms; 1 if one is over its budget."""
-    table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["er3a"]["budget"]
+    """Print the rooms, and words that are used too often; 1 if there is anything over its budget."""
+    own = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["er3a"]
+    table = own["budget"]
     over = 0
     total = 0
     for room, found in weights({room: entry["files"] for room, entry in table.items()}):
@@ -82,6 +94,9 @@ def main() -> int:
         total += found if table[room]["files"][0].endswith(".py") else 0
         print(f"{'OVER' if found > allowed else '':4} {found:8} of {allowed:8}  {room}")
     print(f"     {total:8} tokens of code in all")
+    for word, found in uses(own["words"]).items():
+        over += found > own["words"][word]
+        print(f"{'OVER' if found > own['words'][word] else '':4} {found:8} of {own['words'][word]:8}  uses of {word}")
     return 1 if over else 0
 
 

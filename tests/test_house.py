@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-LONGEST_FUNCTION = 80
+LONGEST_FUNCTION = 60  # lines without its docstring
 MAX_POSITIONAL = 6
 KERNELS = {"kernel", "inner_kernel"}
 
@@ -48,6 +48,12 @@ def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
             yield f"{place} {node.name}", node
 
 
+def lines_of(function: ast.FunctionDef) -> int:
+    """The lines of a function without its docstring."""
+    text = function.body[0] if ast.get_docstring(function) else None
+    return function.end_lineno - function.lineno + 1 - (text.end_lineno - text.lineno + 1 if text else 0)
+
+
 def several(places: dict[str, set[str]]) -> dict[str, set[str]]:
     """Those names that stand in more than one place."""
     return {name: where for name, where in places.items() if len(where) > 1}
@@ -59,8 +65,7 @@ def test_the_rules_are_read_off_the_whole_package():
 
 
 def test_no_function_is_long():
-    long = [place for place, function in functions() if function.end_lineno - function.lineno >= LONGEST_FUNCTION]
-    assert long == []
+    assert [place for place, function in functions() if lines_of(function) > LONGEST_FUNCTION] == []
 
 
 def test_no_function_takes_many_positional_arguments():

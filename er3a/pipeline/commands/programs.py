@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -19,7 +19,17 @@ from er3a.programs.program_names import LanguageName
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+if TYPE_CHECKING:
+    from er3a.pipeline.program_reports import CheckedFile
+
 LEAST_S = 1.0  # to read a file for which no time is left
+ProgramFiles = Annotated[
+    list[Path],
+    typer.Argument(
+        callback=given_files,
+        help="robot programs (the language is detected), or tables of joint values over time (.csv)",
+    ),
+]
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
 StartOption = Annotated[
     str | None,
@@ -48,13 +58,7 @@ Seconds = Annotated[
 
 @app.command(rich_help_panel=PROGRAMS)
 def check_program(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            callback=given_files,
-            help="robot programs (the language is detected), or tables of joint values over time (.csv)",
-        ),
-    ],
+    files: ProgramFiles,
     *,
     robot: RobotOption,
     start: StartOption = None,
@@ -75,18 +79,7 @@ def check_program(
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
-    from er3a.pipeline.program_reports import (
-        accepted,
-        checked_file,
-        cycle_line,
-        json_of,
-        lines_of,
-        missed_line,
-        sarif_of,
-        scope_line,
-        shapes_line,
-        without,
-    )
+    from er3a.pipeline.program_reports import accepted, checked_file, json_of, sarif_of, without
     from er3a.pipeline.progress import TimeBudget, shown_work, work_clock
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
@@ -116,16 +109,23 @@ def check_program(
     if as_json:
         print_json(json_of(checked))
     else:
-        for each in checked:
-            for line in filter(None, (scope_line(each), *lines_of(each, every, verdicts))):
-                print(line)
-        missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
-        for line in filter(None, (*map(cycle_line, checked), shapes_line(arm), missed_line(missed))):
-            print_note(line)
+        _print_checked(checked, arm, every, verdicts)
     if any(each.check is None for each in checked):
         raise typer.Exit(2)
     if any(RANKS[each.level] >= RANKS[fail_on.value] or each.lacks(required) for each in checked):
         raise typer.Exit(1)
+
+
+def _print_checked(checked: Sequence[CheckedFile], arm: Robot, every: bool, verdicts: bool) -> None:
+    """Print findings to standard output, and what holds for all motions to standard error."""
+    from er3a.pipeline.program_reports import cycle_line, lines_of, missed_line, scope_line, shapes_line
+
+    for each in checked:
+        for line in filter(None, (scope_line(each), *lines_of(each, every, verdicts))):
+            print(line)
+    missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
+    for line in filter(None, (*map(cycle_line, checked), shapes_line(arm), missed_line(missed))):
+        print_note(line)
 
 
 def _until(end: float, clock: Callable[[], float]) -> Callable[[], bool]:

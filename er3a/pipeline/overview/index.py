@@ -395,13 +395,8 @@ def _entry(
         "dh_instead": {instead: f"#dh-{instead}"} if instead else {},
         "answers": [*([settled] if settled else []), *_answers(heads, robot, placed)],
         "outdated": changed_text(outdated, {name}),
-        "notes": {
-            stage: tr("changed since") if stage in changed else _note(head, [r for r in runs if r["stage"] == stage])
-            for stage, head in heads.items()
-        },
-        "bare": any(
-            _assumes(heads[stage], "carried") or _assumes(heads[stage], "tool") for stage in MAY_RUN if stage in heads
-        ),
+        "notes": _notes(heads, runs, changed),
+        "bare": any(_assumes(heads[stage], "carried", "tool") for stage in MAY_RUN if stage in heads),
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
@@ -421,15 +416,28 @@ def _entry(
             same_arm=same_arm,
             **proposed(finding, shown_path(study.robot_file(name))),
         ),
-        "cells": [
-            _cell(head, changed.get(head.stage, ()))
-            for head in sorted(heads.values(), key=lambda head: (head.stage not in changed, FIRST.index(head.status)))
-        ],
+        "cells": _cells(heads, changed),
         "expected": expected,
         "meant": _meant(heads, expected),
         "not_examined": [tr(STAGES[stage].title) for stage in stages if stage not in heads],
         "not_asked": [tr(stage.title) for name, stage in STAGES.items() if name not in stages],
     }
+
+
+def _notes(
+    heads: Mapping[str, Head], runs: Sequence[Mapping[str, Any]], changed: Mapping[str, Sequence[str]]
+) -> dict[str, str]:
+    """What stands beside the name of each stage."""
+    return {
+        stage: tr("changed since") if stage in changed else _note(head, [r for r in runs if r["stage"] == stage])
+        for stage, head in heads.items()
+    }
+
+
+def _cells(heads: Mapping[str, Head], changed: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
+    """What is said of each stage: first what has changed since, then the gravest."""
+    order = sorted(heads.values(), key=lambda head: (head.stage not in changed, FIRST.index(head.status)))
+    return [_cell(head, changed.get(head.stage, ())) for head in order]
 
 
 def _motions(
@@ -565,9 +573,9 @@ def _parts(heads: Mapping[str, Head]) -> Sequence[PartFound]:
     return evidence.parts if evidence else ()
 
 
-def _assumes(head: Head, reason: str) -> bool:
+def _assumes(head: Head, *reasons: str) -> bool:
     """Whether a stage assumes something."""
-    return any(each.reason == reason for each in head.summary.assumed)
+    return any(each.reason in reasons for each in head.summary.assumed)
 
 
 def _without_box() -> str:

@@ -18,7 +18,7 @@ from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
-from er3a.pipeline.scope import OF_MOTIONS, Coverage, by_reason, coverages
+from er3a.pipeline.scope import OF_MOTIONS, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
@@ -169,11 +169,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
-    wrong = (
-        fact("collision.shapes_overlap", pairs=bodies.in_error, free_ratio=space.whole.value)
-        if bodies.in_error
-        else None
-    )
+    wrong = bodies.in_error and fact("collision.shapes_overlap", pairs=bodies.in_error, free_ratio=space.whole.value)
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     undecided = int((matrix.state == "undecided").sum())
@@ -190,7 +186,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     rows = model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness))
     return model.CollisionResults(
         summary=model.CollisionSummary(
-            verdict=_verdict(pairs, mounting, wrong, free, home).with_assumed_shapes(assumed),
+            verdict=_verdict(pairs, mounting, wrong or None, free, home).with_assumed_shapes(assumed),
             figures=_figures(space, places_found, matrix),
             scene=scene.title if scene else None,
             samples=settings.samples,
@@ -204,11 +200,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             mounting=mounting,
             closest=closest,
             checked=_checked(study, name, covered, motions),
-            assumed=(
-                *by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed),
-                *assumed_tool(robot),
-                *covered.assumed,
-            ),
+            assumed=(*_chosen(motions), *assumed_tool(robot), *covered.assumed),
         ),
         matrix=matrix,
         pairs=pairs,
@@ -216,6 +208,11 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         targets=targets,
         paths=paths,
     )
+
+
+def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
+    """What was chosen for the paths that are given to be run."""
+    return by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed)
 
 
 def _home(bodies: Bodies) -> tuple[Reals, Pair | None, float]:
