@@ -192,7 +192,7 @@ def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, told, tm
         content["robots"][NAME][part] = str(tmp_path / f"{part}.yaml")
     verdict = compute(Study.model_validate(content), NAME).summary.verdict
     assert (verdict.status, verdict.finding.code) == (status, "collision.home_collides")
-    assert re.search(rf"\(free, .*?\)\. {told}In the home pose ", say(verdict.finding))
+    assert re.search(rf"\(free, .*?\)\. {told}At home ", say(verdict.finding))
 
 
 @pytest.mark.long

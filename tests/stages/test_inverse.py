@@ -153,7 +153,7 @@ def test_chosen_is_the_nearest_by_brute_force(computed):
         best = rows.take(rows.rank == 1)
         np.testing.assert_array_equal(best.q_deg, [chosen])
         assert best.first_of_branch.all()
-        assert target.reason.move.angle_deg == pytest.approx(np.abs(chosen - q_ref).max())
+        assert target.reason.move.move.value == pytest.approx(np.abs(chosen - q_ref).max())
         # A self-motion adds rows that are no turns of the others.
         assert len(moves) == target.rows_within_limits or rows.singular.any()
 

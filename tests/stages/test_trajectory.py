@@ -645,8 +645,8 @@ def test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_th
 def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means(results):
     path = by_name(results["er3a_c60"])["line_shoulder"]
     assert path.fastest_s < path.duration_s
-    told = f"at its fastest it takes {path.fastest_s:.2f} s, of {path.duration_s:.2f} s programmed"
-    assert told in path_text(path)
+    said = f"at its fastest it takes {path.fastest_s:.2f} s, of {path.duration_s:.2f} s programmed"
+    assert said in path_text(path)
 
 
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):

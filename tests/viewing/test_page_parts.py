@@ -132,12 +132,12 @@ def test_what_fails_though_nothing_expects_it_is_named_beside_the_count():
         return Fault(name, "", "fail", "collides", meant, "", (FaultMoment("x"),), "", "trajectory.html")
 
     meant = [fault(f"m{k}", True) for k in range(2)]
-    assert _tally("trajectory", 5, meant, 0) == "5 of 7 paths pass; the other 2 are expected to fail"
+    assert _tally("trajectory", 5, meant, 0) == "5 of 7 paths pass in the model; the other 2 are expected to fail"
     assert _tally("trajectory", 5, meant[:1], 0).endswith("; the other one is expected to fail")
     assert _tally("programs", 3, [], 0) == "3 of 3 programs pass in the model"
     others = [fault(f"o{k}", False) for k in range(5)]
     assert _tally("trajectory", 1, [*meant, *others], 1) == (
-        "1 of 9 paths pass; 2 expected to fail; o0: collides; o1: collides; o2: collides; "
+        "1 of 9 paths pass in the model; 2 expected to fail; o0: collides; o1: collides; o2: collides; "
         "2 more do not pass; 1 not followed to the end"
     )
 

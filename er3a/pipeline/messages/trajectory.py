@@ -158,16 +158,16 @@ def _(found: Finding) -> str:
         "undecided": found.undecided,
         "near-singular": found.near_singular,
     }
-    told_of = {outcome_word(verdict): names for verdict, names in unsafe.items()}
-    told_of[sentence("trajectory.not_followed")] = found.not_followed
-    told_of[sentence("trajectory.of_program")] = found.of_program
+    by_word = {outcome_word(verdict): names for verdict, names in unsafe.items()}
+    by_word[sentence("trajectory.not_followed")] = found.not_followed
+    by_word[sentence("trajectory.of_program")] = found.of_program
     faults = [
-        sentence("trajectory.fault", count=len(names), word=told, names=joined(names, ", "))
-        for told, names in told_of.items()
+        sentence("trajectory.fault", count=len(names), word=title, names=joined(names, ", "))
+        for title, names in by_word.items()
         if names
     ]
     safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
-    if near := found.paths - found.safe - sum(map(len, told_of.values())):
+    if near := found.paths - found.safe - sum(map(len, by_word.values())):
         faults.append(sentence("trajectory.near_assumed", count=near))
     sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
     return sentence("finding", finding=joined(sentences))
