@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 
@@ -110,7 +110,7 @@ def fact(code: str, /, **params: Any) -> Finding:
     return Finding(code, params)
 
 
-def is_one(found: object, *codes: str) -> bool:
+def is_one(found: object, *codes: str) -> TypeGuard[Finding]:
     """Whether something is a finding with one of these codes.
 
     Parameters

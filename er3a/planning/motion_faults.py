@@ -17,14 +17,14 @@ from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from er3a.by_value import Coded
-from er3a.finding import AnyFinding, Finding, fact, is_one
+from er3a.finding import AnyFinding, Finding, fact, is_one, turned_or_moved
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, evaluated, interpolated
+from er3a.robots.joint_limits import limit_amounts
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
@@ -76,65 +76,43 @@ def merged(spans: list[tuple[float, float]], gap: float) -> list[tuple[float, fl
     return kept
 
 
-class NeededSpeed(Coded, code=""):
-    """A speed that a joint (from 1) would need, beyond its limit."""
-
-    joint: int
-    needed_deg_s: float
-    limit_deg_s: float
-    slides: bool = False
-
-    @property
-    def ratio(self) -> float:
-        """Speed needed over speed allowed, greater than 1."""
-        return self.needed_deg_s / self.limit_deg_s
+RateCause = Finding
+"""Of a code of :data:`RATES`: ``joint`` (from 1), and the amounts ``needed`` and ``limit``, whose basis is that of the
+finding; ``needed`` is None where an acceleration steps."""
+RATES = {"too_fast": "/s", "acceleration_too_great": "/s²", "jerk_too_great": "/s³"}
+"""Codes of what exceeds a limit of a rate, and what the rate is by, in the order of the derivative."""
 
 
-class TooFast(NeededSpeed):
-    """A joint (from 1) would have to move faster than it can; values are in mm if it ``slides``."""
+def rate_fault(
+    order: int, joint: int, needed: float, limit: float, slides: bool = False, assumed: bool = False
+) -> RateCause:
+    """That a joint would need more of a rate than it has.
+
+    Parameters
+    ----------
+    order : 1 for speed, 2 for acceleration, 3 for jerk
+    joint : number from 1
+    needed, limit : deg/s^k, or mm/s^k if the joint ``slides``; an infinite jerk is a step of the acceleration
+    assumed : whether the limit is
+
+    Returns
+    -------
+    finding : its basis says whether the limit is assumed
+    """
+    code, per = [*RATES.items()][order - 1]
+    need = None if order == 3 and needed == np.inf else turned_or_moved(needed, slides, per)
+    found = fact(code, joint=joint, needed=need, limit=turned_or_moved(limit, slides, per))
+    return replace(found, basis="assumed") if assumed else found
 
 
-class TooFastIfAssumed(NeededSpeed):
-    """A joint (from 1), whose maximum speed is assumed, would have to move faster; in mm if it ``slides``."""
+def rate_ratio(cause: RateCause) -> float:
+    """Rate needed over rate allowed, greater than 1; infinite where the acceleration steps.
 
-
-class NeededAcceleration(Coded, code=""):
-    """An acceleration that a joint (from 1) would need, beyond its limit."""
-
-    joint: int
-    needed_deg_s2: float
-    limit_deg_s2: float
-    slides: bool = False
-
-    @property
-    def ratio(self) -> float:
-        """Acceleration needed over acceleration allowed, greater than 1."""
-        return self.needed_deg_s2 / self.limit_deg_s2
-
-
-class AccelerationTooGreat(NeededAcceleration):
-    """A joint (from 1) would have to accelerate more than it can; in mm if it ``slides``."""
-
-
-class AccelerationTooGreatIfAssumed(NeededAcceleration):
-    """A joint (from 1), whose maximum acceleration is assumed, would have to accelerate more; mm if it ``slides``."""
-
-
-class JerkTooGreat(Coded):
-    """A joint (from 1) would need a jerk beyond its limit (mm if it ``slides``); None where its acceleration steps."""
-
-    joint: int
-    needed_deg_s3: float | None
-    limit_deg_s3: float
-    slides: bool = False
-
-    @property
-    def ratio(self) -> float:
-        """Jerk needed over jerk allowed; infinite where the acceleration steps."""
-        return np.inf if self.needed_deg_s3 is None else self.needed_deg_s3 / self.limit_deg_s3
-
-
-RateCause = TooFast | TooFastIfAssumed | AccelerationTooGreat | AccelerationTooGreatIfAssumed | JerkTooGreat
+    Parameters
+    ----------
+    cause : as :func:`rate_fault` makes it
+    """
+    return float(cause.needed.value / cause.limit.value) if cause.needed else np.inf
 
 
 OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
@@ -195,14 +173,7 @@ def rate_interval(
     """
     slides = limit.sliding is not None and bool(limit.sliding[joint])
     needed, allowed = (np.array([most, limit.most[joint]]) * (1000.0 if slides else np.degrees(1.0))).tolist()
-    cause: RateCause
-    if limit.order == 3:
-        cause = JerkTooGreat(joint + 1, needed if np.isfinite(needed) else None, allowed, slides)
-    elif limit.order == 2:
-        made = AccelerationTooGreatIfAssumed if limit.assumed[joint] else AccelerationTooGreat
-        cause = made(joint + 1, needed, allowed, slides)
-    else:
-        cause = (TooFastIfAssumed if limit.assumed[joint] else TooFast)(joint + 1, needed, allowed, slides)
+    cause = rate_fault(limit.order, joint + 1, needed, allowed, slides, limit.assumed[joint])
     return Interval(start, end, cause, worst)
 
 
@@ -262,33 +233,14 @@ class LimitSide:
         used = np.flatnonzero(self.factors)
         side: Literal["above", "below"] = "above" if self.sign > 0 else "below"
         slides = bool(self.robot.slides[used].all())
-        scale = 1000.0 if slides else float(np.degrees(1.0))
-        reached, bound = scale * self.sign * most, scale * self.limit
-        if len(used) != 1 or self.factors[used[0]] != 1:
-            joints, factors = (used + 1).tolist(), self.factors[used].tolist()
-            return fact(
-                "combination_exceeded",
-                joints=tuple(joints),
-                factors=tuple(factors),
-                side=side,
-                value=reached,
-                excess=abs(reached - bound),
-                limit=bound,
-                sliding=slides,
-            )
-        joint = int(used[0]) + 1
-        if slides:
-            return fact(
-                "slide_exceeded",
-                joint=joint,
-                side=side,
-                position_mm=reached,
-                excess_mm=abs(reached - bound),
-                limit_mm=bound,
-            )
-        return fact(
-            "above_limit" if self.sign > 0 else "below_limit", joint=joint, reached_deg=reached, limit_deg=bound
-        )
+        amounts = limit_amounts(slides, self.sign * most, abs(self.sign * most - self.limit), self.limit)
+        if len(used) == 1 and self.factors[used[0]] == 1 and not slides:
+            reached, bound = amounts["value"].value, amounts["limit"].value
+            return fact(f"{side}_limit", joint=int(used[0]) + 1, reached_deg=reached, limit_deg=bound)
+        if len(used) == 1 and self.factors[used[0]] == 1:
+            return fact("limit_exceeded", joint=int(used[0]) + 1, side=side, **amounts)
+        joints, factors = tuple((used + 1).tolist()), tuple(self.factors[used].tolist())
+        return fact("combination_exceeded", joints=joints, factors=factors, side=side, **amounts)
 
 
 def limit_sides(robot: Robot) -> list[LimitSide]:

@@ -383,7 +383,7 @@ def toppra_library() -> Any:
             import toppra.constraint.linear_constraint
             import toppra.interpolator
     except ModuleNotFoundError:
-        raise TimingError(fact("toppra_missing")) from None
+        raise TimingError(fact("library_missing", name="toppra")) from None
     return toppra
 
 

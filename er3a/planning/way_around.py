@@ -140,14 +140,14 @@ def _clear_at_ends(task: PlanningTask, bodies: Bodies, start: Reals, end: Reals)
     ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
     for name, q in ends:
         if outside := limits_exceeded(task.robot, q):
-            return fact("end_outside_limits", end=name, limits=outside)
+            return fact("no_end", end=name, why=outside)
     clear, pairs = bodies.min_distance(np.stack([start, end]))
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
             return fact(
-                "end_overlaps",
+                "no_end",
                 end=name,
-                overlap=fact("pair_overlaps", pair=bodies.pairs[pair], depth_mm=-float(distance) * 1000),
+                why=fact("pair_overlaps", pair=bodies.pairs[pair], depth_mm=-float(distance) * 1000),
             )
     return float(clear.min())
 
@@ -206,7 +206,7 @@ def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | N
         (float(np.abs(end - start).max()), i, j) for i, start in enumerate(starts) for j, end in enumerate(ends)
     )
     if not len(starts) or not len(ends):
-        return fact("end_unreached", end="end" if len(starts) else "start")
+        return fact("no_end", end="end" if len(starts) else "start", why=fact("none_within_limits"))
     found: WayAround | NoWayAround = fact("none_found", rounds=0)
     for _, i, j in pairs[:MAX_PAIRS]:
         found = way_around(task, starts[i], ends[j])
@@ -269,7 +269,7 @@ def _tree(task: PlanningTask, moves: _Moves, start: Reals, end: Reals, attempt: 
     try:
         from ompl import base, geometric, util
     except ImportError:
-        return fact("planner_missing")
+        return fact("library_missing", name="OMPL")
     util.noOutputHandler()
     util.RNG.setSeed(1 + (task.seed * len(MARGINS) + attempt) % (2**31 - 1))
     n, robot = len(start), task.robot
@@ -355,7 +355,7 @@ def _timed(task: PlanningTask, corners: Reals) -> Iterator[Timed | Finding]:
         except PathError:
             continue
         except TimingError as error:
-            if is_one(error.finding, "toppra_missing"):
+            if is_one(error.finding, "library_missing"):
                 yield error.finding
 
 

@@ -473,13 +473,13 @@ def _too_fast(path: MotionPath, limits: JointLimits) -> Shares:
     found: Shares = {}
     for j in np.flatnonzero(speeds.max(axis=0) > OVER_SPEED * limits.speed).tolist():
         first = int(np.argmax(speeds[:, j] > OVER_SPEED * limits.speed[j]))
-        made = motion_faults.TooFast if np.isfinite(path.arm.speed[j]) else motion_faults.TooFastIfAssumed
+        assumed = not np.isfinite(path.arm.speed[j])
         comes_to = path.law.share_at(float(limits.speed[j]) / float(slopes[first, j]))
         (needed, slides), (able, _) = (
             joint_shown(path.arm, j, value) for value in (float(speeds[:, j].max()), float(limits.speed[j]))
         )
         share = float(np.clip(comes_to, path.share[first], path.share[first + 1]))
-        found[made(j + 1, needed, able, slides)] = share
+        found[motion_faults.rate_fault(1, j + 1, needed, able, slides, assumed)] = share
     return found
 
 
@@ -497,7 +497,7 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
         (worst, slides), (most, _) = (
             joint_shown(path.arm, j, value) for value in (float(needed[:, j].max()), float(able[j]))
         )
-        found[motion_faults.AccelerationTooGreat(j + 1, worst, most, slides)] = float(share[first])
+        found[motion_faults.rate_fault(2, j + 1, worst, most, slides)] = float(share[first])
     return found
 
 

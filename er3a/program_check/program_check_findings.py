@@ -9,7 +9,6 @@ from typing import Literal
 from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.finding import Amount, Finding, is_one
-from er3a.planning.motion_faults import AccelerationTooGreat, TooFast, TooFastIfAssumed
 from er3a.programs.instructions import Unresolved
 from er3a.programs.program_findings import ProgramFinding
 
@@ -86,14 +85,12 @@ class MotionCollides(Coded):
         return MotionCollides(tuple(deepest.values()), self.assumed)
 
 
-CheckFinding = (
-    ProgramFinding | Finding | TooFast | AccelerationTooGreat | TooFastIfAssumed | Finding | MotionCollides | Finding
-)
+CheckFinding = ProgramFinding | Finding | MotionCollides
 
 FAILS = frozenset(
     (
         *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
-        *("slide_exceeded", "combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
+        *("limit_exceeded", "combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
     )
 )
 NOTES = frozenset(("frames_from_robot_file", "clear_of_assumed", "passes_singularity"))
@@ -123,7 +120,9 @@ def level_of(finding: CheckFinding) -> Level:
             return "fail"
         case MotionCollides(touches=touches, assumed=assumed):
             return "fail" if not assumed and any(touch.is_certain for touch in touches) else "caution"
-    return "fail" if finding.code in FAILS else "note" if finding.code in NOTES else "caution"
+    if finding.code in FAILS:
+        return "caution" if getattr(finding, "basis", "") == "assumed" else "fail"
+    return "note" if finding.code in NOTES else "caution"
 
 
 def gravity(finding: CheckFinding) -> float:
@@ -145,7 +144,7 @@ def gravity(finding: CheckFinding) -> float:
         return float(-finding.distance.value)
     if is_one(finding, "zone_too_large"):
         return float(finding.zone_mm / max(finding.motion_mm, 1e-9))
-    names = ("depth_mm", "needed_deg_s", "needed_deg_s2", "excess_mm", "excess", "angle_deg", "jump", "difference")
+    names = ("depth_mm", "needed", "excess_mm", "excess", "angle_deg", "jump", "difference")
     sizes = (getattr(finding, name, None) for name in names)
     return max(abs(float(size.value if isinstance(size, Amount) else size or 0.0)) for size in sizes)
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.errors import Er3aError
-from er3a.finding import Finding, fact
+from er3a.finding import Amount, Finding, fact, turned_or_moved
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
@@ -296,44 +296,31 @@ def limits_exceeded(robot: Robot, q: Reals) -> Finding | None:
         for side, excess, limit in _beyond(value, robot.lower[j], robot.upper[j]):
             if robot.continuous[j]:
                 continue
-            if slides[j]:
-                found.append(
-                    fact(
-                        "slide_exceeded",
-                        joint=j + 1,
-                        side=side,
-                        position_mm=1000 * float(value),
-                        excess_mm=1000 * excess,
-                        limit_mm=1000 * limit,
-                    )
-                )
-            else:
-                turned, beyond, most = np.degrees([value, excess, limit]).tolist()
-                found.append(
-                    fact("limit_exceeded", joint=j + 1, side=side, angle_deg=turned, excess_deg=beyond, limit_deg=most)
-                )
+            sizes = limit_amounts(bool(slides[j]), float(value), excess, limit)
+            found.append(fact("limit_exceeded", joint=j + 1, side=side, **sizes))
     for combined in robot.combined:
         factors = np.array(combined.factors)
         joints = np.flatnonzero(factors)
         sliding = bool(slides[joints].all())
         # A sum is shown in mm only if all its joints slide; see CombinedLimit.
-        scale = 1000.0 if sliding else float(np.degrees(1.0))
         for side, excess, limit in _beyond(float(factors @ q), combined.lower, combined.upper):
             own, shares = tuple((joints + 1).tolist()), tuple(factors[joints].tolist())
-            value = scale * float(factors @ q)
-            found.append(
-                fact(
-                    "combination_exceeded",
-                    joints=own,
-                    factors=shares,
-                    side=side,
-                    value=value,
-                    excess=scale * excess,
-                    limit=scale * limit,
-                    sliding=sliding,
-                )
-            )
+            sizes = limit_amounts(sliding, float(factors @ q), excess, limit)
+            found.append(fact("combination_exceeded", joints=own, factors=shares, side=side, **sizes))
     return fact("limits_exceeded", joints=tuple(found)) if found else None
+
+
+def limit_amounts(slides: bool, value: float, excess: float, limit: float) -> dict[str, Amount]:
+    """What a finding of a limit says, with its unit.
+
+    Parameters
+    ----------
+    slides : whether what is limited slides
+    value, excess, limit : rad, or m if it does
+    """
+    scale = 1000.0 if slides else float(np.degrees(1.0))
+    sizes = {"value": value, "excess": excess, "limit": limit}
+    return {name: turned_or_moved(scale * float(size), slides) for name, size in sizes.items()}
 
 
 def _beyond(value: float, lower: float, upper: float) -> list[tuple[Literal["above", "below"], float, float]]:

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.by_value import Coded
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Amount, Finding, fact, is_one, turned_or_moved
 from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Integers, Reals
-from er3a.robots.joint_limits import comparable, joint_shown, limit_margin
+from er3a.robots.joint_limits import comparable, joint_shown, limit_margin, unit_compared
 from er3a.robots.robot import Robot
 
 SAME_MOVE = 1e-9  # rad; moves closer than this differ by rounding only
@@ -31,31 +30,9 @@ NextBest = Finding
 MaxMove = Finding
 
 
-class MovesLess(Coded):
-    """Its largest joint move is less than the next best solution's, by ``less_deg``."""
-
-    move: MaxMove
-    less_deg: float
-    next_best: NextBest
-
-
-class SlidesLess(MovesLess):
-    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
-
-
-class MovesLessTogether(Coded):
-    """The largest joint moves are equal; the root of all moves' squares is less by ``less_deg``."""
-
-    move: MaxMove
-    less_deg: float
-    next_best: NextBest
-
-
-class SlidesLessTogether(MovesLessTogether):
-    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
-
-
-WhyFirst = Finding | MovesLess | SlidesLess | MovesLessTogether | SlidesLessTogether | Finding
+WhyFirst = Finding
+"""``only_admissible``, ``moves_less`` (largest joint move), ``moves_less_together`` (the root of all moves' squares) or
+``lower_branch_number``."""
 WhyNone = Finding
 
 
@@ -133,23 +110,23 @@ def _why_first(
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
     value, slides = joint_shown(robot, joint, float(np.abs(solutions.q[chosen, joint] - q_ref[joint])))
-    move: MaxMove = (
-        fact("greatest_slide", joint=joint + 1, move_mm=value)
-        if slides
-        else fact("greatest_move", joint=joint + 1, angle_deg=value)
-    )
+    move: MaxMove = fact("greatest_move", joint=joint + 1, move=turned_or_moved(value, slides))
     if len(order) == 1:
         return fact("only_admissible", move=move)
     second = order[1]
     other = _difference(solutions, chosen, second)
     margin = moves[second].max() - most
     if margin > SAME_MOVE:
-        return (SlidesLess if robot.sliding.any() else MovesLess)(move, float(np.degrees(margin)), other)
+        return fact("moves_less", move=move, less=_compared(robot, margin), next_best=other)
     nearer = distance[second] - distance[chosen]
     if nearer > SAME_MOVE:
-        together = SlidesLessTogether if robot.sliding.any() else MovesLessTogether
-        return together(move, float(np.degrees(nearer)), other)
+        return fact("moves_less_together", move=move, less=_compared(robot, nearer), next_best=other)
     return fact("lower_branch_number", move=move, next_best=other)
+
+
+def _compared(robot: Robot, less: float) -> Amount:
+    """A difference of moves (rad), in the unit of such."""
+    return Amount(float(np.degrees(less)), unit_compared(robot))
 
 
 def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:

@@ -114,7 +114,7 @@ def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tup
     legs : or why there are none
     """
     if outside := limits_exceeded(task.robot, start):
-        return fact("end_outside_limits", end="start", limits=outside)
+        return fact("no_end", end="start", why=outside)
     straight = joint_legs("move", np.stack([start, end]), task.limits)
     if task.bodies is None or ((clear := _clearance(task.bodies, straight)) > 0 and clear >= needed):
         return straight

@@ -121,8 +121,8 @@ def test_a_sliding_joint_has_no_turns():
     q = np.array([0, 0, 0.9, 0, 0, 0])
     np.testing.assert_array_equal(nearest_equivalent(arm, q, q + 6), q)
     found = limits_exceeded(arm, np.array([0, 0, 1.5, 0, 0, 0])).joints[0]
-    assert (found.code, found.joint, found.side) == ("slide_exceeded", 3, "above")
-    assert found.excess_mm == pytest.approx(200)
+    assert (found.code, found.joint, found.side) == ("limit_exceeded", 3, "above")
+    assert (found.excess.value, found.excess.unit) == (pytest.approx(200), "mm")
 
 
 def test_the_sums_limit_is_named():
@@ -131,11 +131,12 @@ def test_the_sums_limit_is_named():
     assert not within(arm, np.stack([q, -q])).any()
     found = limits_exceeded(arm, q).joints[0]
     assert (found.joints, found.side) == ((2, 3), "above")
-    assert found.excess == pytest.approx(40 - np.degrees(0.5))
+    assert found.excess.value == pytest.approx(40 - np.degrees(0.5))
     assert limit_margin(arm, q) == limit_margin(arm, -q) == pytest.approx(0.5 - np.radians(40))
     slide = stanford().replace(combined=(CombinedLimit((0, 0, 2, 0, 0, 0), 0.0, 1.0),))
     (found,) = limits_exceeded(slide, np.array([0, 0, 0.9, 0, 0, 0])).joints
-    assert (found.value, found.excess, found.limit) == pytest.approx((1800, 800, 1000))  # mm
+    assert tuple(size.value for size in (found.value, found.excess, found.limit)) == pytest.approx((1800, 800, 1000))
+    assert found.value.unit == "mm"
 
 
 @pytest.mark.long

@@ -133,7 +133,7 @@ def test_reasons_match_limits(robot, random):
         np.testing.assert_array_equal(solution.within_limits, inside)
         for row, ok, reason in zip(solution.q, inside, solution.reason):
             assert (reason is None) == ok
-            told = {} if reason is None else {one.joint: one.angle_deg for one in reason.joints}
+            told = {} if reason is None else {one.joint: one.value.value for one in reason.joints}
             leaves = (row > robot.upper + 1e-9) | (row < robot.lower - 1e-9)
             assert told == {j + 1: np.degrees(row[j]) for j in np.flatnonzero(leaves)}
 
@@ -147,10 +147,10 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     exceeded = limits_exceeded(arm, near * DEG)
     first, fourth = exceeded.joints
     assert (first.joint, first.side, fourth.joint, fourth.side) == (1, "above", 4, "below")
-    assert (first.angle_deg, first.excess_deg, first.limit_deg) == pytest.approx((170, 160, 10))
-    assert (fourth.angle_deg, fourth.excess_deg, fourth.limit_deg) == pytest.approx((182, 18, 200))
+    assert tuple(size.value for size in (first.value, first.excess, first.limit)) == pytest.approx((170, 160, 10))
+    assert tuple(size.value for size in (fourth.value, fourth.excess, fourth.limit)) == pytest.approx((182, 18, 200))
     assert say(exceeded) == (
-        "J1 at 170.0 deg is 160 deg above its limit of 10 deg; J4 at 182.0 deg is 18 deg below its limit of 200 deg"
+        "J1 at 170.0 deg: 160 deg beyond its limit of 10 deg; J4 at 182.0 deg: 18 deg beyond its limit of 200 deg"
     )
     assert limits_exceeded(arm, np.append(np.zeros(3), [205 * DEG, 0, 0])) is None
     below = nearest_equivalent(arm, np.array([0, 0, 0, 215 - 360, 0, 0]) * DEG, np.zeros(6)) / DEG

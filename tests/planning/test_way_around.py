@@ -126,11 +126,11 @@ def test_ends_that_can_not_be_are_named():
     outside = home.copy()
     outside[1] = ROBOT.upper[1] + 0.1
     assert way_around(one, outside, home).end == "start"
-    assert is_one(way_around(one, home, outside), "end_outside_limits")
+    assert is_one(way_around(one, home, outside), "no_end")
     low = np.radians([0, 80, 40, 0, 60, 0])
     if one.bodies.min_distance(low[None])[0][0] < 0:
-        assert is_one(way_around(one, home, low), "end_overlaps")
-    assert way_between(one, home[None], np.empty((0, 6))) == fact("end_unreached", end="end")
+        assert is_one(way_around(one, home, low), "no_end")
+    assert way_between(one, home[None], np.empty((0, 6))) == fact("no_end", end="end", why=fact("none_within_limits"))
     assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == fact("nothing_measured")
 
 
@@ -171,4 +171,4 @@ def test_a_missing_planner_is_said(monkeypatch, random):
     one = task(load_scene("data/scenes/table_and_post.yaml"))
     query = blocked(one.bodies, random)
     monkeypatch.setattr(builtins, "__import__", without)
-    assert way_around(one, *query) == fact("planner_missing")
+    assert way_around(one, *query) == fact("library_missing", name="OMPL")

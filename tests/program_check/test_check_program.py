@@ -37,8 +37,8 @@ FOUND = {
     "no_motion": {"program_nothing_moves"},
     "out_of_reach": {"way_out_of_reach"},
     "outside_limits": {"above_limit"},
-    "singular_line": {"passes_singularity", "too_fast_if_assumed"},
-    "too_fast": {"too_fast_if_assumed"},
+    "singular_line": {"passes_singularity", "too_fast"},
+    "too_fast": {"too_fast"},
     "unknown_tool": {"not_followed"},
     "zone_larger_than_segment": {"zone_too_large"},
 }

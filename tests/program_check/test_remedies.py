@@ -12,10 +12,10 @@ from er3a.by_value import KINDS
 from er3a.collision.pairs import LinkPair
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
-from er3a.finding import fact
+from er3a.finding import fact, is_one
 from er3a.pipeline.messages.programs import ADVISED, NOT_FOLLOWED, REMEDIES, remedy
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.program_check.program_check_findings import NOTES, MotionCollides, TooFastIfAssumed
+from er3a.program_check.program_check_findings import NOTES, MotionCollides
 from er3a.programs.execution import RunLimits
 from er3a.programs.languages import read_program
 from er3a.robots.robot import CombinedLimit, Envelope
@@ -69,7 +69,7 @@ def test_a_line_at_the_pace_advised_passes(tmp_path, line):
         text = f"def a():\n  movej({START}, a=1, v=0.5)\n  {line.format(start=START, a=a, v=v)}\nend\n"
         (tmp_path / "a.script").write_text(text)
         check = check_program(read_program(tmp_path / "a.script"), ROBOT, CheckOptions(start=np.zeros(6)))
-        return [at.finding for at in check.findings if isinstance(at.finding, TooFastIfAssumed)]
+        return [at.finding for at in check.findings if is_one(at.finding, "too_fast")]
 
     told = [re.findall(r"([\d.]+) %", remedy(each)) for each in found(400, 8.0)]
     speed, acc = (min(float(percent) / 100 for percent in each) for each in zip(*told))
@@ -155,7 +155,7 @@ MENDED = {
         (krl("LIN_REL {X 1.2,Y -1.2,Z -0.3}"), TURNED),  # where it ends 4.3 mm behind the start
     ),
     "combination_exceeded": ((krl("PTP {A2 -50,A3 -20}"), TIED), (krl("PTP {A2 -50,A3 -5}"), TIED)),
-    "slide_exceeded": (
+    "limit_exceeded": (
         (CSV.format(200), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
         (CSV.format(150), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
     ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
-from er3a.finding import fact
+from er3a.finding import Amount, fact
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
@@ -33,7 +33,7 @@ def test_nearest_breaks_ties_by_all_joints_then_branch():
     choice = nearest(robot, solutions_of(rows[:2], [True, True], [0, 1]), np.zeros(6))
     assert choice.chosen == 1
     assert choice.reason.code == "moves_less_together"
-    assert choice.reason.less_deg == pytest.approx(np.degrees(np.hypot(1, 0.5) - 1))
+    assert choice.reason.less.value == pytest.approx(np.degrees(np.hypot(1, 0.5) - 1))
 
 
 def test_nearest_of_none_and_of_one():
@@ -44,7 +44,9 @@ def test_nearest_of_none_and_of_one():
     assert [one.joint for one in choice.reason.exceeded.joints] == [1]
     choice = nearest(robot, solutions_of([[1, 0, 0, 0, 0, 0]], [True], [3]), np.zeros(6))
     assert choice.order.tolist() == [0]
-    assert choice.reason == fact("only_admissible", move=fact("greatest_move", joint=1, angle_deg=np.degrees(1)))
+    assert choice.reason == fact(
+        "only_admissible", move=fact("greatest_move", joint=1, move=Amount(np.degrees(1), "deg"))
+    )
     assert say(choice.reason) == "greatest joint move 57.3 deg (J1); the only admissible solution"
 
 
@@ -75,10 +77,10 @@ def test_a_millimetre_of_a_slide_counts_as_a_degree_and_is_told_as_one():
     solutions = inverse(robot, forward(robot, q), q_ref)
     choice = nearest(robot, solutions, q_ref)
     assert np.degrees(choice.max_joint_move) == pytest.approx(120)
-    assert choice.reason.move == fact("greatest_slide", joint=3, move_mm=pytest.approx(120))
+    assert choice.reason.move == fact("greatest_move", joint=3, move=Amount(pytest.approx(120), "mm"))
     assert say(choice.reason).startswith("greatest joint move 120.0 mm (J3); the next best")
-    assert "needs the same, but" in say(choice.reason)
-    assert "(in deg, or mm of a prismatic joint)" in say(choice.reason)
+    assert "needs as much, but" in say(choice.reason)
+    assert "deg (mm of a prismatic joint)" in say(choice.reason)
     ranking = select(robot, solutions, {"nearest": 1, "limits": 1}, q_ref)
     np.testing.assert_allclose(ranking.measured["nearest"], 120)
     np.testing.assert_allclose(ranking.measured["limits"], 30)

@@ -29,7 +29,7 @@ def test_what_is_expected_and_comes_is_a_demonstration():
     assert unmet_expectations(judged) is None
     assert [shown.name for shown in demonstrations(judged, "safe")] == ["out"]
     assert demonstrated(demonstrations(judged, "safe"), 1) == "1 expected to fail, and did: out (unreachable)"
-    assert demonstrated(demonstrations(judged, "safe"), 0).endswith("; nothing else is given to be judged")
+    assert demonstrated(demonstrations(judged, "safe"), 0).endswith("; nothing else to judge")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def test_what_comes_besides_the_expected_is_not_expected():
     part = Judged("line", "leaves limits", "leaves limits", both)
     unmet = unmet_expectations([part])
     assert unmet is not None
-    assert say(unmet) == ("1 of 1 expectations is not met: line (collides, leaves limits; expected: leaves limits).")
+    assert say(unmet) == "Expectations not met: 1 of 1: line (collides, leaves limits; expected: leaves limits)."
     assert demonstrations([part], "safe") == ()
     assert as_expected(part) == "leaves limits: as expected; collides: not expected"
     given = Judged("line", "leaves limits", both[::-1], both)
@@ -64,7 +64,7 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
     assert found is not None
     assert [each.name for each in found.unmet] == ["out", "line"]
     assert say(found) == (
-        "2 of 2 expectations are not met: out (safe in the model; expected: unreachable); "
+        "Expectations not met: 2 of 2: out (safe in the model; expected: unreachable); "
         "line (too fast; expected: safe in the model)."
     )
     assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
@@ -73,7 +73,7 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
 def test_what_expects_nothing_and_fails_is_named_beside_an_expectation_that_is_not_met():
     judged = [Came("out", "safe", "unreachable"), Came("line", "collides"), Came("arc", "safe")]
     found = unmet_expectations(judged, "safe")
-    assert say(found).endswith(" Besides, of what expects nothing: line (collides).")
+    assert say(found).endswith(" Of what expects nothing: line (collides).")
 
 
 def test_files_hold_expectations(tmp_path):

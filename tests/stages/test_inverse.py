@@ -106,8 +106,8 @@ def test_article_target_has_eight_solutions_and_none_within_limits(folders):
         8,
     )
     (exceeded,) = target.reason.exceeded.joints
-    assert (exceeded.joint, exceeded.side, exceeded.limit_deg) == (2, "above", pytest.approx(155))
-    assert exceeded.excess_deg == pytest.approx(17.7, abs=0.05)
+    assert (exceeded.joint, exceeded.side, exceeded.limit.value) == (2, "above", pytest.approx(155))
+    assert exceeded.excess.value == pytest.approx(17.7, abs=0.05)
 
 
 def test_every_solution_reproduces_its_target(computed):
@@ -133,7 +133,7 @@ def test_limits_are_judged_by_the_robots_file(computed):
     np.testing.assert_array_equal(solutions.within_limits, margin.min(axis=1) >= -1e-7)
     np.testing.assert_allclose(solutions.limit_margin_deg, margin.min(axis=1), atol=1e-9)
     for refusal, row in zip(solutions.refusal, margin):
-        told = {} if refusal is None else {one.joint: one.excess_deg for one in refusal.joints}
+        told = {} if refusal is None else {one.joint: one.excess.value for one in refusal.joints}
         assert told == pytest.approx({j + 1: -row[j] for j in np.flatnonzero(row < -1e-7)}, abs=1e-9)
 
 
@@ -153,7 +153,7 @@ def test_chosen_is_the_nearest_by_brute_force(computed):
         best = rows.take(rows.rank == 1)
         np.testing.assert_array_equal(best.q_deg, [chosen])
         assert best.first_of_branch.all()
-        assert target.reason.move.angle_deg == pytest.approx(np.abs(chosen - q_ref).max())
+        assert target.reason.move.move.value == pytest.approx(np.abs(chosen - q_ref).max())
         # A self-motion adds rows that are no turns of the others.
         assert len(moves) == target.rows_within_limits or rows.singular.any()
 
@@ -214,7 +214,7 @@ def test_wrist_singularity_is_named(computed):
     singular = tuple(each.name for each in results.summary.targets if any(it.code == advice.code for it in each.advice))
     if finding.code != "inverse.none_solved":
         assert "wrist_aligned" in finding.singular == singular
-        assert ", where only joint moves lead: " + ", ".join(singular) in say(finding)
+        assert "so only joint moves lead there: " + ", ".join(singular) in say(finding)
 
 
 def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(computed):
@@ -236,8 +236,8 @@ def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(com
             assert (branch_word(other.label[other.rank.argmin()]) in told[2]) == bool(len(other))
         if target.reason.code == "moves_less":
             others = rows.greatest_move_deg[rows.rank == 2]
-            assert target.reason.less_deg == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
-            assert f"needs {target.reason.less_deg:.3g} deg more" in cells[5]
+            assert target.reason.less.value == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
+            assert f"needs {target.reason.less.value:.3g} deg more" in cells[5]
 
 
 def test_values_of_one_joint_have_its_unit():

@@ -32,7 +32,7 @@ from er3a.pipeline.stages.programs.page.report import report
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
-from er3a.planning.motion_faults import AccelerationTooGreat
+from er3a.planning.motion_faults import rate_fault
 from er3a.program_check.check_program import CheckOptions
 from er3a.programs.csv_program import write_csv
 from er3a.robots.joint_limits import joint_columns
@@ -169,13 +169,13 @@ def test_a_line_past_a_singular_pose_is_told_by_it_then_by_what_weighs_most_then
     )
     assert fault.cause.endswith(": J4 and J6 in line")
     limit, rates = fault.moments
-    assert limit.what.startswith("J4 goes above its upper limit of 180 deg")
-    assert rates.what == "J4, J6: above the assumed limits; J4 needs about 3800 of 360 deg/s"
+    assert limit.what.startswith("J4 reaches ")
+    assert rates.what == "too fast: J4, J6; J4 needs 3800 deg/s; limit 360 deg/s (assumed)"
     assert f"t={round(found['above_limit'].program_s, 9)}#singular_line" in fault.address
     report(study, stored["er3a_c60"], tmp_path / "programs.html")
     html = (tmp_path / "programs.html").read_text(encoding="utf-8")
     listed = html[html.index('id="singular_line.10"') :]
-    order = [listed.index(words) for words in (": J4 and J6 in line", ": J4 goes above", ": J4 exceeds the assumed")]
+    order = [listed.index(words) for words in (": J4 and J6 in line", ": J4 reaches", ": J4 needs")]
     assert order == sorted(order)
     shown = next(each for each in motions(load_robot("er3a_c60"), results) if each.name == "singular_line")
     now = [each for each in shown.events if each.t <= found["above_limit"].program_s <= each.until]
@@ -235,7 +235,7 @@ def test_accelerations_that_the_study_gives_bind_programs_too(study, tmp_path):
         assert "own_accelerations" not in {each.reason for each in summary.assumed}
         found[limit] = [each.finding for each in summary.programs[0].findings if each.level == "fail"]
     assert found[300.0] == []
-    assert found[100.0] == [AccelerationTooGreat(1, pytest.approx(np.degrees(4.0)), pytest.approx(100.0))]
+    assert found[100.0] == [rate_fault(2, 1, pytest.approx(np.degrees(4.0)), pytest.approx(100.0))]
     percent, acceleration = re.findall(r"([\d.]+) %", remedy(found[100.0][0]))
     assert float(acceleration) / 100 * np.degrees(4.0) == pytest.approx(100.0, rel=0.01)
     assert (float(percent) / 100) ** 2 * np.degrees(4.0) <= 100.0

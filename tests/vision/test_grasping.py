@@ -279,14 +279,14 @@ def test_without_the_planner_the_object_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
     _, _, plan = chosen_from(BEHIND_THE_POST)
     assert plan.chosen is None
-    assert plan.refusal == fact("no_transfer", why=fact("planner_missing"))
+    assert plan.refusal == fact("no_transfer", why=fact("library_missing", name="OMPL"))
 
 
 def test_a_start_outside_the_limits_is_named():
     robot = load_robot(FIXED.robot)
     _, _, plan = chosen_from(BEHIND_THE_POST + np.array([robot.upper[0], 0, 0, 0, 0, 0]))
     assert is_one(plan.refusal, "no_transfer")
-    assert is_one(plan.refusal.why, "end_outside_limits")
+    assert is_one(plan.refusal.why, "no_end")
 
 
 def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):

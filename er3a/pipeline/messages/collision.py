@@ -8,14 +8,14 @@ from typing import assert_never
 import numpy as np
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, Pair
+from er3a.collision.pairs import BASE, TRIED, CarriedAndLink, Pair
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.finding import AnyFinding, Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages import scope  # noqa: F401
+from er3a.pipeline.messages import expectations, scope  # noqa: F401
 from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import joined, listed, say, say_as, says, sentence, texts, word
 from er3a.pipeline.stages.collision.model import FreeSpace, HomeCollides
 
 NAMED = 3
@@ -43,80 +43,51 @@ STATES: dict[PairState, str] = {
 
 TEXTS = texts(
     {
-        "carried_and_solid": "{carried} and {solid}",
+        "pair": "{first} and {second}",
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
-        "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; {margin_mm:g} mm are to be kept",
-        "link_pair": "{first} and {second}",
-        "link_and_solid": "{link} and {solid}",
-        "carried_and_link": "{link} and {carried}",
-        "pairs_unexamined": "Collisions not examined, because the shapes overlap where no arm's can: {pairs}.",
-        "shapes_assumed#given": "Link shapes are assumed (no authoritative source): real collisions may differ.",
-        "shapes_assumed#guessed": (
-            "Link shapes are capsules guessed from the table, as the robot's file gives none: real collisions may "
-            "differ."
-        ),
-        "shapes_assumed#partial": (
-            "The given shapes cover some links only in part, so that no more is shown than of the shapes themselves: "
-            "real collisions may differ."
-        ),
-        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes, and so not settled: {names}.",
-        "collision.never_free#given": (
-            "No joint vector within the limits is collision-free (proven): {pairs} always overlap."
-        ),
-        "collision.never_free#assumed": (
-            "No joint vector within the limits is free of collisions of the assumed shapes: {pairs} always overlap."
-        ),
+        "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; to keep: {margin_mm:g} mm",
+        "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs}.",
+        "shapes_assumed": "Link shapes are assumed: real collisions may differ.",
+        "shapes_assumed#partial": "Shapes are missing for parts of links: real collisions may differ.",
+        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes: {names}.",
+        "collision.never_free": "No joint vector within the limits is free of collisions: {pairs} always overlap.",
         "collision.shapes_overlap": (
-            "The shapes of {pairs} overlap in every joint vector tried ({count}), which no joint between them "
-            "explains: an error of the shapes, not of the arm. Correct their size, unit or placement in the robot's "
-            "file, or allow the pair there with a reason. Of the rest of the shapes, {percent:.1f} % of the joint "
-            "space is collision-free."
+            "Shapes in error: {pairs} overlap in all {count} joint vectors tried. Correct their size, unit or "
+            "placement in the robot's file, or allow the pair there. Of the rest, {percent:.1f} % of the joint space "
+            "is collision-free."
         ),
         "collision.base_in_solid": (
-            "The base is inside {own_name} at every joint vector: correct the scene or the position of the base."
+            "The base is always inside {own_name}: correct the scene or the position of the base."
         ),
         "collision.home_collides": (
-            "In the home pose {pair} overlap by {depth_mm:.1f} mm, so what can be reached from there is unknown; "
-            "{percent:.1f} % of the joint space is collision-free."
+            "At home {pair} overlap by {depth_mm:.1f} mm, so what can be reached from there is unknown. Of the joint "
+            "space {percent:.1f} % is collision-free."
         ),
-        "collision.free_space#free": (
-            "{percent:.1f} % of the joint space is collision-free. Of {places} cells reached, {clear} are proven "
-            "reachable without collision, {joined} of these by a proven motion from home; at most {lost} % of the "
-            "cells are lost to collisions."
+        "collision.free_space": (
+            "{percent:.1f} % of the joint space is collision-free. Of {places} cells {clear} are reached without "
+            "collision, {joined} of these from home; at most {lost} % are lost."
         ),
-        "collision.free_space#assumed": (
-            "With the assumed shapes {percent:.1f} % of the joint space is collision-free. Of {places} cells reached, "
-            "{clear} are reachable without collision, {joined} of these by a collision-free motion from home; at most "
-            "{lost} % of the cells are lost to collisions."
-        ),
-        "collision.free_space#doubt": (
-            "Pairs of links that may or may not collide, and are therefore checked: {undecided}."
-        ),
-        "collision.free_space#targets": Plural(
-            "targets",
-            "The chosen solution of {count} target is clear by {nearest}.",
-            "The chosen solutions of {count} targets are clear by {nearest} or more.",
-        ),
+        "collision.doubt": "Pairs undecided, and therefore checked: {undecided}.",
+        "collision.targets": "Targets solved: {targets}; the nearest is clear by {nearest}.",
         "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
-        "colliding_path": by("expected", true="{name} ({pair}; as expected)", false="{name} ({pair}; not expected)"),
-        "collision.free_space#paths": Plural(
-            "colliding", "{count} path collides: {colliding:, }.", "{count} paths collide: {colliding:, }."
-        ),
-        "colliding_target": by("expected", true="{name} ({pair}; as expected)", false="{name} ({pair}; not expected)"),
-        "collision.free_space#blocked": Plural(
-            "blocked",
-            "{count} target collides in every solution within the limits: {named}.",
-            "{count} targets collide in every solution within the limits: {named}.",
-        ),
-        "collision.free_space#none": "No collision-free configuration was found.",
+        "colliding": "{name} ({pair})",
+        "collision.paths": "Paths that collide: {colliding}.",
+        "collision.blocked": "Targets that collide in every solution: {blocked}.",
+        "collision.none": "No collision-free configuration was found.",
     }
 )
 
 
 @say.register
 def _(found: Pair) -> str:
-    bodies = {key: value for key, value in vars(found).items() if key != "code"}
-    return say_as(found, **{key: own_title(it) if isinstance(it, str) else _link(it) for key, it in bodies.items()})
+    first, second = (value for key, value in vars(found).items() if key != "code")
+    if isinstance(found, CarriedAndLink):
+        first, second = second, first
+    return sentence("pair", first=_body(first), second=_body(second))
+
+
+def _body(body: int | str) -> str:
+    return own_title(body) if isinstance(body, str) else _link(body)
 
 
 @says("pairs_unexamined")
@@ -132,7 +103,7 @@ def _first_of(findings: Sequence[AnyFinding]) -> str:
 
 @says("shapes_assumed")
 def _(found: Finding) -> str:
-    rests = say_as(found, "partial" if found.partial else "given" if found.given else "guessed")
+    rests = say_as(found, "partial" if found.partial else "")
     return joined([rests, near_shapes(found.margin_mm, found.near)], " ")
 
 
@@ -147,7 +118,7 @@ def _link(number: int) -> str:
 
 @says("collision.never_free")
 def _(found: Finding) -> str:
-    return say_as(found, "assumed" if found.assumed else "given", pairs=joined(listed(found.pairs[:NAMED]), ", "))
+    return say_as(found, pairs=joined(listed(found.pairs[:NAMED]), ", "))
 
 
 @says("collision.shapes_overlap")
@@ -160,6 +131,12 @@ def _(found: Finding) -> str:
     return say_as(found, own_name=", ".join(found.solids[:NAMED]))
 
 
+@says("colliding_path", "colliding_target")
+def _(found: Finding) -> str:
+    expected = sentence("as_expected") if found.expected else ""
+    return sentence("colliding", name=found.name, pair=joined([say(found.pair), expected]))
+
+
 @say.register
 def _(found: HomeCollides) -> str:
     home = say_as(found, percent=100 * found.found.free_ratio)
@@ -168,23 +145,19 @@ def _(found: HomeCollides) -> str:
 
 @say.register
 def _(found: FreeSpace) -> str:
-    free = say_as(found, "none")
+    free = sentence("collision.none")
     if found.clear:
-        free = say_as(
-            found,
-            "assumed" if found.assumed else "free",
-            percent=100 * found.free_ratio,
-            lost=at_most(100 * (1 - found.clear / found.places), 1),
-        )
-    doubt = say_as(found, "doubt") if found.undecided else ""
+        lost = at_most(100 * (1 - found.clear / found.places), 1)
+        free = say_as(found, percent=100 * found.free_ratio, lost=lost)
+    doubt = sentence("collision.doubt", undecided=found.undecided) if found.undecided else ""
     return joined([*_asked(found), free, doubt], " ")
 
 
 def _asked(found: FreeSpace) -> list[str]:
     """What targets and paths come to, a sentence each."""
-    targets = say_as(found, "targets") if found.nearest else ""
-    paths = say_as(found, "paths") if found.colliding else ""
-    blocked = say_as(found, "blocked", named=_first_of(found.blocked)) if found.blocked else ""
+    targets = sentence("collision.targets", targets=found.targets, nearest=found.nearest) if found.nearest else ""
+    paths = sentence("collision.paths", colliding=joined(listed(found.colliding), ", ")) if found.colliding else ""
+    blocked = sentence("collision.blocked", blocked=_first_of(found.blocked)) if found.blocked else ""
     return [blocked, targets, paths]
 
 

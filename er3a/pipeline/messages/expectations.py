@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from er3a.finding import Finding
 from er3a.pipeline.language import N_
-from er3a.pipeline.messages.say import Plural, joined, listed, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import joined, listed, say_as, says, sentence, texts, word
 from er3a.pipeline.stages.expectations import Judged, Outcome, came_to, expected_of, is_met
 
 OUTCOMES: dict[Outcome, str] = {
@@ -31,14 +31,10 @@ OUTCOMES: dict[Outcome, str] = {
 
 TEXTS = texts(
     {
-        "expectations_unmet": Plural(
-            "unmet",
-            "{count} of {expectations} expectations is not met: {unmet:; }.",
-            "{count} of {expectations} expectations are not met: {unmet:; }.",
-        ),
-        "expectations_unmet.others": "Besides, of what expects nothing: {named}.",
+        "expectations_unmet": "Expectations not met: {count} of {expectations}: {unmet:; }.",
+        "expectations_unmet.others": "Of what expects nothing: {named}.",
         "demonstrations": "{count} expected to fail, and did: {named}",
-        "demonstrations#alone": "{count} expected to fail, and did: {named}; nothing else is given to be judged",
+        "nothing_else": "nothing else to judge",
         "demonstration": "{name} ({outcome})",
         "as_expected": "as expected",
         "as_expected#partly": "{expected}: as expected; {other}: not expected",
@@ -73,8 +69,8 @@ def demonstrated(shown: tuple[Finding, ...], asked: int) -> str:
     """What fails as it is meant to, beside so many that are ``asked`` not to; empty if nothing does."""
     if not shown:
         return ""
-    form = "demonstrations" if asked else "demonstrations#alone"
-    return sentence(form, count=len(shown), named=joined(listed(shown), ", "))
+    failed = sentence("demonstrations", count=len(shown), named=joined(listed(shown), ", "))
+    return joined([failed, "" if asked else sentence("nothing_else")])
 
 
 @says("demonstration")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_
+from er3a.finding import Finding
+from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.kinematics import sum_of_joints
-from er3a.pipeline.messages.say import Plural, by, joined, listed, say_as, says, sentence, texts
-from er3a.robots.joint_limits import Exceeded
+from er3a.pipeline.messages.kinematics import limited, singular_pose, singularity_word
+from er3a.pipeline.messages.numbers import numbers
+from er3a.pipeline.messages.say import joined, listed, say_as, says, sentence, texts
 
 NAMED = 3
 KEY_FIGURES = {
@@ -44,117 +44,43 @@ SHAPES = {
 TEXTS = texts(
     {
         "inverse.not_reproduced": (
-            "The solver can't be trusted here: worst residual {worst_mm:.2g} mm and {worst_deg:.2g} deg, the joint "
-            "angles of {lost} random poses not found again."
+            "Don't trust the solver here: residuals up to {worst_mm:.2g} mm, {worst_deg:.2g} deg; joint angles of "
+            "{lost} random poses not found again."
         ),
         "unsolved_target": "{name} ({obstacle})",
         "nothing_found": "no solution found",
         "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
-        "branches_leave_limits": Plural(
-            "count", "the only solution is outside the limits", "all {count} solutions are outside the limits"
-        ),
-        "branches_collide": Plural(
-            "count", "the only branch within the limits collides", "all {count} branches within the limits collide"
-        ),
-        "inverse.all_solved#some": Plural(
-            "targets",
-            "{count} of {total} targets has a solution {where}.",
-            "{count} of {total} targets have a solution {where}.",
-        ),
-        "inverse.all_solved#every": "Every target ({targets}) has a solution {where}.",
-        "inverse.none_solved": "No target has a solution {where}: {none_for}.",
-        "inverse.some_unsolved": Plural(
-            "solved",
-            "{count} of {total} targets has a solution {where}; none for {none_for}.",
-            "{count} of {total} targets have a solution {where}; none for {none_for}.",
-        ),
-        "inverse.singular": Plural(
-            "names",
-            "{count} of them is at a singularity, where only joint moves lead: {names:, }.",
-            "{count} of them are at singularities, where only joint moves lead: {names:, }.",
-        ),
-        "where#itself": "within the limits and free of self-collision",
-        "where#scene": "within the limits and free of collisions",
-        "reach_missing#near": "{gap_mm:.2g} mm out of reach",
-        "reach_missing#far": "{gap_mm:.0f} mm out of reach",
-        "turning_does_not_help": (
-            "Turning the tool does not help: no orientation tried at this position has a solution that keeps a margin."
-        ),
-        "shifting_does_not_help": (
-            "Moving the part alone does not help: no position tried has a solution with this orientation that keeps a "
-            "margin."
-        ),
-        "move_obstacle": "Move the part, the obstacle or the base: the arm alone can take this pose with margin.",
-        "near_limit": "Little margin: one joint is {margin_deg:.2g} deg from its limit.",
-        "near_end": "Little margin: one joint is {margin_deg:.2g} deg (mm of a prismatic joint) from its limit.",
-        "sum_in_short#above": "{sum} {excess:.1f} above",
-        "sum_in_short#below": "{sum} {excess:.1f} below",
-        "slide_in_short#above": "J{joint} {excess:.1f} mm above",
-        "slide_in_short#below": "J{joint} {excess:.1f} mm below",
-        "at_singularity": by(
-            "kind",
-            wrist=(
-                "Wrist singularity: axes 4 and 6 are collinear, so J4 and J6 turn the tool about the same line; the "
-                "pair nearest to the reference is taken. On a straight line through this pose they can turn by any "
-                "amount; a joint move is unaffected."
-            ),
-            elbow="Elbow singularity: the arm is stretched or folded, so the wrist centre can't move along the arm.",
-            shoulder="Shoulder singularity: the wrist centre is on axis 1, so J1 is free while the wrist follows.",
-        ),
-        "turn_in_short#above": "J{joint} {excess:.1f} above",
-        "turn_in_short#below": "J{joint} {excess:.1f} below",
+        "branches_leave_limits": "solutions outside the limits: {count}",
+        "branches_collide": "solutions that collide: {count}",
+        "inverse.solved": "Targets solved within limits, free of collisions: {solved} of {targets}.",
+        "inverse.unsolved": "No solution: {none_for}.",
+        "inverse.singular": "At a singularity, so only joint moves lead there: {names:, }.",
+        "reach_missing": "{gap_mm:.4g} mm out of reach",
+        "turning_does_not_help": "No tool orientation tried here keeps a margin.",
+        "shifting_does_not_help": "No other place tried for the part keeps a margin.",
+        "move_obstacle": "Move the part, the obstacle or the base: the arm alone reaches this pose with margin.",
+        "near_limit": "Little margin: {margin:.2g} from a limit.",
+        "at_singularity": "Singular ({kind}: {pose}): come here by a joint move, not on a straight line.",
         "turn_tool": (
-            "Turn the tool: {share:.2g} % of random orientations at this position have a solution within the limits. "
-            "With roll, pitch, yaw = {roll:.2f}, {pitch:.2f}, {yaw:.2f} deg, {least_turn_deg:.1f} deg away, the arm "
-            "keeps {margin_deg:g} deg from its limits and {clearance_mm:g} mm from what it may not touch."
+            "Turn the tool by {least_turn_deg:.1f} deg, to roll, pitch, yaw = {to} deg. It then keeps {margin_deg:g} "
+            "deg from limits and {clearance_mm:g} mm clear; {share:.2g} % of orientations tried have a solution."
         ),
         "shift_tool": (
-            "Move the part or the base: with the tool's orientation kept and the tool at ({x:.1f}, {y:.1f}, {z:.1f}) "
-            "mm, a shift of {shift_mm:.0f} mm, the arm keeps {margin_deg:g} deg from its limits and {clearance_mm:g} "
-            "mm from what it may not touch."
+            "Move the part or the base by {shift_mm:.0f} mm, the tool to ({to}) mm. It then keeps {margin_deg:g} deg "
+            "from limits and {clearance_mm:g} mm clear."
         ),
     }
 )
 
 
-@says("inverse.all_solved")
+@says("inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
 def _(found: Finding) -> str:
-    if not found.targets:
-        return _and_demonstrations("", found)
-    where = _where(found.collisions)
-    if not found.demonstrations:
-        return _and_demonstrations(say_as(found, "every", where=where), found)
-    some = say_as(found, "some", total=found.targets, where=where)
-    return _and_demonstrations(some, found)
-
-
-@says("inverse.none_solved")
-def _(found: Finding) -> str:
-    none = say_as(found, where=_where(found.collisions), none_for=_none_for(found.unsolved))
-    return _and_demonstrations(none, found)
-
-
-@says("inverse.some_unsolved")
-def _(found: Finding) -> str:
-    some = say_as(
-        found,
-        total=found.targets,
-        where=_where(found.collisions),
-        none_for=_none_for(found.unsolved),
-    )
-    return _and_demonstrations(some, found)
-
-
-def _and_demonstrations(text: str, found: Finding) -> str:
-    expected = demonstrated(found.demonstrations, found.targets)
+    solved = sentence("inverse.solved", solved=found.solved, targets=found.targets) if found.targets else ""
+    unsolved = sentence("inverse.unsolved", none_for=_none_for(found.unsolved)) if found.unsolved else ""
     singular = sentence("inverse.singular", names=found.singular) if found.singular else ""
-    return joined([text, singular, sentence("finding", finding=expected) if expected else ""], " ")
-
-
-def _where(collisions: bool) -> str:
-    if collisions:
-        return sentence("where#scene")
-    return sentence("where#itself")
+    expected = demonstrated(found.demonstrations, found.targets)
+    expected = sentence("finding", finding=expected) if expected else ""
+    return joined([solved, unsolved, singular, expected], " ")
 
 
 def _none_for(unsolved: tuple[Finding, ...]) -> str:
@@ -164,35 +90,25 @@ def _none_for(unsolved: tuple[Finding, ...]) -> str:
     return joined(named, ", ")
 
 
-@says("reach_missing")
-def _(found: Finding) -> str:
-    if found.gap_mm >= 10:
-        return say_as(found, "far")
-    return say_as(found, "near")
-
-
 def limits_in_short(found: Finding) -> str:
     """Which limits are left and by how much, for a cell of a table."""
-    return joined(map(_in_short, found.joints), ", ")
+    signs = {"above": 1, "below": -1}
+    by_how_much = [as_text(signs[each.side] * each.excess.value, "+.1f") for each in found.joints]
+    units = [each.excess.unit for each in found.joints]
+    shown = map(with_unit, by_how_much, units)
+    return joined((f"{limited(each)} {text}" for each, text in zip(found.joints, shown)), ", ")
 
 
-def _in_short(found: Exceeded) -> str:
-    if is_one(found, "combination_exceeded"):
-        return sentence(
-            f"sum_in_short#{found.side}", sum=sum_of_joints(found.joints, found.factors), excess=found.excess
-        )
-    if is_one(found, "slide_exceeded"):
-        return sentence(f"slide_in_short#{found.side}", joint=found.joint, excess=found.excess_mm)
-    return sentence(f"turn_in_short#{found.side}", joint=found.joint, excess=found.excess_deg)
+@says("at_singularity")
+def _(found: Finding) -> str:
+    return say_as(found, kind=singularity_word(found.kind), pose=singular_pose(found.kind))
 
 
 @says("turn_tool")
 def _(found: Finding) -> str:
-    roll, pitch, yaw = found.to_deg
-    return say_as(found, share=100 * found.orientation_ratio, roll=roll, pitch=pitch, yaw=yaw)
+    return say_as(found, share=100 * found.orientation_ratio, to=numbers(found.to_deg, 2))
 
 
 @says("shift_tool")
 def _(found: Finding) -> str:
-    x, y, z = found.to_mm
-    return say_as(found, x=x, y=y, z=z)
+    return say_as(found, to=numbers(found.to_mm, 1))

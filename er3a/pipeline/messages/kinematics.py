@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Finding
-from er3a.kinematics.solutions import ByClass, Label, PoseUnsolved, SideUnsolved, Unsolved
-from er3a.pipeline.language import N_, as_text, tr
+from er3a.finding import Finding, is_one
+from er3a.kinematics.solutions import ByClass, Label, PoseUnsolved, SideUnsolved
+from er3a.pipeline.language import N_, as_text
 from er3a.pipeline.messages.say import by, joined, listed, say, say_as, says, sentence, texts, word
-from er3a.selection.nearest import MovesLess, MovesLessTogether
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -85,75 +83,48 @@ RULE_TITLES = {
 
 TEXTS = texts(
     {
-        "coupled_wrist": "its joints are coupled in another way than by whole turns among the first three",
+        "coupled_wrist": "its joints are coupled otherwise than by whole turns among the first three",
         "coupled_joints": "its joints are coupled, or sums of them have limits",
         "elbow_axes_not_parallel": "axes 2 and 3 are not parallel",
         "neighbouring_axes_parallel": "axes {first} and {second} are parallel",
         "no_common_point_of_axes_4_5_6": "axes 4, 5 and 6 miss a common point by {miss_mm:.6g} mm",
         "upper_arm_or_forearm_without_length": "the upper arm or the forearm has no length",
         "no_solution_of_class": "no joint values reach the pose; {miss}",
-        "dependent_joints": (
-            "its joints move the tool in fewer ways than there are joints (parallel slides, for instance), so that "
-            "each pose has infinitely many solutions or none"
-        ),
-        "iteration": (
-            "iteration from {starts} random starts, which may miss solutions; no closed form, because {lacking}"
-        ),
+        "dependent_joints": "its joints move the tool in fewer ways than there are joints",
+        "iteration": "iteration from {starts} random starts may miss solutions; no closed form: {lacking}",
         "wrist_tilts_too_little": "the wrist can't tilt that far; {missing_deg:.3g} deg are missing",
-        "nearest_miss": "the nearest configuration found misses by {position_mm:.3g} mm and {rotation_deg:.3g} deg",
-        "limit_bound": "limit-bound: {miss}; a configuration outside the limits solves it: {exceeded}",
-        "singular": "singular: the iteration converges slowly to a singular configuration and ends there: {miss}",
+        "nearest_miss": "the nearest configuration misses by {position_mm:.3g} mm and {rotation_deg:.3g} deg",
+        "limit_bound": "limit-bound: {miss}; solved outside the limits: {exceeded}",
+        "singular": "singular: the iteration ends at a singular configuration: {miss}",
         "unreachable": "unreachable: {miss}, whatever the start",
-        "limit_exceeded#above": "J{joint} at {at:.1f} deg is {by:.3g} deg above its limit of {bound:g} deg",
-        "limit_exceeded#below": "J{joint} at {at:.1f} deg is {by:.3g} deg below its limit of {bound:g} deg",
-        "slide_exceeded#above": "J{joint} at {at:.1f} mm is {by:.3g} mm above its limit of {bound:g} mm",
-        "slide_exceeded#below": "J{joint} at {at:.1f} mm is {by:.3g} mm below its limit of {bound:g} mm",
-        "combination_exceeded#above": "{sum} at {at:.1f} {unit} is {by:.3g} {unit} above its limit of {bound:g} {unit}",
-        "combination_exceeded#below": "{sum} at {at:.1f} {unit} is {by:.3g} {unit} below its limit of {bound:g} {unit}",
+        "limit_exceeded": "{of} at {value:.1f}: {excess:.3g} beyond its limit of {limit:g}",
         "bad_guess": by(
             "solved_by",
-            other_starts="bad guess: from the start given {miss}; other starts solve it, so allow restarts",
-            without_limits=(
-                "bad guess: {miss}; a search from there without limits (respect_limits=False) finds a solution within "
-                "them"
-            ),
+            other_starts="bad guess: from the start given {miss}; allow restarts",
+            without_limits="bad guess: {miss}; search without limits (respect_limits=False)",
         ),
         "found_arm": "solution {number}",
         "not_six_turning_joints#revolute": "it has {joints} joints",
         "not_six_turning_joints#sliding": "it has sliding joints ({sliding})",
-        "by_class": "{arm_class}",
-        "by_class_in_doubt": "{arm_class}; because of rounding, solutions may be missing",
-        "by_class_numbered": "{arm_class}; no signs separate its branches, so they are numbered",
-        "wrist_too_near_axis_1": "the wrist centre would be {gap} too near to axis 1 for the arm's sideways offset",
-        "wrist_too_far": "{gap} beyond reach (the stretched arm brings the wrist centre {reach} from axis 2)",
-        "wrist_too_near": (
-            "the wrist centre would be {gap} too near to axis 2 (folded, the arm gets no nearer than {least})"
-        ),
-        "side_unsolved": "to the {side}: {why}",
-        "greatest_move": "greatest joint move {angle_deg:.1f} deg (J{joint})",
-        "greatest_slide": "greatest joint move {move_mm:.1f} mm (J{joint})",
+        "by_class_in_doubt": "{arm_class}; rounding may hide solutions",
+        "by_class_numbered": "{arm_class}; branches are numbered, as no signs separate them",
+        "wrist_too_near_axis_1": "wrist centre {gap} too near to axis 1",
+        "wrist_too_far": "{gap} beyond reach (wrist centre at most {reach} from axis 2)",
+        "wrist_too_near": "wrist centre {gap} too near to axis 2 (at least {least})",
+        "side_unsolved": "{side}: {why}",
+        "greatest_move": "greatest joint move {move:.1f} (J{joint})",
         "only_admissible": "{move}; the only admissible solution",
         "joint_turned": "J{joint} turned by {turn_deg:+d} deg",
         "other_turns": "the same branch, {joints:, }",
         "other_free_joint": "the same branch, its free joint at another angle",
         "all_collide": "all {count} solutions within the limits collide: {overlap}",
-        "moves_less": "{move}; {other} needs {less_deg:.3g} deg more",
-        "slides_less": "{move}; {other} needs {less_deg:.3g} more (in deg, or mm of a prismatic joint)",
-        "slides_less_together": (
-            "{move}; {other} needs the same, but {less_deg:.3g} more of all joints together (in deg, or mm of a "
-            "prismatic joint)"
-        ),
-        "moves_less_together": "{move}; {other} needs the same, but {less_deg:.3g} deg more of all joints together",
-        "lower_branch_number": "{move}; {other} is just as near, and the lower branch number decides",
-        "next_best": "the next best ({branch})",
+        "moves_less": "{move}; the next best ({next_best}) needs {less:.3g} more",
+        "moves_less_together": "{move}; the next best ({next_best}) needs as much, but {less:.3g} more in all",
+        "lower_branch_number": "{move}; as near: {next_best}; the lower branch number decides",
         "no_solution": "out of reach: {fault}",
-        "all_outside_limits#several": (
-            "all {count} solutions leave the limits; the nearest to them is {branch}: {reason}"
-        ),
-        "all_outside_limits#one": "the only solution leaves them: {branch}: {reason}",
-        "placed": "place {place}: {measures}",
-        "best_by_rules#ranked": "{measures}; the next best has {next_best}",
-        "best_by_rules#only": "{measures}; the only admissible solution",
+        "all_outside_limits": "solutions outside the limits: {count}; nearest: {branch}: {reason}",
+        "placed": "place {place}: {measures:, }",
+        "best_by_rules": "{measures:, }; the next best has {next_best:, }",
     }
 )
 
@@ -175,23 +146,14 @@ def singular_pose(kind: str) -> str:
     return word("singular_pose", SINGULAR_POSES, kind) if kind in SINGULAR_POSES else ""
 
 
-@says("limit_exceeded")
+@says("limit_exceeded", "combination_exceeded")
 def _(found: Finding) -> str:
-    at, by, bound = found.angle_deg, found.excess_deg, found.limit_deg
-    return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
+    return sentence("limit_exceeded", of=limited(found), **found.params)
 
 
-@says("slide_exceeded")
-def _(found: Finding) -> str:
-    at, by, bound = found.position_mm, found.excess_mm, found.limit_mm
-    return say_as(found, found.side, joint=found.joint, at=at, by=by, bound=bound)
-
-
-@says("combination_exceeded")
-def _(found: Finding) -> str:
-    at, by, bound, unit = found.value, found.excess, found.limit, "mm" if found.sliding else tr("deg")
-    named = sum_of_joints(found.joints, found.factors)
-    return say_as(found, found.side, sum=named, at=at, by=by, bound=bound, unit=unit)
+def limited(found: Finding) -> str:
+    """The joint, or the sum of joints, that leaves its limit."""
+    return f"J{found.joint}" if is_one(found, "limit_exceeded") else sum_of_joints(found.joints, found.factors)
 
 
 def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
@@ -211,34 +173,19 @@ def _(found: Finding) -> str:
 
 @says("not_six_turning_joints")
 def _(found: Finding) -> str:
-    if found.sliding:
-        return say_as(found, "sliding")
-    return say_as(found, "revolute")
+    return say_as(found, "sliding" if found.sliding else "revolute")
 
 
 @say.register
 def _(found: ByClass) -> str:
-    parts = {"arm_class": word("arm_class", ARM_CLASSES, found.arm_class)}
-    if not found.certain:
-        return sentence("by_class_in_doubt", **parts)
-    if not found.named:
-        return sentence("by_class_numbered", **parts)
-    return say_as(found, **parts)
+    arm_class = word("arm_class", ARM_CLASSES, found.arm_class)
+    form = "" if found.certain and found.named else "_numbered" if found.certain else "_in_doubt"
+    return sentence(f"by_class{form}", arm_class=arm_class) if form else arm_class
 
 
-@says("wrist_too_near_axis_1")
+@says("wrist_too_near_axis_1", "wrist_too_far", "wrist_too_near")
 def _(found: Finding) -> str:
-    return say_as(found, gap=_mm(found.gap_mm))
-
-
-@says("wrist_too_far")
-def _(found: Finding) -> str:
-    return say_as(found, gap=_mm(found.gap_mm), reach=_mm(found.reach_mm))
-
-
-@says("wrist_too_near")
-def _(found: Finding) -> str:
-    return say_as(found, gap=_mm(found.gap_mm), least=_mm(found.least_mm))
+    return say_as(found, **{name.removesuffix("_mm"): _mm(length) for name, length in found.params.items()})
 
 
 @say.register
@@ -255,13 +202,6 @@ def _mm(length: float) -> str:
     return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"
 
 
-@say.register(MovesLess)
-@say.register(MovesLessTogether)
-@says("lower_branch_number")
-def _(found: Any) -> str:
-    return say_as(found, other=sentence("next_best", branch=say(found.next_best)))
-
-
 @says("other_branch")
 def _(found: Finding) -> str:
     return branch_word(found.label, found.branch)
@@ -272,21 +212,12 @@ def _(found: Finding) -> str:
     if len(found.unsolved) == 1:
         return say(found.unsolved[0])
     faults = list(dict.fromkeys(say(part.why) for part in found.unsolved))
-    fault = faults[0] if len(faults) == 1 else joined(map(_of_side, found.unsolved))
-    return say_as(found, fault=fault)
-
-
-def _of_side(found: Unsolved) -> str:
-    side = word("side", SIDES, found.side) if isinstance(found, SideUnsolved) else ""
-    return joined((side, say(found.why)), ", ")
+    return say_as(found, fault=faults[0] if len(faults) == 1 else joined(listed(found.unsolved)))
 
 
 @says("all_outside_limits")
 def _(found: Finding) -> str:
-    label, reason = branch_word(found.label, found.branch), say(found.exceeded)
-    if found.count == 1:
-        return say_as(found, "one", branch=label, reason=reason)
-    return say_as(found, "several", branch=label, reason=reason)
+    return say_as(found, branch=branch_word(found.label, found.branch), reason=found.exceeded)
 
 
 @says("measure")
@@ -295,16 +226,8 @@ def _(found: Finding) -> str:
     return f"{rule} {as_text(found.value, '.3g')} {found.unit}".removesuffix(" 1")
 
 
-@says("placed")
-def _(found: Finding) -> str:
-    measures = joined(listed(found.measures), ", ")
-    return say_as(found, measures=measures)
-
-
 @says("best_by_rules")
 def _(found: Finding) -> str:
-    measures = joined(listed(found.measures), ", ")
     if not found.next_best:
-        return say_as(found, "only", measures=measures)
-    next_best = joined(listed(found.next_best), ", ")
-    return say_as(found, "ranked", measures=measures, next_best=next_best)
+        return sentence("only_admissible", move=joined(listed(found.measures), ", "))
+    return say_as(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from math import ceil, floor, isfinite, isnan, log10
 
-from er3a.pipeline.language import as_number
+from er3a.pipeline.language import as_number, as_text
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -40,6 +40,11 @@ def number(value: float | int | None, digits: int = 4) -> str:
     if "e" in text:
         text = f"{float(text):.0f}"
     return as_number(f"{float(text):.{len(text.partition('.')[2])}f}")
+
+
+def numbers(values: Iterable[float], decimals: int) -> str:
+    """Numbers with commas between them."""
+    return ", ".join(as_text(value + 0.0, f".{decimals}f") for value in values)
 
 
 def measured(value: float | int | None, uncertainty: float | None, unit: str = "") -> str:

@@ -9,12 +9,12 @@ from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.pairs import LinkAndSolid
-from er3a.finding import Amount, AnyFinding, Finding
+from er3a.finding import Amount, AnyFinding, Finding, is_one
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.expectations import OUTCOMES, demonstrated
 from er3a.pipeline.messages.kinematics import SINGULARITIES, singular_pose
-from er3a.pipeline.messages.planning import UNBOUNDED, rate_needed
+from er3a.pipeline.messages.planning import rate_needed
 from er3a.pipeline.messages.say import (
     WORDS,
     Maker,
@@ -29,7 +29,7 @@ from er3a.pipeline.messages.say import (
     word,
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
-from er3a.planning.motion_faults import AccelerationTooGreat, TooFast, TooFastIfAssumed
+from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, MotionCollides, NotFollowedReason
 from er3a.programs.program_names import ProgramOutcome
@@ -68,7 +68,7 @@ OTHER_SOLUTION = N_(
 )
 FRAMES = N_("Map the name to a frame under frames in the file that lists the programs (--frames).")
 REMEDIES: dict[str, str] = {
-    "slide_exceeded": OTHER_SOLUTION,
+    "limit_exceeded": OTHER_SOLUTION,
     "combination_exceeded": OTHER_SOLUTION,
     "target_out_of_reach": NEARER,
     "way_out_of_reach": NEARER,
@@ -105,7 +105,6 @@ SINGULAR: dict[SingularityType, str] = {
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
 }
-Pace = TooFast | TooFastIfAssumed
 MAX_PAIRS = 3  # that are named of a collision
 KEY_FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
@@ -137,8 +136,6 @@ TEXTS = texts(
         "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",
         "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds {bounded:bounded}",
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
-        "programs.rates": "{named}: above {limits}; {worst:, }",
-        "programs.rates#far": "{named}: above {limits}, at worst by more than {times:g} times",
         "programs.cause": "{finding}: {pose}",
         "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
         "motion_collides": "collision ({assumed:shapes}): {touches:; }",
@@ -280,16 +277,17 @@ def _(found: MotionCollides) -> str:
     return sentence("remedy.collision#links")
 
 
-@remedy.register
-def _(found: TooFast | TooFastIfAssumed) -> str:
-    percent = math.floor(1000 / found.ratio) / 10
+@advises("too_fast")
+def _(found: Finding) -> str:
+    percent = math.floor(1000 / rate_ratio(found)) / 10
     return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
-@remedy.register
-def _(found: AccelerationTooGreat) -> str:
-    percent = math.floor(1000 / math.sqrt(found.ratio)) / 10
-    return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / found.ratio) / 10)
+@advises("acceleration_too_great")
+def _(found: Finding) -> str:
+    ratio = rate_ratio(found)
+    percent = math.floor(1000 / math.sqrt(ratio)) / 10
+    return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / ratio) / 10)
 
 
 @advises("zone_too_large")
@@ -297,17 +295,12 @@ def _(found: Finding) -> str:
     return sentence("remedy.zone_too_large", half=found.motion_mm / 2)
 
 
-def rates_text(paces: Sequence[Pace]) -> str:
+def rates_text(paces: Sequence[RateCause]) -> str:
     """What is too fast on a line, all joints together: the worst of them."""
     joints = sorted({each.joint for each in paces})
-    worst = max(paces, key=lambda each: each.ratio)
-    limits = sentence(
-        "rate_limits#known" if any(isinstance(each, TooFast) for each in paces) else "rate_limits#assumed"
-    )
-    parts = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
-    if worst.ratio > UNBOUNDED:
-        return sentence("programs.rates#far", times=UNBOUNDED, **parts)
-    return sentence("programs.rates", worst=(rate_needed(worst),), **parts)
+    worst = rate_needed(max(paces, key=rate_ratio))
+    named = ", ".join(f"J{joint}" for joint in joints)
+    return sentence("rates", named=named, worst=(worst,)) if len(joints) > 1 else worst
 
 
 def singular_cause(found: AnyFinding) -> str:
@@ -321,9 +314,9 @@ def remedies(findings: Sequence[CheckFinding | FindingAt]) -> list[str]:
     worst = max((RANKS[each.level] for each in located), default=0)
     kept: list[CheckFinding] = [each for each in findings if not isinstance(each, FindingAt)]
     kept += [each.finding for each in located if RANKS[each.level] == worst]
-    fast = [each for each in kept if isinstance(each, Pace)]
-    slowest = max(fast, key=lambda each: each.ratio, default=None)
-    said = (remedy(each) for each in kept if not isinstance(each, Pace) or each is slowest)
+    fast = [each for each in kept if is_one(each, "too_fast")]
+    slowest = max(fast, key=rate_ratio, default=None)
+    said = (remedy(each) for each in kept if not is_one(each, "too_fast") or each is slowest)
     return list(dict.fromkeys(filter(None, said)))
 
 

@@ -8,16 +8,15 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid
-from er3a.finding import Finding
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.expectations import demonstrated, outcome_word
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
+from er3a.pipeline.messages.numbers import numbers
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.planning import rate_needed
-from er3a.pipeline.messages.say import Plural, joined, listed, say, say_first, says, sentence, texts, word
+from er3a.pipeline.messages.say import joined, listed, say, say_first, says, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import JerkTooGreat, RateCause
+from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import PathVerdict, StrategyName
 
 KEY_FIGURES = {
@@ -72,155 +71,76 @@ LEAST_CHANGE = 0.5  # deg or mm
 ADJOINING = 0.05  # s, between stretches that are told as one
 FULL_SPEED = 0.995  # of a joint's limit, which rounds to 100 %
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
-IF_ASSUMED = "_if_assumed"  # ends the codes of faults against assumed limits
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 
 TEXTS = texts(
     {
-        "trajectory.paths": Plural(
-            "count", "{safe} of {count} path passes in the model", "{safe} of {count} paths pass in the model"
-        ),
-        "trajectory.not_followed": "{count} not followed to the end ({names})",
+        "trajectory.paths": "{safe} of {count} paths pass",
+        "trajectory.not_followed": "not followed to the end",
+        "trajectory.of_program": "doubt or fault in the program",
         "trajectory.fault": "{word}: {count} ({names})",
-        "trajectory.of_program": "doubt or fault in the program: {count} ({names})",
         "trajectory.near_assumed": "within the margin of assumed shapes: {count}",
         "dependent_axes": "axes {axes} dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
-        "path.safe": "far from singular poses, within limits and reach",
         "path.shown": "the figure shows the straight joint move",
-        "path.harmless": "passes singular poses ({places}); joint moves are unaffected by singularities",
+        "path.harmless": "passes singular poses, which joint moves may: {places}",
         "path.no_fault": "no fault",
-        "path.pace#profile": (
-            "only the speed profile is at fault, not the path: slower there and faster elsewhere, the "
-            "{programmed:.2f} s programmed are enough (at its fastest it takes {fastest:.2f} s)"
-        ),
-        "path.pace#least": "it takes at least {fastest:.2f} s",
+        "path.pace": "at its fastest it takes {fastest:.2f} s, of {programmed:.2f} s programmed",
         "path.speeds#unbounded": "no finite joint speed follows the path there",
-        "path.speeds#bounded": (
-            "joint speeds stay finite there, but a controller may stop or change to another configuration"
-        ),
-        "singularity.passed": "{type} singularity within {distance} at t = {when} s",
-        "dependent.passed": "close to {type} at t = {when} s ({distance})",
-        "singularity.met": "{type} singularity at t = {when} s",
-        "dependent.met": "{type} at t = {when} s",
-        "path.jump": "the branch in use ends at t = {t:.4g} s, J{joint} would jump",
-        "path.stretch": "{when}: {cause}",
-        "path.worst": "{cause} at t = {t:.4g} s",
-        "path.when": "from t = {start:.4g} to {end:.4g} s",
-        "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
-        "bodies_overlap.more": "{touches}; and more later",
-        "path.singular": "{type} singularity",
-        "path.rates": Plural(
-            "joints",
-            "{named} exceeds {limits} until t = {end:.4g} s: {worst:; }",
-            "{named} exceed {limits} until t = {end:.4g} s: {worst:; }",
-        ),
-        "path.rates#edge": Plural(
-            "joints",
-            "{named} exceeds {limits} from there on, without bound towards the edge of the reach",
-            "{named} exceed {limits} from there on, without bound towards the edge of the reach",
-        ),
+        "path.speeds#bounded": "a controller may stop there or change configuration",
+        "path.passed": "{type} within {distance} at t = {when} s",
+        "path.stretch": "from t = {start:.4g} to {end:.4g} s",
         "path.cause": "{event}: {pose}",
-        "path.cause#edge": "the edge of the reach: towards it the arm is stretched, and no joint speed is enough",
-        "path.rate": "at worst {needed} at t = {t:.4g} s",
-        "path.rates#again": "{rates}; and again from t = {again:.4g} s",
-        "advice.out_of_reach": "it is out of reach {when}",
-        "advice.only": "{way}, as the study requires, does not repair it: {reason}",
-        "advice.none": "No avoidance strategy completes this path: {why}",
-        "advice.no_strategy": "No avoidance strategy works: {reason}",
+        "path.worst": "{cause} at t = {t} s",
+        "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
+        "path.singular": "{type} singularity",
+        "path.rates": "until t = {end:.4g} s {rates}",
+        "path.rates#again": "{rates}; again from t = {again:.4g} s",
+        "path.rates#edge": "{named} too fast from there on, without bound towards the edge of the reach",
+        "path.cause#edge": "the edge of the reach: stretched towards it, the arm needs speeds without bound",
+        "advice.none": "No repair: {why}",
         "advice.slower": (
-            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
-            "duration_s {needed:.4g} in the path file"
-        ),
-        "advice.slower#table": (
-            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: "
-            "multiply the times of its table by {longer:.4g}"
-        ),
-        "advice.slower#program": (
-            "If its speed can't vary along the path, run all of it at {percent:.3g} % of the programmed speed: this is "
-            "the program's override"
+            "Or run all of it at {percent:.3g} % of the programmed speed: {needed:.4g} s in all, its times × "
+            "{longer:.4g}"
         ),
         "advice.clear_until": (
-            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
-            "({stop:.2f} s): end the path there, with the tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg "
-            "(joints {q}), or move its end or the body that it hits: {pair} touch at {contact} mm"
-        ),
-        "advice.clear_until#links": (
-            "It keeps {margin:.1f} mm of clearance up to t = {t:.4g} s ({far:.1f} mm) and in a stop from there "
-            "({stop:.2f} s): end the path there, with the tool at x, y, z = {xyz} mm and roll, pitch, yaw = {rpy} deg "
-            "(joints {q}), or move the path: {pair} touch at {contact} mm"
+            "It is {margin:.1f} mm clear up to t = {t:.4g} s ({far:.1f} mm), also in a stop ({stop:.2f} s). End it "
+            "with the tool at x, y, z = {xyz} mm, roll, pitch, yaw = {rpy} deg (joints {q}). Or move the path, or "
+            "what it hits: {pair} touch at {contact} mm"
         ),
         "advice.within_reach": (
-            "It is within reach up to t = {t:.4g} s ({far:.1f} mm of the path): move its end or the workpiece nearer "
-            "to the arm"
+            "It is within reach up to t = {t:.4g} s ({far:.1f} mm): move its end or the workpiece nearer"
         ),
-        "advice.within_reach#later": (
-            "From t = {first:.4g} s: {what}; from t = {t:.4g} s ({far:.1f} mm of the path) it is out of reach besides"
-        ),
-        "advice.sound": (
-            "End it at t = {t:.4g} s, with the tool at x, y, z = {xyz} mm, {left:.2f} s before the first fault (a stop "
-            "takes {stop:.2f} s), or move the path"
-        ),
-        "advice.slow_there": (
-            "Slow down from t = {start:.2f} to {end:.2f} s only, there to {percent} % of the programmed speed at the "
-            "slowest"
-        ),
-        "advice.no_part": "No part of it may be run as it is",
+        "advice.within_reach#later": ("From t = {first:.4g} s: {what}; out of reach from t = {t:.4g} s ({far:.1f} mm)"),
         "advice.end": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
-            "{stop:.2f} s)."
+            "End it at t = {t:.4g} s, x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
+            "{stop:.2f} s)"
         ),
         "advice.end#clear": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear, also after a stop from there "
-            "({stop:.2f} s)."
+            "End it at t = {t:.4g} s, x, y, z = {xyz} mm: {margin:.1f} mm clear, also in a stop ({stop:.2f} s)"
         ),
-        "advice.end#assumed": (
-            "End it there, with the tool at x, y, z = {xyz} mm: {margin:.1f} mm clear of assumed shapes, also after a "
-            "stop from there ({stop:.2f} s); it touches if the true shapes are larger by more than that."
-        ),
-        "advice.end#within": (
-            "Not before the shapes are confirmed, which may be wrong by {error:g} mm: end it there, with the tool at "
-            "x, y, z = {xyz} mm, {margin:.1f} mm clear of assumed shapes, also after a stop from there ({stop:.2f} s)."
-        ),
-        "advice.chosen": "{way}: {tool}; {time}",
-        "advice.chosen#clear": "{way}: {tool}; {time}; the arm keeps {clearance:.1f} mm of clearance",
-        "advice.of_assumed": "Clearance is that of assumed shapes: the true ones may come nearer",
-        "advice.of_assumed#within": (
-            "Clearance is that of assumed shapes, which may be wrong by {error:g} mm, more than it keeps: confirm them "
-            "first"
-        ),
-        "advice.slowly": "This is its shortest time, quicker than the {programmed:.2f} s programmed: another motion",
-        "advice.near": "No part of it is safe: the arm is near-singular at the start",
-        "advice.near#met": "No part of it is safe: the arm is singular at the start",
+        "advice.slow_there": "Slow down from t = {start:.2f} to {end:.2f} s, to {percent} % at the slowest",
+        "advice.no_part": "Run no part of it",
+        "advice.near": "it begins near a singular pose",
+        "advice.clear": "{clearance:.1f} mm clear",
+        "advice.of_assumed": "Confirm the shapes first, which may be wrong by {error:g} mm",
+        "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
         "advice.full_speed": "A joint moves at full speed: start slowly",
-        "limits_assumed#both": "Joint speeds and accelerations are assumed: what passes may be too fast for the arm.",
-        "limits_assumed#speed": "Joint speeds are assumed: what passes may be too fast for the arm.",
-        "limits_assumed#acceleration": "Joint accelerations are assumed: what passes may be too fast for the arm.",
-        "advice.limits#both": (
-            "It uses up to {speed:.0f} % of the assumed joint speeds and {acceleration:.0f} % of the assumed "
-            "accelerations; the controller's own 100 % may be faster: begin at 10 % override"
-        ),
-        "advice.limits#speed": (
-            "It uses up to {speed:.0f} % of the assumed joint speeds; the controller's own 100 % may be faster: begin "
+        "limits_assumed": "Joint speeds or accelerations are assumed: what passes may be too fast.",
+        "advice.limits": (
+            "It uses {speed:.0f} % of joint speeds and {acceleration:.0f} % of accelerations, in part assumed: begin "
             "at 10 % override"
         ),
-        "advice.limits#acceleration": "It uses up to {acceleration:.0f} % of the assumed joint accelerations",
-        "advice.tool#both": "the tool leaves the path by {far} mm and {turned} deg",
+        "advice.limits#acceleration": "It uses {acceleration:.0f} % of joint accelerations, in part assumed",
+        "advice.tool": "the tool leaves the path by {far} mm, {turned} deg",
         "advice.tool#none": "the tool stays on the path",
-        "advice.tool#far": "the tool leaves the path by {far} mm",
-        "advice.tool#turned": "the tool leaves the path by {turned} deg",
-        "advice.swing": "{tool}; J{joint} turns most, by {swing:.0f} deg",
-        "advice.switch#before": (
-            "It begins at other joint angles than programmed ({changes}): the way there is not part of it and was not "
-            "checked"
-        ),
+        "advice.swing": "J{joint} turns by {swing:.0f} deg",
+        "advice.switch#before": "It begins at other joint angles ({changes}): the way there was not checked",
         "advice.switch#within": "The move to the other solution is part of it and was checked",
-        "advice.time#less": "{takes:.2f} s instead of {programmed:.2f} s",
-        "advice.time#same": "same time as programmed",
-        "advice.time#slower_there": "same time as programmed, slower there and faster elsewhere",
-        "advice.time#more": "{longer:.2f} s longer than programmed",
+        "advice.time": "{takes:.2f} s instead of {programmed:.2f} s",
+        "advice.time#same": "same time",
     }
 )
 
@@ -238,19 +158,16 @@ def _(found: Finding) -> str:
         "undecided": found.undecided,
         "near-singular": found.near_singular,
     }
-    faults = []
-    for verdict, names in unsafe.items():
-        parts = {"count": len(names), "word": outcome_word(verdict), "names": joined(names, ", ")}
-        faults.append(sentence("trajectory.fault", **parts) if names else "")
+    by_word = {outcome_word(verdict): names for verdict, names in unsafe.items()}
+    by_word[sentence("trajectory.not_followed")] = found.not_followed
+    by_word[sentence("trajectory.of_program")] = found.of_program
+    faults = [
+        sentence("trajectory.fault", count=len(names), word=title, names=joined(names, ", "))
+        for title, names in by_word.items()
+        if names
+    ]
     safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
-    if found.not_followed:
-        parts = {"count": len(found.not_followed), "names": joined(found.not_followed, ", ")}
-        faults.append(sentence("trajectory.not_followed", **parts))
-    if found.of_program:
-        parts = {"count": len(found.of_program), "names": joined(found.of_program, ", ")}
-        faults.append(sentence("trajectory.of_program", **parts))
-    other = len(found.not_followed) + len(found.of_program) + sum(map(len, unsafe.values()))
-    if near := found.paths - found.safe - other:
+    if near := found.paths - found.safe - sum(map(len, by_word.values())):
         faults.append(sentence("trajectory.near_assumed", count=near))
     sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
     return sentence("finding", finding=joined(sentences))
@@ -308,23 +225,22 @@ def _apart_from_collisions(path: model.PathSummary) -> str:
     if path.undecided:
         return joined([*map(say, adjoined(path.undecided)), *map(say, path.singularities)])
     met = [say(event) for event in path.singularities if event.crossing]
-    if path.in_joint_space:
-        if not met:
-            return sentence("path.no_fault")
+    if path.in_joint_space and met:
         return sentence("path.harmless", places=joined(met))
-    if met or path.jumps:
-        return joined([*met, *map(say, path.jumps), _speeds(path.joint_speed_bounded)])
-    if path.singularities:
+    if not path.in_joint_space and (met or path.jumps):
+        speeds = sentence("path.speeds#bounded" if path.joint_speed_bounded else "path.speeds#unbounded")
+        return joined([*met, *map(say, path.jumps), speeds])
+    if not path.in_joint_space and path.singularities:
         return joined(map(say, path.singularities))
-    return sentence("path.safe")
+    return sentence("path.no_fault")
 
 
 def _first_and_worst(stretches: tuple[model.Stretch[RateCause], ...]) -> list[model.Stretch[RateCause]]:
     """Of each kind of limit the stretch that exceeds it first and, if it is another, the one that exceeds it most."""
     found: list[model.Stretch[RateCause]] = []
-    for code in dict.fromkeys(part.cause.code for part in stretches):
-        alike = [part for part in stretches if part.cause.code == code]
-        found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: part.cause.ratio)]
+    for kind in dict.fromkeys((part.cause.code, part.cause.basis) for part in stretches):
+        alike = [part for part in stretches if (part.cause.code, part.cause.basis) == kind]
+        found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: rate_ratio(part.cause))]
     return sorted(dict.fromkeys(found), key=lambda part: part.t0_s)
 
 
@@ -332,57 +248,46 @@ def _at_another_pace(path: model.PathSummary) -> str:
     """What the shortest time of a path that is too fast means; empty where its pace is not its only fault."""
     if path.fastest_s is None or not _only_too_fast(path):
         return ""
-    if path.fastest_s > path.duration_s:
-        return sentence("path.pace#least", fastest=path.fastest_s)
-    return sentence("path.pace#profile", fastest=path.fastest_s, programmed=path.duration_s)
+    return sentence("path.pace", fastest=path.fastest_s, programmed=path.duration_s)
 
 
 def _only_too_fast(path: model.PathSummary) -> bool:
     """Whether speed and acceleration are all that is wrong with a path."""
     other = path.unreachable or path.out_of_limits or path.collisions or path.jumps
-    return bool(path.too_fast) and not other and not any(isinstance(e.cause, JerkTooGreat) for e in path.too_fast)
-
-
-def _speeds(bounded: bool) -> str:
-    if bounded:
-        return sentence("path.speeds#bounded")
-    return sentence("path.speeds#unbounded")
+    return bool(path.too_fast) and not other and not any(is_one(each.cause, "jerk_too_great") for each in path.too_fast)
 
 
 @say.register
 def _(event: model.Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
-    parts = {"type": event_word(event), "when": when, "distance": event_distance(event)}
-    if event.type == "dependent_axes":
-        if event.crossing:
-            return sentence("dependent.met", **parts)
-        return sentence("dependent.passed", **parts)
     if event.crossing:
-        return sentence("singularity.met", **parts)
-    return sentence("singularity.passed", **parts)
+        return sentence("path.worst", cause=_kind(event), t=when)
+    return sentence("path.passed", type=_kind(event), when=when, distance=event_distance(event))
+
+
+def _kind(event: model.Singularity) -> str:
+    """What a singular pose is called in a sentence."""
+    return event_word(event) if event.type == "dependent_axes" else sentence("path.singular", type=event_word(event))
 
 
 @say.register
 def _(jump: model.Jump) -> str:
-    parts = {"t": jump.t_s, "joint": jump.joint}
-    return sentence("path.jump", **parts)
+    return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
 
 
 @say.register
 def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
-    return sentence("path.stretch", when=_when(stretch), cause=_with_worst(stretch, say(stretch.cause)))
+    return sentence("path.cause", event=_when(stretch), pose=_with_worst(stretch, say(stretch.cause)))
 
 
 def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
-    return sentence("path.when", start=stretch.t0_s, end=stretch.t1_s)
+    return sentence("path.stretch", start=stretch.t0_s, end=stretch.t1_s)
 
 
 @say.register
 def _(found: model.BodiesOverlap) -> str:
-    touches = joined(listed(found.touches[:MAX_PAIRS]))
-    if len(found.touches) > MAX_PAIRS:
-        return sentence("bodies_overlap.more", touches=touches)
-    return touches
+    more = len(found.touches) - MAX_PAIRS
+    return joined([*listed(found.touches[:MAX_PAIRS]), sentence("more", count=more) if more > 0 else ""])
 
 
 def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
@@ -404,7 +309,7 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
     """What is wrong first with a path, and where it leaves reach or limits or collides, or else its gravest fault: in
     order of time, what only follows from others last. What is undecided counts only where it comes before all that is
     not."""
-    fast = [[part for part in path.too_fast if part.cause.code.endswith(IF_ASSUMED) is each] for each in (False, True)]
+    fast = [[part for part in path.too_fast if part.cause.basis == each] for each in ("documented", "assumed")]
     grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
     found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
@@ -415,7 +320,7 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
         follows = end >= edge - ADJOINING
         found.append(FaultText(run[0].t0_s, _rates(each, edge), run[0].t0_s if seen is None else seen, follows))
     events = [] if path.in_joint_space else [e for e in path.singularities if e.crossing and e.t_s < edge - AT_EDGE]
-    found += [FaultText(e.t_s, sentence("path.singular", type=event_word(e)), e.t_s) for e in events[:1]]
+    found += [FaultText(e.t_s, _kind(e), e.t_s) for e in events[:1]]
     found += [FaultText(jump.t_s, say(jump), jump.t_s) for jump in path.jumps[:1]]
     open_ = min(path.undecided, key=lambda part: part.t0_s, default=None)
     if open_ and open_.t0_s < min(found, default=(math.inf,))[0]:
@@ -476,11 +381,10 @@ def _end_of(run: Sequence[model.Stretch[RateCause]]) -> float:
 
 def _worst_of_kinds(run: Sequence[model.Stretch[RateCause]]) -> list[model.Stretch[RateCause]]:
     """Of each kind of limit the stretch that exceeds it most, speeds first."""
-    kinds = dict.fromkeys((part.cause.code, part.cause.slides) for part in run)
-    return [
-        max((part for part in run if (part.cause.code, part.cause.slides) == kind), key=lambda part: part.cause.ratio)
-        for kind in sorted(kinds, key=lambda kind: not kind[0].startswith("too_fast"))
-    ]
+    kinds: dict[str, list[model.Stretch[RateCause]]] = {}
+    for part in sorted(run, key=lambda part: not is_one(part.cause, "too_fast")):
+        kinds.setdefault(f"{part.cause.code} {part.cause.limit.unit}", []).append(part)
+    return [max(alike, key=lambda part: rate_ratio(part.cause)) for alike in kinds.values()]
 
 
 def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf) -> str:
@@ -490,27 +394,21 @@ def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf
     """
     run, again = _run(stretches)
     first, end = run[0], _end_of(run)
-    joints = sorted({part.cause.joint for part in run})
-    limits = sentence("rate_limits#assumed" if first.cause.code.endswith(IF_ASSUMED) else "rate_limits#known")
-    named = {"joints": joints, "named": ", ".join(f"J{joint}" for joint in joints), "limits": limits}
+    named = ", ".join(f"J{joint}" for joint in sorted({part.cause.joint for part in run}))
     if end >= edge - ADJOINING:
-        return sentence("path.rates#edge", **named)
+        return sentence("path.rates#edge", named=named)
     if len(run) == 1 and not _lasts(first):
         return say(first.cause)
-    rates = sentence("path.rates", end=end, worst=tuple(map(_worst_rate, _worst_of_kinds(run))), **named)
+    worst = [_with_worst(part, say(part.cause)) for part in _worst_of_kinds(run)]
+    rates = sentence("path.rates", end=end, rates=sentence("rates", named=named, worst=worst))
     return rates if again is None else sentence("path.rates#again", rates=rates, again=again)
-
-
-def _worst_rate(part: model.Stretch[RateCause]) -> str:
-    needed = rate_needed(part.cause)
-    return needed if part.worst_s is None else sentence("path.rate", needed=needed, t=part.worst_s)
 
 
 def _with_worst(part: model.Stretch[Any], cause: str) -> str:
     """A cause, and when it is worst on a stretch that is not but a moment."""
     if part.worst_s is None or not _lasts(part):
         return cause
-    return sentence("path.worst", cause=cause, t=part.worst_s)
+    return sentence("path.worst", cause=cause, t=f"{part.worst_s:.4g}")
 
 
 def _lasts(part: model.Stretch[Any]) -> bool:
@@ -549,10 +447,12 @@ def no_repair(path: model.PathSummary) -> str:
     if len(path.avoidance) == 1:
         (only,) = path.avoidance
         if only.name == "planned":
-            return sentence("advice.no_strategy", reason=reasons(only))
-        return sentence("advice.only", way=word("advice", ADVICE, only.name), reason=reasons(only))
+            return sentence("advice.none", why=reasons(only))
+        why = sentence("path.cause", event=strategy_word(only.name), pose=reasons(only))
+        return sentence("advice.none", why=why)
     if path.unreachable:
-        why = sentence("advice.out_of_reach", when=joined(map(_when, path.unreachable), ", "))
+        when = joined(map(_when, path.unreachable), ", ")
+        why = sentence("path.cause", event=when, pose=sentence("beyond_reach"))
     else:
         causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))
@@ -568,11 +468,10 @@ def _of_end(path: model.PathSummary, shapes: Finding | None) -> str:
 
 
 def _of_assumed(clearance_mm: float, shapes: Finding | None) -> str:
-    """That a clearance is that of assumed shapes, and whether these may be wrong by more; empty where none are."""
-    if shapes is None:
+    """That assumed shapes may be wrong by more than a clearance; empty where that is not so."""
+    if shapes is None or clearance_mm >= shapes.margin_mm:
         return ""
-    form = "advice.of_assumed#within" if clearance_mm < shapes.margin_mm else "advice.of_assumed"
-    return sentence(form, error=shapes.margin_mm)
+    return sentence("advice.of_assumed", error=shapes.margin_mm)
 
 
 def _until(path: model.PathSummary) -> str:
@@ -582,7 +481,7 @@ def _until(path: model.PathSummary) -> str:
         return ""
     if path.clear_until and end.t_s >= path.clear_until.t_s:
         return _clear(path)
-    return sentence("advice.sound", t=end.t_s, **_end(end))
+    return sentence("advice.end", **_end(end))
 
 
 def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: Finding | None) -> str:
@@ -590,10 +489,9 @@ def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: Finding | 
     assumed ``shapes`` or of given ones; that first, where assumed ones may be wrong by more."""
     last = path.clear_until
     if last is None:
-        return sentence("advice.end", **_end(end))
-    form = "clear" if shapes is None else "within" if last.margin_mm < shapes.margin_mm else "assumed"
-    parts = {"xyz": _numbers(end.xyz_mm, 1), "margin": last.margin_mm, "stop": last.stop_s}
-    return sentence(f"advice.end#{form}", error=shapes.margin_mm if shapes else None, **parts)
+        return sentence("finding", finding=sentence("advice.end", **_end(end)))
+    clear = sentence("advice.end#clear", **_end(end) | {"margin": last.margin_mm, "stop": last.stop_s})
+    return sentence("finding", finding=joined([_of_assumed(last.margin_mm, shapes), clear], ". "))
 
 
 def end_facts(path: model.PathSummary) -> list[tuple[FactName, str]]:
@@ -602,7 +500,7 @@ def end_facts(path: model.PathSummary) -> list[tuple[FactName, str]]:
 
 
 def _end(end: model.SoundEnd) -> dict[str, Any]:
-    return {"xyz": _numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
+    return {"t": end.t_s, "xyz": numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 
 def whole_pace(path: model.PathSummary) -> str:
@@ -611,8 +509,7 @@ def whole_pace(path: model.PathSummary) -> str:
     if path.strategy != "slow" or speed is None or acceleration is None or not _only_too_fast(path):
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
-    form = "advice.slower" if path.times_in == "path_file" else f"advice.slower#{path.times_in}"
-    return sentence(form, percent=100 / longer, needed=path.duration_s * longer, longer=longer)
+    return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer, longer=longer)
 
 
 def _within_reach(path: model.PathSummary) -> str:
@@ -630,20 +527,18 @@ def _clear(path: model.PathSummary) -> str:
     last = path.clear_until
     if last is None or path.unreachable:
         return ""
-    parts = {
-        "xyz": _numbers(last.xyz_mm, 1),
-        "rpy": _numbers(last.rpy_deg, 2),
-        "q": _numbers(last.q_deg, 2),
-        "contact": _numbers(last.contact_mm, 0),
-    }
-    pair = path.collisions[0].cause.touches[0].pair
-    form = "advice.clear_until" if isinstance(pair, LinkAndSolid) else "advice.clear_until#links"
-    parts["pair"] = say(pair)
-    return sentence(form, margin=last.margin_mm, t=last.t_s, far=last.s_m * 1000, stop=last.stop_s, **parts)
-
-
-def _numbers(values: tuple[float, ...], digits: int) -> str:
-    return ", ".join(as_text(value + 0.0, f".{digits}f") for value in values)
+    return sentence(
+        "advice.clear_until",
+        margin=last.margin_mm,
+        t=last.t_s,
+        far=last.s_m * 1000,
+        stop=last.stop_s,
+        xyz=numbers(last.xyz_mm, 1),
+        rpy=numbers(last.rpy_deg, 2),
+        q=numbers(last.q_deg, 2),
+        contact=numbers(last.contact_mm, 0),
+        pair=path.collisions[0].cause.touches[0].pair,
+    )
 
 
 def reasons(tried: model.TriedStrategy) -> str:
@@ -670,19 +565,15 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
     if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
-        tool = sentence("advice.swing", tool=tool, joint=joint, swing=swings[joint])
+        tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
     clearance = _clearance_kept(motion)
     way = word("advice", ADVICE, tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)
         way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)
-    return sentence(
-        "advice.chosen" if clearance is None else "advice.chosen#clear",
-        way=way,
-        tool=tool,
-        time=_takes(motion.duration_s, path.duration_s, tried.name),
-        clearance=clearance,
-    )
+    clear = "" if clearance is None else sentence("advice.clear", clearance=clearance)
+    parts = joined([tool, _takes(motion.duration_s, path.duration_s), clear])
+    return sentence("path.cause", event=way, pose=parts)
 
 
 def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.StrategyMotion]:
@@ -724,41 +615,28 @@ def fact_word(name: FactName) -> str:
 
 def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:
     """What of assumed limits a motion takes; empty where none is assumed."""
-    speeds, speed, acceleration = any(limits.speed_assumed), limits.speed_deg_s, limits.acceleration_assumed
-    if not speeds and not acceleration:
+    if not any(limits.speed_assumed) and not limits.acceleration_assumed:
         return ""
-    form = _assumed_form(speeds, acceleration)
-    pairs = zip(motion.max_joint_speed_deg_s, speed, limits.speed_assumed)
-    return sentence(
-        f"advice.limits#{form}",
-        speed=100 * max((most / limit for most, limit, assumed in pairs if assumed), default=0.0),
-        acceleration=100 * motion.max_joint_acceleration_ratio,
-    )
-
-
-def _assumed_form(speed: bool, acceleration: bool) -> str:
-    return "both" if speed and acceleration else "speed" if speed else "acceleration"
+    if not any(limits.speed_assumed):
+        return sentence("advice.limits#acceleration", acceleration=100 * motion.max_joint_acceleration_ratio)
+    speed = max(most / limit for most, limit in zip(motion.max_joint_speed_deg_s, limits.speed_deg_s))
+    return sentence("advice.limits", speed=100 * speed, acceleration=100 * motion.max_joint_acceleration_ratio)
 
 
 def limits_assumed(speed: Sequence[bool], acceleration: bool) -> str:
     """That passing rests on assumed limits of the joints; empty where none is assumed."""
-    if not any(speed) and not acceleration:
-        return ""
-    return sentence(f"limits_assumed#{_assumed_form(any(speed), acceleration)}")
+    return sentence("limits_assumed") if any(speed) or acceleration else ""
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:
     if far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION:
         return sentence("advice.tool#none")
-    if turned_deg < NO_DEVIATION:
-        return sentence("advice.tool#far", far=_shortly(far_mm))
-    if far_mm < NO_DEVIATION:
-        return sentence("advice.tool#turned", turned=_shortly(turned_deg))
-    both = {"far": _shortly(far_mm), "turned": _shortly(turned_deg)}
-    return sentence("advice.tool#both", **both)
+    return sentence("advice.tool", far=_shortly(far_mm), turned=_shortly(turned_deg))
 
 
 def _shortly(value: float) -> str:
+    if value < NO_DEVIATION:
+        return "0"
     return f"{value:.2g}" if value < WHOLE else f"{value:.0f}"
 
 
@@ -774,9 +652,6 @@ def switch_text(change: Sequence[float], sliding: Sequence[int]) -> str:
     return sentence("advice.switch#before", changes=joined(parts, ", "))
 
 
-def _takes(takes_s: float, programmed_s: float, strategy: StrategyName) -> str:
-    if abs(takes_s - programmed_s) < NO_TIME:
-        return sentence("advice.time#slower_there" if strategy == "slow" else "advice.time#same")
-    if takes_s > programmed_s:
-        return sentence("advice.time#more", longer=takes_s - programmed_s)
-    return sentence("advice.time#less", takes=takes_s, programmed=programmed_s)
+def _takes(takes_s: float, programmed_s: float) -> str:
+    form = "advice.time#same" if abs(takes_s - programmed_s) < NO_TIME else "advice.time"
+    return sentence(form, takes=takes_s, programmed=programmed_s)

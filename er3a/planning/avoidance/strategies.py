@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from er3a.errors import PoseError
-from er3a.finding import Finding, fact
+from er3a.finding import Finding, fact, turned_or_moved
 from er3a.geometry.transforms import frame_along, moved
 from er3a.kinematics.closed_form import SLOTS
 from er3a.kinematics.forward import forward, frames
@@ -163,11 +163,11 @@ def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoi
 
 def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance | avoidance.NotPossible:
     if not segment.regions:
-        return fact("no_singular_region")
+        return fact("nothing_to_avoid")
     if segment.regions[0][0] == 0:
-        return fact("begins_in_region")
+        return no_end("start", "in_region")
     if segment.regions[-1][1] == len(segment.t):
-        return fact("ends_in_region")
+        return no_end("end", "in_region")
     bends = [bends_of(segment, first, last, kind) for first, last in segment.regions]
     if not all(bends):
         return _none_far_enough(segment, kind)
@@ -318,10 +318,15 @@ def _smallest_bend(
     return bend(high)
 
 
+def no_end(end: str, why: str) -> avoidance.NotPossible:
+    """That the start or the end of a path can't be one, and why."""
+    return fact("no_end", end=end, why=fact(why))
+
+
 def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
-    if kind == "shift":
-        return fact("no_shift_keeps_distance", up_to_mm=MAX_BEND["shift"] * characteristic_length(segment.robot) * 1000)
-    return fact("no_tilt_keeps_distance", up_to_deg=float(np.degrees(MAX_BEND["tilt"])))
+    shift = 1000 * MAX_BEND["shift"] * characteristic_length(segment.robot)
+    most = shift if kind == "shift" else float(np.degrees(MAX_BEND["tilt"]))
+    return fact("no_bend_keeps_distance", up_to=turned_or_moved(most, kind == "shift"))
 
 
 def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
@@ -338,15 +343,15 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
     found : the motion, which crosses the singular set by joint moves, or why there is none
     """
     if not segment.regions:
-        return fact("no_singular_region")
+        return fact("nothing_to_avoid")
     count, at = len(segment.t), 0
     parts: list[Timed] = []
     for first, last in segment.regions:
         before, after = max(first - 1, 0), min(last, count - 1)
         if np.isnan(segment.q[before, 0]):
-            return fact("begins_out_of_reach")
+            return no_end("start", "beyond_reach")
         if np.isnan(segment.q[after, 0]):
-            return fact("ends_out_of_reach")
+            return no_end("end", "beyond_reach")
         if before > at:
             parts += [*(segment.begin() if at == 0 else []), segment.along(at, before)]
         leave = segment.q[before] if before > 0 else segment.first_joints
@@ -450,10 +455,10 @@ def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
     found : the motion to that pose with the share of the path done (0 to 1), or why there is none
     """
     if not segment.regions:
-        return fact("no_singular_region")
+        return fact("nothing_to_avoid")
     last = segment.regions[0][0] - 1
     if last < 1:
-        return fact("begins_in_region")
+        return no_end("start", "in_region")
     motion = joined([*segment.begin(), segment.along(0, last)])
     done = float(segment.followed.line.progress(segment.t[last])[0])
     return avoidance.Avoidance(motion, done, crosses_by_joints=True)

@@ -12,7 +12,7 @@ from er3a.collision.along import bodies_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Amount, Finding, fact, is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.by_class import arm_solver, misses
 from er3a.kinematics.classes.chain_solvers import Unsolved
@@ -43,7 +43,7 @@ from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
-from er3a.robots.joint_limits import limit_margin, meant, shown
+from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import Choice, Refusal, nearest
 from er3a.selection.rule_names import RuleName
@@ -262,8 +262,8 @@ def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[
         fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on
     ]
     margin = float(rows.limit_margin_deg[chosen])
-    near = model.NearEnd if robot.sliding.any() else model.NearLimit
-    return (*found, near(margin)) if margin < LITTLE_MARGIN_DEG else tuple(found)
+    near = fact("near_limit", margin=Amount(margin, unit_compared(robot)))
+    return (*found, near) if margin < LITTLE_MARGIN_DEG else tuple(found)
 
 
 MIX = "mix"

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
@@ -21,17 +20,7 @@ from er3a.selection.rule_names import RuleName
 Obstacle = Finding
 
 
-class NearLimit(Coded):
-    """A joint of the arm taken is near its limit."""
-
-    margin_deg: float
-
-
-class NearEnd(NearLimit):
-    """The same of an arm with prismatic joints, of which a millimetre counts as a degree."""
-
-
-Advice = Finding | NearLimit | NearEnd
+Advice = Finding
 
 
 SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")

@@ -98,7 +98,7 @@ def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits)
 
 
 def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
-    known = [part for part in found.fast if not isinstance(part.cause, model.ASSUMED)]
+    known = [part for part in found.fast if part.cause.basis != "assumed"]
     faults: dict[PathVerdict, object] = {
         "unreachable": beyond,
         "leaves limits": found.limits,
@@ -214,7 +214,7 @@ def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tup
         "unreachable": [(part.start, part.end) for part in found.beyond],
         "leaves limits": [(part.start, part.end) for part in found.limits],
         "collides": [(contact.start, contact.end) for contact in along.contacts],
-        "too fast": [(part.start, part.end) for part in found.fast if not isinstance(part.cause, model.ASSUMED)],
+        "too fast": [(part.start, part.end) for part in found.fast if part.cause.basis != "assumed"],
     }
     return model.in_order(verdict_of(found, along), spans, duration)
 

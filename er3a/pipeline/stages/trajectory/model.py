@@ -22,7 +22,7 @@ from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.motion_faults import AccelerationTooGreatIfAssumed, LimitCause, RateCause, TooFastIfAssumed
+from er3a.planning.motion_faults import LimitCause, RateCause
 from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.way_around import NoWayAround
 
@@ -34,7 +34,6 @@ FASTEST: Literal["fastest"] = "fastest"
 SAME_SPEED = 1e-9
 """Speeds whose relative difference is less are equal but for rounding."""
 
-ASSUMED = (TooFastIfAssumed, AccelerationTooGreatIfAssumed)
 AT_EDGE, AROUND_EDGE = 0.001, 0.1
 """Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
 joints may be too fast because of it."""
@@ -314,7 +313,7 @@ class PathSummary:
     @property
     def outcomes(self) -> tuple[PathVerdict, ...]:
         """All that it came to, as :func:`in_order` names it."""
-        known = [part for part in self.too_fast if not isinstance(part.cause, ASSUMED)]
+        known = [part for part in self.too_fast if part.cause.basis != "assumed"]
         faults: dict[PathVerdict, Sequence[Stretch[Any]]] = {
             "unreachable": self.unreachable,
             "leaves limits": self.out_of_limits,

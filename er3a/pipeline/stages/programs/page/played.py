@@ -13,11 +13,12 @@ from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import Pace, rates_text, remedies, say, singular_cause
+from er3a.pipeline.messages.programs import rates_text, remedies, say, singular_cause
 from er3a.pipeline.messages.say import joined, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
+from er3a.planning.motion_faults import rate_ratio
 from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -57,7 +58,7 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     if is_one(finding, "meets_singularity", "passes_singularity"):
         return [PlayedEvent(start, start, singular_cause(finding), weight)]
     end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
-    if not isinstance(finding, Pace):
+    if not is_one(finding, "too_fast"):
         joint = getattr(finding, "joint", None)
         joints = ((joint, ""),) if joint and is_one(finding, "above_limit", "below_limit") else ()
         return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
@@ -66,17 +67,17 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
         return []
     needed: dict[int, str] = {}
     for _, pace in paces:
-        needed.setdefault(pace.joint, times_needed(pace.ratio, acceleration=False))
+        needed.setdefault(pace.joint, times_needed(rate_ratio(pace)))
     text = rates_text([pace for _, pace in paces])
     return [PlayedEvent(start, max(start, end), text, weight, joints=tuple(needed.items()))]
 
 
-def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Pace]]:
+def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Finding]]:
     """From when on (s) joints are too fast at the line of a finding; the first of each joint is its gravest."""
     return [
         (each.program_s, each.finding)
         for each in _same_line(program, found)
-        if isinstance(each.finding, Pace) and each.program_s is not None
+        if is_one(each.finding, "too_fast") and each.program_s is not None
     ]
 
 
@@ -90,7 +91,7 @@ def cause_first(found: FindingAt) -> tuple[bool, int, bool, float]:
     return (
         not is_one(found.finding, "meets_singularity", "passes_singularity"),
         -RANKS[found.level],
-        isinstance(found.finding, Pace),
+        is_one(found.finding, "too_fast"),
         when(found),
     )
 
@@ -132,7 +133,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
 def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
     """The singular pose that a line with joints that are too fast comes to; None where it comes to none."""
     here = _same_line(program, found)
-    if not any(isinstance(each.finding, Pace) for each in here):
+    if not any(is_one(each.finding, "too_fast") for each in here):
         return None
     said = [
         tr("{where}: {text}", where=_where(program, each), text=singular_cause(each.finding))
@@ -146,7 +147,7 @@ def _moment(program: ProgramSummary, found: FindingAt) -> FaultMoment:
     """A finding with its line and its time; joints of a line that are too fast together."""
     text, seen, where = say_first(found.finding), found.program_s, _where(program, found)
     row = line_id(program.name, found.line) if found.line and found in of_line(program, found.line) else ""
-    if isinstance(found.finding, Pace) and seen is not None:
+    if is_one(found.finding, "too_fast") and seen is not None:
         text = rates_text([pace for _, pace in _paces(program, found)])
     address = "" if seen is None else address_of("programs", program.name, seen, program.name)
     return FaultMoment(text, where, "", seen, row, address)

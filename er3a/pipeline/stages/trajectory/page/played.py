@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.finding import Finding, fact
+from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_words
@@ -17,7 +17,6 @@ from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedies, remedy, say
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.messages.trajectory import (
-    IF_ASSUMED,
     FactName,
     FaultText,
     Slowed,
@@ -38,7 +37,7 @@ from er3a.pipeline.messages.trajectory import (
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import NeededAcceleration, NeededSpeed, RateCause
+from er3a.planning.motion_faults import RATES, rate_ratio
 from er3a.planning.names import FAULTS, PathVerdict
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -172,7 +171,7 @@ def _linked(moment: FaultMoment, path: str) -> FaultMoment:
 
 def _assumed(part: model.Stretch[Any]) -> bool:
     """Whether what a stretch exceeds is an assumed limit."""
-    return bool(part.cause.code.endswith(IF_ASSUMED))
+    return isinstance(part.cause, Finding) and part.cause.basis == "assumed"
 
 
 def _to_do(
@@ -247,8 +246,8 @@ def advised(
     if text is None or path.chosen:
         return text and joined([text, _switch(path, rows, motions)], ". ")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
-        met = any(event.crossing and event.t_s <= rows.t_s[0] for event in path.singularities)
-        return joined([sentence("advice.near#met" if met else "advice.near"), text], ". ")
+        near = sentence("path.cause", event=sentence("advice.no_part"), pose=sentence("advice.near"))
+        return joined([near, text], ". ")
     no_part = path.sound_end is None and weight_of(path.verdict) == "fail"
     return joined([text, sentence("advice.no_part")], ". ") if no_part else text
 
@@ -312,7 +311,7 @@ def _pass(event: model.Singularity) -> PlayedEvent:
 
 def _few_words(part: model.Stretch[Any]) -> str:
     """Why a stretch is an event."""
-    return rate_needed(part.cause) if isinstance(part.cause, RateCause) else cause_text(part)
+    return rate_needed(part.cause) if is_one(part.cause, *RATES) else cause_text(part)
 
 
 def _near_events(path: model.PathSummary, near: Finding | None, clearance: model.Clearances) -> list[PlayedEvent]:
@@ -332,9 +331,9 @@ def _joints(cause: object) -> tuple[tuple[int, str], ...]:
     joint = getattr(cause, "joint", None)
     if joint is None:
         return ()
-    if not isinstance(cause, NeededSpeed | NeededAcceleration):
+    if not is_one(cause, "too_fast", "acceleration_too_great"):
         return ((joint, ""),)
-    return ((joint, times_needed(cause.ratio, acceleration=isinstance(cause, NeededAcceleration))),)
+    return ((joint, times_needed(rate_ratio(cause))),)
 
 
 def _weight(path: model.PathSummary, part: model.Stretch[Any]) -> Weight:
