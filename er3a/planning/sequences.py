@@ -95,59 +95,6 @@ class Arc(Segment):
         return np.cos(turn) * spoke + np.sin(turn) * np.cross(self.normal, spoke)
 
 
-@dataclass(frozen=True, eq=False)
-class ArcWithPath(Arc):
-    """An arc whose circle carries the tool along, which turns by ``rotation`` beside that.
-
-    With n the normal and a the angle, R(s) = exp(s a n) exp(s rotation) R_0, so that its angular velocity is
-    exp(s a n) (a n + rotation): of constant size.
-    """
-
-    @property
-    def turned(self) -> float:
-        """Size of the angular velocity, which is constant, per unit of progress: rad."""
-        return float(np.linalg.norm(self._turning))
-
-    def poses(self, progress: Reals) -> Reals:
-        """Poses of the tool, which the circle carries along.
-
-        Parameters
-        ----------
-        progress : (...,), shares of the path, 0 to 1
-
-        Returns
-        -------
-        T : (..., 4, 4), T_base_tool, m
-        """
-        beside = super().poses(progress)
-        beside[..., :3, :3] = self._carried(np.asarray(progress, float)) @ beside[..., :3, :3]
-        return beside
-
-    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
-        """Velocity of the tool per unit of progress, and its derivative.
-
-        Parameters
-        ----------
-        progress : (...,), shares of the path, 0 to 1
-
-        Returns
-        -------
-        twist, slope : (..., 6), linear (m) then angular (rad), of the tool point, in base axes
-        """
-        first, second = super().twists(progress)
-        first[..., 3:] = self._carried(np.asarray(progress, float)) @ self._turning
-        second[..., 3:] = self.angle * np.cross(self.normal, first[..., 3:])
-        return first, second
-
-    @property
-    def _turning(self) -> Reals:
-        found: Reals = self.angle * self.normal + self.rotation
-        return found
-
-    def _carried(self, progress: Reals) -> Reals:
-        return exp_rotation(self.angle * progress[..., None] * self.normal)
-
-
 def arc(
     T_start: Reals,
     via: Reals,

@@ -24,7 +24,7 @@ from er3a.files.robot_library import load_robot
 from er3a.finding import fact, is_one
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import lines_of
-from er3a.pipeline.messages.diagnosis import say
+from er3a.pipeline.messages.diagnosis import say, sentence
 from er3a.robots.robot import to_modified
 from testing.simulated_measurements import covered, measured
 
@@ -116,8 +116,7 @@ def test_what_intervals_leave_wider_than_a_table_may_be_off_is_not_settled(rando
     assert f"settle {settled} of {estimated + len(found.held)} numbers" in lines_of(found)
     if not settled:
         assert found.conclusion == fact("no_correction_found", intervals=estimated, open=found.open)
-        assert "settle nothing of base_x" in say(found.conclusion)
-        assert "no correction" not in say(found.conclusion)
+        assert say(found.conclusion) == sentence("not_settled", entries=", ".join(found.open))
 
 
 def test_what_positions_cannot_tell_apart_is_held(random):
@@ -205,7 +204,7 @@ def test_the_command_writes_a_robot_file_that_has_the_corrected_kinematics(rando
     path = written(tmp_path, truth, random)
     done = CliRunner().invoke(app, ["calibrate", "er3a_c60", str(path), "--output", str(tmp_path / "mine.yaml")])
     assert done.exit_code == 0, done.output
-    assert "d2 and d3 can't be identified separately: axes 2 and 3 are parallel" in done.output
+    assert "d2, d3 can't be identified separately (axes 2, 3 are parallel)" in done.output
     mine = load_robot(tmp_path / "mine.yaml")
     assert mine.beta[1] != 0
     q = poses_in(robot, random, 200)
@@ -385,7 +384,7 @@ def test_a_wrong_sign_of_alpha_is_named(name, joint, random):
         finding = error.finding
     given = float(np.degrees(wrong.alpha[joint - 1]))
     assert fact("wrong_alpha_sign", joint=joint, given_deg=given, fits_deg=-given) in finding.faults
-    assert f"joint {joint}: alpha" in say(finding)
+    assert f"alpha {joint}" in say(finding)
 
 
 def test_a_joints_zero_that_is_far_off_is_named(random):
@@ -394,7 +393,7 @@ def test_a_joints_zero_that_is_far_off_is_named(random):
     rows = [replace(row, pose=tuple(np.add(row.pose, [0, 0, 0, 30, 0, 0])), deviation_mm=None) for row in rows]
     found = er3a.calibrate(robot, rows)
     assert found.wrong.entries == ("offset4",)
-    assert "corrections of offset4 are far beyond" in lines_of(found)
+    assert "offset4" in lines_of(found)
 
 
 @pytest.mark.parametrize(("size", "words"), [(0.1, "cm. Multiply by 10"), (1 / 25.4, "inches. Multiply by 25.4")])

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from er3a.errors import PathError, PoseError
-from er3a.geometry.transforms import exp_rotation, log_rotation, transform, transposed
+from er3a.geometry.transforms import transform
 from er3a.planning.moves import line
 from er3a.planning.profiles import Times
-from er3a.planning.sequences import ArcWithPath, arc, joint_sequence, segment_path, spin
+from er3a.planning.sequences import arc, joint_sequence, segment_path, spin
 
 
 def random_pose(random):
@@ -180,21 +180,3 @@ def test_joint_sequence_rates_corners_and_halts(random):
     np.testing.assert_allclose(((after[1] - before[1]) / (2 * step))[away], a[away], atol=1e-3)
     rounded = np.abs(move.joints(np.linspace(0, 6, 6001))[0][:, None] - points[[1, 3]]).max(axis=2).min(axis=0)
     assert (rounded > 1e-6).all()
-
-
-def test_an_arc_that_turns_with_the_path_has_the_twists_of_its_poses():
-    """Compared with differences of its poses; its angular velocity is of constant size."""
-    rng = np.random.default_rng(1)
-    T_start, T_end = (transform(rng.normal(size=3), rng.normal(size=3)) for _ in range(2))
-    plain = arc(T_start, rng.normal(size=3), T_end, 1.0)
-    rotation = rng.normal(size=3)
-    made = ArcWithPath(T_start, rotation, 1.0, False, None, plain.centre, plain.normal, plain.angle)
-    end = exp_rotation(plain.angle * plain.normal) @ exp_rotation(rotation) @ T_start[:3, :3]
-    np.testing.assert_allclose(made.poses(np.array(1.0))[:3, :3], end, atol=1e-12)
-    share, step = np.array([0.2, 0.7]), 1e-5
-    first, second = made.twists(share)
-    R = [made.poses(share + each)[:, :3, :3] for each in (-step, step)]
-    np.testing.assert_allclose(log_rotation(R[1] @ transposed(R[0])) / (2 * step), first[:, 3:], atol=1e-6)
-    slope = (made.twists(share + step)[0] - made.twists(share - step)[0]) / (2 * step)
-    np.testing.assert_allclose(slope, second, atol=1e-5)
-    np.testing.assert_allclose(np.linalg.norm(first[:, 3:], axis=1), made.turned)

@@ -115,7 +115,7 @@ def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, und
 def test_a_verdict_says_which_limit_makes_the_void():
     verdict = judge(1 / 6, [void_record(False)], 0.02)
     assert verdict.finding.cause == Disappears((Relaxed((3,), (1.0,), "upper", "deg", 75.0, 15.0, 1.0),))
-    assert "joint 3's upper limit is extended to +90 deg" in say(verdict.finding)
+    assert "J3 ≤ 75 deg; it disappears at J3 ≤ 90 deg" in say(verdict.finding)
 
 
 # --- reach ---

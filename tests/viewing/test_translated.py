@@ -16,7 +16,7 @@ from er3a.pipeline import language
 from er3a.pipeline.language import KEYED
 from er3a.pipeline.messages.say import english
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.stages.registry import all_messages
+from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.run import show
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach.panel import write_teach_page
@@ -46,8 +46,8 @@ def test_a_catalogue_has_the_texts_of_the_code_and_no_others(catalogue):
 
 
 def test_each_entry_is_translated_with_all_its_fields(catalogue, request):
-    for module in all_messages():
-        import_module(module)
+    for stage in STAGES.values():
+        import_module(stage.messages)
     for texts, entry in catalogue.items():
         translated = _forms(entry.string)
         texts = english(entry.id[0] if entry.pluralizable else entry.id) if entry.context == KEYED else texts

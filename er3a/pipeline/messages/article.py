@@ -36,11 +36,8 @@ ITEMS = (
         "er3a.gravity(robot, q, er3a.Load(6))",
         N_("Payload"),
         N_("The arm is introduced as a desktop arm for 6 kg."),
-        N_("No document that er3a has states a payload of the ER3A-C60; nothing else on this page rests on 6 kg."),
-        N_(
-            "No source was found for it, and none for what the drives can hold. The manual of the arm's successor, the "
-            "ER3-600, says 3 kg."
-        ),
+        N_("No document states a payload of the ER3A-C60; nothing else on this page rests on 6 kg."),
+        N_("No source was found for it. The manual of its successor, the ER3-600, says 3 kg."),
     ),
     Item(
         "toolbox",
@@ -48,11 +45,10 @@ ITEMS = (
         "",
         N_("Robotics Toolbox"),
         N_("MATLAB's Robotics Toolbox is used, version 10 or 11 recommended."),
-        N_("The Toolbox was not run here: er3a does each step by itself, and every other item says with what."),
+        N_("It was not run here: er3a does each step by itself."),
         N_(
-            "It needs MATLAB. Its public repository names release 10 as the newest; no release 11 was found. er3a's "
-            "tests hold poses, the modified reading, the joint move and ctraj's time law against its Python port, by "
-            "the same author."
+            "It needs MATLAB; the newest public release is 10. er3a's tests compare with its Python port by the same "
+            "author."
         ),
     ),
     Item(
@@ -62,13 +58,10 @@ ITEMS = (
         N_("The four D-H parameters"),
         N_("The parameters are called standard, and a and α are defined from axis Z(i) to axis Z(i+1) along X(i)."),
         N_(
-            "Whoever therefore enters the table as modified, row by row, gets an arm whose joint 1 alone moves "
-            "the tool {literal_rise_mm:.0f} mm up and down. Entered as standard it moves it {circle_error_mm} mm."
+            "Entered as modified row by row, joint 1 alone moves the tool {literal_rise_mm:.0f} mm up and down; "
+            "entered as standard, {circle_error_mm} mm."
         ),
-        N_(
-            "These are the definitions of modified D-H (Craig). They give the same arm only if a and α move one "
-            "row down, as frame i then lies on axis i."
-        ),
+        N_("These are the definitions of modified D-H (Craig), for which a and α move one row down."),
     ),
     Item(
         "convention",
@@ -78,7 +71,7 @@ ITEMS = (
         N_("Manuals use either convention; find out which."),
         N_(
             "Every robot file names its convention, `er3a new DIR --dh table.csv --convention modified` reads the "
-            "other one, and the diagnosis tries it as a fault."
+            "other one, and the diagnosis tries it."
         ),
     ),
     Item(
@@ -88,14 +81,13 @@ ITEMS = (
         N_("Hand check: the zero pose"),
         N_("With all joints at 0 the upper arm should be vertical and the forearm horizontal."),
         N_(
-            "As printed the upper arm is {p_upper_arm_deg:.0f}° and the forearm {p_forearm_deg:.0f}° from the "
-            "vertical, and the tool is at z = {p_tool_z:.0f} mm. With offset 2 = −90° they are "
-            "{c_upper_arm_deg:.0f}° and {c_forearm_deg:.0f}°, and the tool is at z = {c_tool_z:.0f} mm."
+            "Upper arm and forearm from the vertical, and height of the tool: as printed {p_upper_arm_deg:.0f}°, "
+            "{p_forearm_deg:.0f}°, {p_tool_z:.0f} mm; with offset 2 = −90° {c_upper_arm_deg:.0f}°, "
+            "{c_forearm_deg:.0f}°, {c_tool_z:.0f} mm."
         ),
         N_(
-            "The table fails the article's own check. One entry repairs it: the diagnosis finds offset 2 = "
-            "{fault_deg:.0f}°, which takes the zero pose from {missed_before_mm:.1f} mm off to {missed_after_mm} "
-            "mm."
+            "The table fails the article's own check. One entry repairs it: offset 2 = {fault_deg:.0f}° takes the "
+            "zero pose from {missed_before_mm:.1f} mm off to {missed_after_mm} mm."
         ),
     ),
     Item(
@@ -138,9 +130,8 @@ ITEMS = (
             " all are 0."
         ),
         N_(
-            "With all offsets 0 the table meets {p_statements_met} of {p_statements} of the article's statements "
-            "(what its text says of poses, and what its table prints: the validation page lists them), with offset 2 "
-            "= −90° {c_statements_met} of {c_statements}."
+            "Statements of the article that the table meets: {p_statements_met} of {p_statements} with all offsets 0,"
+            " {c_statements_met} of {c_statements} with offset 2 = −90°. The validation page lists them."
         ),
         N_("By the article's own zero pose offset 2 is not 0."),
     ),
@@ -170,17 +161,17 @@ ITEMS = (
         "er3a.conditioning(robot, q)",
         N_("Joint 5 near 0"),
         N_(
-            "With axes 4 and 6 nearly in line, a small move of joint 4 or 6 is said to change the orientation "
-            "violently, or a slider to move the tool hardly at all (again in 6.2)."
+            "With axes 4 and 6 nearly in line, joints 4 and 6 are said to turn the tool violently, or hardly to "
+            "move it (again "
+            "in 6.2)."
         ),
         N_(
-            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. What grows is "
-            "the joint speed that a turn of the tool needs: {wrist_gain:.1f} times the tool's own at joint 5 = "
-            "1°."
+            "One degree of joint 4 turns the tool by {wrist_turn_deg:.3f}°, there as everywhere. At joint 5 = 1° a "
+            "turn of the tool needs {wrist_gain:.1f} times its own speed of the joints."
         ),
         N_(
-            "The second is right of the tool's position, the first of no pose. At the singularity the tool loses a "
-            "direction, and joints must move fast for small turns of the tool."
+            "The second is right of the tool's position, the first of no pose: what grows is the joint speed that a "
+            "turn of the tool needs."
         ),
     ),
     Item(
@@ -224,8 +215,8 @@ ITEMS = (
             "{same_pose_deg}° apart."
         ),
         N_(
-            "The example lies on the singularity of roll-pitch-yaw, which the article does not mention. It harms "
-            "no solver, but reading the angles back may give others."
+            "The example lies on the singularity of roll-pitch-yaw. It harms no solver, but angles read back may "
+            "differ."
         ),
     ),
     Item(
@@ -233,17 +224,14 @@ ITEMS = (
         "4.2",
         "er3a.solve(robot, T, q0, respect_limits=False)",
         N_("ikine and the limits"),
-        N_(
-            "The code's comment says that ikine considers the limits (3.1 says so of the solver too); the text "
-            "below says that it does not."
-        ),
+        N_("The code's comment and 3.1 say that ikine considers the limits; the text says that it does not."),
         N_(
             "Iteration without limits reaches the target with joint {free_joint} {free_beyond_deg:.0f}° beyond "
             "its limit."
         ),
         N_(
-            "The text is right and the comment wrong. In the Toolbox's release 10 ikine has one output: the printed "
-            "line, which asks for an exit flag as a second one, would end in an error."
+            "The text is right. In the Toolbox's release 10 ikine has one output: the printed line, which asks for "
+            "two, would end in an error."
         ),
     ),
     Item(
@@ -261,12 +249,12 @@ ITEMS = (
         N_("ikcon"),
         N_("ikcon is recommended because it respects the limits; its second output is taken as an exit flag."),
         N_(
-            "As printed {p_within_limits} of {p_solutions} branches are within the limits, so nothing that "
-            "respects them can solve the target."
+            "As printed {p_within_limits} of {p_solutions} branches are within the limits, so nothing that respects "
+            "them solves the target."
         ),
         N_(
-            "By the Toolbox's documentation the second output of ikcon is the remaining error, not a flag, so a "
-            "failure looks like success to code that tests it for being above 0."
+            "By the Toolbox's documentation the second output is the remaining error: a failure looks like success to"
+            " code that tests it for being above 0."
         ),
     ),
     Item(
@@ -276,9 +264,8 @@ ITEMS = (
         N_("Why a target fails"),
         N_("A failure may mean a target out of reach, a singularity, limits, or a poor guess."),
         N_(
-            "Here it is the table: as printed {p_within_limits} of {p_solutions} branches keep the limits, with "
-            "offset 2 = −90° {c_within_limits} of {c_solutions}; of the real arm {r_within_limits} of "
-            "{r_solutions}."
+            "Here it is the table. Branches within the limits: as printed {p_within_limits} of {p_solutions}, with "
+            "offset 2 = −90° {c_within_limits} of {c_solutions}, of the real arm {r_within_limits} of {r_solutions}."
         ),
         N_("The article looks for the cause in target, guess and limits, not in the table."),
     ),
@@ -316,12 +303,12 @@ ITEMS = (
         N_("The void"),
         N_("The workspace is a hollow shell; a region near and below the base can't be reached."),
         N_(
-            "As printed the largest void is of {p_void} L with its centre at z = {p_void_z} mm. With offset 2 = "
-            "−90° {c_void} L are left, at z = {c_void_z} mm."
+            "The largest void: as printed {p_void} L with its centre at z = {p_void_z} mm, with offset 2 = −90° "
+            "{c_void} L at z = {c_void_z} mm."
         ),
         N_(
-            "The printed table's large void lies above the base, not below it. With the offset that the article's text "
-            "asks for it is gone, and what is left is about the shoulder."
+            "The printed table's void lies above the base. The offset that the text asks for leaves only one about "
+            "the shoulder."
         ),
     ),
     Item(
@@ -353,8 +340,8 @@ ITEMS = (
         N_("Straight line"),
         N_("50 poses on a straight line are solved one after the other with ikcon, each from the last."),
         N_(
-            "er3a follows the whole line of both tables, in ctraj's own time law: a trapezoid of speed, each ramp"
-            " a third of the time. Verdicts: {p_line} as printed, {c_line} with offset 2 = −90°."
+            "er3a follows the whole line in ctraj's own time law (trapezoid of speed, ramps of a third). Verdicts: "
+            "{p_line} as printed, {c_line} with offset 2 = −90°."
         ),
     ),
     Item(
@@ -364,12 +351,12 @@ ITEMS = (
         N_("Where the line is singular"),
         N_("A straight line may cross singular regions; the example is played without a remark."),
         N_(
-            "As printed the line is singular at t = {p_crossings} s, with offset 2 = −90° at t = {c_crossings} s."
-            " No joint speed jumps: it is at most {p_line_speed}°/s."
+            "Singular at t = {p_crossings} s as printed, at t = {c_crossings} s with offset 2 = −90°. No joint speed "
+            "jumps: at most {p_line_speed}°/s."
         ),
         N_(
-            "The article's own line is singular at its start and once more, which it does not mention. This does no "
-            "harm here: the line asks for no motion in the direction that the tool loses."
+            "The line is singular at its start and once more. This does no harm here: it asks for no motion in the "
+            "lost direction."
         ),
     ),
     Item(
@@ -379,12 +366,12 @@ ITEMS = (
         N_("Manipulability and condition number"),
         N_("The condition number is named as an example of manipulability (again in 6.2)."),
         N_(
-            "Of two random poses the measures disagree in {ranked_apart_percent:.0f} % of the cases on which is "
-            "nearer to a singularity."
+            "For {ranked_apart_percent:.0f} % of pairs of random poses the measures disagree on which is nearer to a "
+            "singularity."
         ),
         N_(
-            "Manipulability is the product of the singular values, the condition number the ratio of the largest "
-            "to the smallest. One falls to 0 and the other grows without bound."
+            "Manipulability is the product of the singular values and falls to 0; the condition number is the largest"
+            " by the smallest and grows without bound."
         ),
     ),
     Item(
@@ -394,8 +381,8 @@ ITEMS = (
         N_("What to do about it"),
         N_("Stop, go round in joint space, warn the operator, or bend the line by a via point (6.2)."),
         N_(
-            "All are tried and compared on the trajectory page. On the article's line as printed these work: "
-            "{ways_usable}. Recommended: {way_chosen}."
+            "All are compared on the trajectory page. On the article's line these work: {ways_usable}. Recommended: "
+            "{way_chosen}."
         ),
     ),
     Item(
@@ -405,15 +392,14 @@ ITEMS = (
         N_("Key poses against the manual"),
         N_("Compare key poses with the manual; small errors are allowed."),
         N_(
-            "No official manual was found. Against CAD models and a URDF export {p_checks_met} of {p_checks} "
-            "independent checks pass as printed, {c_checks_met} of {c_checks} with offset 2 = −90°, and "
-            "{r_checks_met} of {r_checks} of the real arm's own table. At the worst joint angles the printed "
-            "table's tool is {off_anywhere_mm:.0f} mm off, {off_aligned_mm:.0f} mm once base, flange, zeros and "
-            "directions are aligned."
+            "No official manual was found. Independent checks that pass: as printed {p_checks_met} of {p_checks}, "
+            "with offset 2 = −90° {c_checks_met} of {c_checks}, of the real arm's table {r_checks_met} of {r_checks}."
+            " At worst the printed table's tool is {off_anywhere_mm:.0f} mm off, {off_aligned_mm:.0f} mm once "
+            "aligned."
         ),
         N_(
-            "The lengths are another robot's: with offset 2 = −90° the table agrees with the article and is still"
-            " no ER3A-C60, which reaches {r_reach_mm:.0f} mm from axis 1, not {p_reach_mm:.0f} mm."
+            "The lengths are another robot's: the ER3A-C60 reaches {r_reach_mm:.0f} mm from axis 1, not "
+            "{p_reach_mm:.0f} mm."
         ),
     ),
     Item(
@@ -423,11 +409,10 @@ ITEMS = (
         N_("Workspace drawing"),
         N_("Compare the cloud with the manual's drawing."),
         N_(
-            "No drawing of this arm was found. The real arm's tool gets {r_reach_mm:.0f} mm from axis 1, as "
-            "printed {p_reach_mm:.0f} mm. For the ER3-600, whose manual has a drawing, `make run` compares all of"
-            " it: reports/er3_600/validation.html."
+            "No drawing of this arm was found. Its tool gets {r_reach_mm:.0f} mm from axis 1, as printed "
+            "{p_reach_mm:.0f} mm. `make run` compares the ER3-600 with its drawing: reports/er3_600/validation.html."
         ),
-        N_("The reach of the printed table is not that of the arm that it is said to be."),
+        N_("The reach of the printed table is not that of the arm."),
     ),
     Item(
         "round_trip",
@@ -444,13 +429,10 @@ ITEMS = (
         N_("A hole in the cloud"),
         N_("A hole in the middle means wrong limits, or a direction turned round, of joints 2 and 3."),
         N_(
-            "The hole is there as printed ({p_void} L). Offset 2 = −90°, which the article's zero pose asks for, "
-            "leaves {c_void} L of it. The workspace page names the single changes that take it away."
+            "As printed it has {p_void} L; offset 2 = −90° leaves {c_void} L of it. The workspace page names the "
+            "single changes that take it away."
         ),
-        N_(
-            "Offsets belong on the list, and the hole alone does not tell which entry is wrong: a wider limit "
-            "hides the fault as well."
-        ),
+        N_("Offsets belong on the list; and a wider limit hides the fault as well."),
     ),
     Item(
         "poor_solver",
@@ -476,9 +458,8 @@ ITEMS = (
         N_("CSV and robot programs"),
         N_("Trajectories are written as CSV or as controller programs (.src, .script)."),
         N_(
-            "The command writes the article's joint move as KRL (and with other words as CSV or URScript); no page "
-            "hands it out, because evidence contradicts the table. The programs page of the real arm checks other "
-            "programs, and some that are faulty on purpose."
+            "The command writes the joint move as KRL, with other words as CSV or URScript. No page hands it out, "
+            "because evidence contradicts the table."
         ),
     ),
     Item(
@@ -501,8 +482,8 @@ ITEMS = (
             "`er3a.dynamics.torques.accelerations`."
         ),
         N_(
-            "No drive's limits are known, so no motor can be chosen or judged, and the masses are neither measured "
-            "nor given by the manufacturer."
+            "No drive's limits are known, and the masses are neither measured nor given by the manufacturer: no motor"
+            " can be chosen."
         ),
     ),
     Item(

@@ -38,13 +38,11 @@ HEADLINES = {
 }
 CAUSES = {
     "a_and_d_swapped": N_("a and d are swapped"),
-    "other_convention": N_(
-        "the table is of the other D-H convention, standard or modified: a and alpha stand a row off"
-    ),
-    "all_alphas_negated": N_("the sign of every alpha is turned round"),
-    "one_alpha_negated": N_("the sign is turned round"),
-    "one_length_negated": N_("the sign is turned round"),
-    "offsets_negated": N_("the sign of every offset is turned round"),
+    "other_convention": N_("the table is of the other D-H convention: a and alpha stand a row off"),
+    "all_alphas_negated": N_("every alpha has the other sign"),
+    "one_alpha_negated": N_("it has the other sign"),
+    "one_length_negated": N_("it has the other sign"),
+    "offsets_negated": N_("every offset has the other sign"),
     "unit": N_("the lengths are in another unit"),
     "angle_unit": N_("the angles are in another unit"),
     "scale": N_("all lengths are scaled"),
@@ -70,24 +68,17 @@ def _verdict(found: Comparison) -> str:
     if found.as_printed_mm is None or found.aligned_mm is None:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
-    if found.verdict == "equal":
-        off = tr(
-            "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.2f} deg off)",
-            verdict=text,
-            printed=found.as_printed_mm,
-            turned=found.as_printed_deg,
-        )
-        missing = joined([_uncompared(each) for each in found.not_examined], ", ")
-        return tr("{verdict}; not compared: {layers}", verdict=off, layers=missing) if missing else off
-    return tr(
-        "{verdict} (at the worst joint angles the flange is {printed:.1f} mm and {turned:.1f} deg off as printed, "
-        "{aligned:.4g} mm and {aligned_deg:.3g} deg aligned)",
+    off = tr(
+        "{verdict} (flange off by {printed:.1f} mm and {turned:.2f} deg at worst, aligned by {aligned:.4g} mm and "
+        "{aligned_deg:.3g} deg)",
         verdict=text,
         printed=found.as_printed_mm,
         turned=found.as_printed_deg,
         aligned=round(found.aligned_mm, 3),
         aligned_deg=round(found.aligned_deg or 0.0, 3),
     )
+    missing = joined([_uncompared(each) for each in found.not_examined], ", ") if found.verdict == "equal" else ""
+    return tr("{verdict}; not compared: {layers}", verdict=off, layers=missing) if missing else off
 
 
 def layer_rows(found: Comparison) -> list[tuple[str, str, str]]:
@@ -123,7 +114,7 @@ def _detail(name: str, found: Comparison) -> str:
         shown = tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
         return joined([shown, *(say(each) for each in layer.causes)])
     if name == "limits" and layer.same is False:
-        return tr("{limits} (the second's limits by the first's zeros and directions)", limits=say(layer))
+        return tr("{limits} (by the first's zeros and directions)", limits=say(layer))
     if name == "units":
         return joined([say(each) for each in layer.causes])
     if name == "coupling":

@@ -13,26 +13,13 @@ PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
 TEACH_PANEL = N_("teach panel")
 ARTICLE = N_("the article, item by item")
 FOUNDATIONS: Mapping[str, str] = {
-    "fail": N_(
-        "Never use this table: evidence contradicts it. These results hold for the table, not for the robot: run no "
-        "path, repair or program that was made by it."
-    ),
-    "caution": N_(
-        "Part of this D-H table is not settled: what passes here passes in the model. Run none of it on the arm before "
-        "the table is confirmed."
-    ),
+    "fail": N_("Never use this table: evidence contradicts it. Run no path, repair or program that was made by it."),
+    "caution": N_("Part of this D-H table is not settled: confirm it before the arm moves."),
     "unsettled": N_(
-        "No entry of this D-H table is settled by an independent document: don't rely on it. What passes here passes "
-        "in the model; run none of it on the arm before the table is confirmed."
+        "No entry of this D-H table is settled by an independent document: confirm it before the arm moves."
     ),
-    "no_reference": N_(
-        "This D-H table was compared with no data: what passes here passes in the model. Run none of it on the arm "
-        "before the table is confirmed."
-    ),
-    "not_computed": N_(
-        "This D-H table was not validated: what passes here passes in the model. Run none of it on the arm before the "
-        "table is confirmed."
-    ),
+    "no_reference": N_("This D-H table was compared with no data: confirm it before the arm moves."),
+    "not_computed": N_("This D-H table was not validated: confirm it before the arm moves."),
 }
 GRADE_NAMES = {
     "official": N_("official"),
@@ -57,11 +44,11 @@ GROUP_NAMES = {  # of a robot file
     "wrist_load": N_("wrist load"),
     "weight": N_("weight"),
 }
+SIDES = {"lower": N_("lower limit"), "upper": N_("upper limit")}
 GLOSSARY = {
     N_("branch"): N_("one choice of shoulder, elbow and wrist among the joint angles that bring the tool to a pose"),
     N_("branch and bound"): N_(
-        "a search that divides what is possible and drops the parts that bounds exclude, until the rest is small; not "
-        "the arm's branches"
+        "a search that divides what is possible and drops what bounds exclude; not the arm's branches"
     ),
     N_("self-motion"): N_("a continuum of solutions: joints that move while the tool stays on its target"),
     N_("arm angle"): N_("where the elbow of an arm with spherical shoulder and wrist is on its circle"),
@@ -84,25 +71,22 @@ GLOSSARY = {
     ),
     N_("most likely fault"): N_("the table entry whose correction explains the differences best"),
     N_("authoritative"): N_("of a source: official, CAD or exported; a verdict rests on such sources alone"),
-    N_("settled"): N_(
-        "of a table entry: what independent documents leave open for it moves the tool by less than the tolerance"
-    ),
+    N_("settled"): N_("of a table entry: independent documents give it to within the tolerance"),
     N_("but for signs"): N_(
-        "of a settled table entry: keep it; should an open entry turn out otherwise, another sign or half turn here "
-        "may fit as well"
+        "of a settled table entry: keep it, unless an open entry turns out otherwise, which may change a sign or "
+        "half turn here"
     ),
     N_("claim"): N_("what an article says; shown, but no verdict rests on it"),
     N_("margin"): N_("how far something is from a limit, in its unit"),
     N_("capability"): N_("what the tool can do at a place: share of directions, solutions, dexterity"),
     N_("tray"): N_(
-        "the space, as of a bin or of a pallet's load, for which the workspace page looks for a place: the tool has to "
-        "reach every point of it"
+        "the space, as of a bin or a pallet's load, that the workspace page places where the tool reaches all of it"
     ),
     N_("void"): N_("a region that the tool point can't reach: enclosed, or an open pocket"),
     N_("undecided"): N_("what the computed bounds can't decide; never called safe"),
     N_("allowed collision matrix"): N_(
-        "which pairs of bodies are checked for collisions: pairs that never collide are proven so, adjacent "
-        "ones touch at their joint only; all others are checked"
+        "which pairs of bodies are checked for collisions: all but those proven never to collide and neighbours at "
+        "their joint"
     ),
     N_("penetration tolerance"): N_(
         "the depth of overlap below which a contact between checked points may go unnoticed"
@@ -122,13 +106,12 @@ def of_study() -> str:
     sentences = (
         tr("Evidence on kinematic models of robots: can each table be trusted, and what can the arm do?"),
         tr(
-            "Start with the index: verdicts and key figures of every robot and stage. Each robot has a page for"
-            " each stage and a teach panel. Pages are complete and work offline; links between pages do not "
-            "work inside this report, so choose pages from the lists here."
+            "Start with the index: verdicts and key figures of every robot and stage. Links between pages do not work "
+            "inside this report: choose pages from the lists here."
         ),
         tr(
-            "A fail is a result, not a broken run: evidence contradicts the table. The foot of each page lists "
-            "its inputs and the command that reproduces it."
+            "A fail is a result, not a broken run. The foot of each page lists its inputs and the command that "
+            "reproduces it."
         ),
     )
     return "\n\n".join(sentences)
@@ -137,8 +120,7 @@ def of_study() -> str:
 def of_stage(robot: str, question: str) -> str:
     """A stage's page: what it answers."""
     return tr(
-        "{robot}: {question} The verdict comes first, then the figures behind it; the foot of the page names their "
-        "sources.",
+        "{robot}: {question} The verdict comes first, then its figures.",
         robot=robot,
         question=tr(question),
     )
@@ -147,8 +129,7 @@ def of_stage(robot: str, question: str) -> str:
 def of_teach_panel(robot: str) -> str:
     """The teach panel."""
     return tr(
-        "Move {robot} by hand: joints, typed poses, jogging, way points, distance from singularities, and all "
-        "IK solutions of the pose.",
+        "Move {robot} by hand: joints, poses, jogging, way points, singularities, and all IK solutions.",
         robot=robot,
     )
 
@@ -179,38 +160,26 @@ def decision(
     number about which references contradict each other.
     """
     if table == "not_examined":
-        return tr("Its table has not been examined yet: run the stage validation before you use it.")
+        return tr("Its table has not been examined yet: run the stage validation first.")
     if table == "fail" and same_arm:
         return tr("This is the robot, but its zeros, directions, base or flange are others: correct them first.")
     if table == "fail" and instead:
         return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
     if table == "fail":
-        return tr("Never use this table: evidence contradicts it, so nothing computed from it holds for the robot.")
+        return tr("Never use this table: evidence contradicts it.")
     if failed:
         return tr("Do not use it as it is: see {stages}.", stages=joined(failed, ", "))
     if table == "pass":
-        return tr(
-            "Use it: every entry that moves the tool is settled by independent documents, and nothing here fails."
-        )
-    if table == "caution" and conflict:
-        text = (
-            N_(
-                "Don't rely on it yet: references contradict each other ({values}), and no independent document "
-                "settles any of its geometry."
-            )
-            if unproven
-            else N_(
-                "Use it for planning only: references contradict each other ({values}), and part of it is not settled."
-            )
-        )
-        return tr(text, values=conflict)
-    if table == "caution" and unproven:
-        return tr(
-            "Don't rely on it yet: nothing contradicts its table, but no independent document settles any of its "
-            "geometry."
-        )
+        return tr("Use it: independent documents settle every entry that moves the tool.")
     if table == "caution":
-        return tr("Use it for planning only: nothing contradicts its table, but part of it is not settled.")
+        use = tr("Don't rely on it yet") if unproven else tr("Use it for planning only")
+        if conflict:
+            why = tr("references contradict each other ({values}).", values=conflict)
+        elif unproven:
+            why = tr("no independent document settles any of its geometry.")
+        else:
+            why = tr("part of its table is not settled.")
+        return tr("{use}: {why}", use=use, why=why)
     return tr("There is no evidence on its table: check it before you use it.")
 
 
@@ -244,7 +213,7 @@ def next_step(
             f"{validation}#table-to-use",
         )
     if table == "fail":
-        return NextStep(tr("See which entries the evidence contradicts, and what would mend them."), validation)
+        return NextStep(tr("See which entries are contradicted, and what mends them."), validation)
     if failed:
         stage, title = next(iter(failed.items()))
         return NextStep(tr("See why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html")

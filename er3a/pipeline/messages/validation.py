@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.finding import Finding, is_one
+from er3a.finding import Finding
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.language import N_, as_text, distinct, own_title, tr, with_unit
-from er3a.pipeline.messages.references import GROUP_WORDS, MISSING_WORDS, quoted
-from er3a.pipeline.messages.say import Plural, bracketed, by, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, MISSING_WORDS, quoted
+from er3a.pipeline.messages.say import bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
@@ -63,7 +63,12 @@ GRADES = {
     "claim": N_("an article's text"),
     "inferred": N_("inferred, not stated"),
 }
-CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
+SET_ASIDE = {
+    "no_such_joint": N_("no such joint"),
+    "no_wrist_centre": N_("no wrist centre"),
+    "joint_slides": N_("stated for a joint that turns, but it slides"),
+    "joint_turns": N_("stated for a joint that slides, but it turns"),
+}
 PLACED = {"tool": N_("tool"), "base": N_("base")}
 PART_ENTRIES = {
     "geometry": N_("lengths and twists"),
@@ -79,116 +84,67 @@ GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("r
 
 TEXTS = texts(
     {
-        "graded": "{own_source} ({grade})",
-        "claims#all": "All {claims} statements in {reference_set} that no document backs (“claims”) hold.",
-        "claims#some": Plural(
-            "failed",
-            "Of the {claims} statements in {reference_set} that no document backs (“claims”), {count} doesn't hold.",
-            "Of the {claims} statements in {reference_set} that no document backs (“claims”), {count} don't hold.",
+        "claims": "Statements without a document (“claims”) in {reference_set} that fail: {failed} of {claims}.",
+        "counted_checks": "{passed} of {total} {kind} checks pass",
+        "validation.off": "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f} deg.",
+        "validation.off#tip": (
+            "A tool's tip is then off by up to {factor:.2g} times its distance from the flange: run no Cartesian "
+            "target with a tool before."
         ),
-        "counted_checks#independent": "{passed} of {total} independent checks pass",
-        "counted_checks#consistency": "{same_passed} of {same_total} consistency checks pass, and none is independent",
-        "counted_checks#both": (
-            "{passed} of {total} independent checks and {same_passed} of {same_total} consistency checks (with the "
-            "table's own sources) pass"
-        ),
-        "validation.left_open#up_to": (
-            "If an open or weak entry is wrong, the tool is off by up to {mm:.0f} mm and {deg:.0f} deg."
-        ),
-        "validation.left_open#at_least": (
-            "If an open or weak entry is wrong, the tool is off by {mm:.0f} mm and {deg:.0f} deg or more."
-        ),
-        "validation.left_open#turned": (
-            "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by up to {deg:.0f} deg; a tool's tip is then off by up to {factor:.2g} times its distance from "
-            "there. Run no Cartesian target with a tool before these are checked."
-        ),
-        "validation.left_open#turned_at_least": (
-            "If {entry} is wrong, the tool point (without a tool: the flange's centre) is where it should be, but "
-            "turned by {deg:.0f} deg or more; a tool's tip is then off by up to twice its distance from there. Run "
-            "no Cartesian target with a tool before these are checked."
-        ),
-        "validation.left_open#entry": "an open or weak entry",
-        "validation.left_open#uncovered": "No independent document covers this table ({checks}).",
+        "validation.left_open#uncovered": "No independent document covers this table. {checks}.",
         "validation.left_open#unsettled": (
-            "Don't rely on this table: no independent document contradicts it, but none settles any entry of it. "
-            "{checks}; a check that other values would pass as well settles none."
+            "Don't rely on this table: no independent document settles any of its entries. {checks}."
         ),
         "validation.left_open#uncontradicted": (
-            "No independent document contradicts this table ({checks}), but not all of it is settled: a check that "
-            "other values would pass as well settles none."
+            "Nothing contradicts this table, but part of it is not settled. {checks}."
         ),
-        "validation.missed#contradicted": (
-            "The model contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}; "
+        "validation.left_open#parts": (
+            "Confirmed by independent documents (to {mm:g} mm and {deg:g} deg at the tool): {parts}."
+        ),
+        "validation.left_open#open": "Not confirmed: {names}.",
+        "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
+        "validation.left_open#unbounded": (
+            "Only the table's own source gives {names}: nothing bounds the tool's error if they are wrong."
+        ),
+        "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
+        "validation.contradicted": (
+            "The table contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}. "
             "{checks}."
         ),
-        "validation.missed#described": (
-            "With this table the {quantity} is {measured}; the {grades} data in {own_set} give {expected}. {checks}."
+        "validation.another_arm": (
+            "This is not the arm of the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}. "
+            "{checks}."
         ),
-        "validation.missed#another_arm": (
-            "This is not the arm that the {grades} data in {own_set} describe: the {quantity} is {measured}, not "
-            "{expected}; {checks}."
-        ),
+        "validation.another_arm#entries": "Contradicted entries that move the tool: {names}.",
         "validation.defined_otherwise": (
-            "Its geometry is that of the {grades} data in {own_set}: the same arm, defined otherwise ({checks})."
+            "This is the same arm, defined otherwise than in the {grades} data in {own_set} ({checks}). Convert joint "
+            "values and positions before you use them."
         ),
-        "validation.defined_otherwise#joints": (
-            "Whoever commands joints by this table moves the arm to other places than these data mean."
-        ),
-        "validation.defined_otherwise#places": (
-            "Where base and flange are is a choice: positions can be compared once both sides make the same one."
-        ),
-        "chain#or": "{value} or {values}",
-        "chain#and": "{value} and {values}",
         "validation.confirmed": (
             "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
         ),
-        "validation.left_open#parts": "Confirmed by independent documents: {parts}.",
-        "validation.left_open#open": "Not confirmed: {names}.",
-        "validation.left_open#tolerance": (
-            "“Confirmed” means: what the documents leave open moves the tool by less than {mm} mm and {deg} deg."
-        ),
-        "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
-        "validation.left_open#unbounded": (
-            "Only the table's own source gives {names}: if one of them is wrong, the tool could be off by any amount."
-        ),
-        "validation.left_open#conflicting": "{count} undecided, because documents contradict each other",
-        "part_found#all": "all {part}",
-        "part_found#some": "{settled} of {entries} {part}",
+        "part_found": "{settled} of {entries} {part}",
         "part_found#more": "{more} more of the {part}",
-        "part_found#up_to_signs": "{count} of these only as long as the open entries are right",
-        "part_found#excluded": "{names} (contradicted)",
-        "validation.no_reference": "There is no official, CAD or exported data to compare this model with.",
+        "part_found#up_to_signs": "{count} of these if the open entries are right",
+        "validation.no_reference": "There is no official, CAD or exported data to compare this table with.",
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
-        "validation.another_arm": "Contradicted entries that move the tool (for limits see the table): {names}.",
-        "contradiction#more": (
-            "The references contradict each other about the {subject} ({stated}) and {more} more, which is not "
-            "counted against the model: measure that on the arm before you rely on either."
-        ),
-        "contradiction#one": (
-            "The references contradict each other about the {subject} ({stated}), which is not counted against the "
-            "model: measure it on the arm before you rely on either."
+        "contradiction": (
+            "References contradict each other about the {subjects}: measure that on the arm before you rely on it."
         ),
         "not_in_robot_file": "the robot's file gives no value",
         "source_gives_none": "the source gives none",
-        "not_of_this_arm": by(
-            "reason",
-            no_such_joint="set aside: the arm has {joints} joints",
-            no_wrist_centre="set aside: the arm has no wrist centre",
-            joint_slides="set aside: the joint slides, and the limit or speed is stated as of one that turns",
-            joint_turns="set aside: the joint turns, and the limit or speed is stated as of one that slides",
-        ),
+        "not_of_this_arm": "set aside (arm of {joints} joints): {reason}",
         "too_uncertain": (
-            "decides nothing: the source leaves {uncertainty:g} either way, and from {undecided_from:.4g} on a value "
-            "taken at random would pass as often as not"
+            "decides nothing: uncertain by ±{uncertainty:g}; from {undecided_from:.4g} on a value taken at random "
+            "would pass as often as not"
         ),
         "set_has_no_data": "{reference_set} has no data",
         "in_no_set": "no reference set gives it",
         "numbers_missing": "numbers are missing",
         "no_closed_form": "no closed-form inverse, because {missing}",
         "near_singular_left_out": (
-            "{judged} of {poses} random poses; the others lie within {wrist_deg:g} deg (wrist, elbow) or "
-            "{shoulder_mm:g} mm (shoulder) of a singularity, where joints follow from a pose less exactly"
+            "{judged} of {poses} random poses, the others within {wrist_deg:g} deg (wrist, elbow) or "
+            "{shoulder_mm:g} mm (shoulder) of a singularity"
         ),
     }
 )
@@ -207,25 +163,13 @@ def _(found: Confirmed) -> str:
 
 def counted_checks(counts: CheckCounts) -> str:
     """How many checks pass, by what they rest on: the one scheme of counts of all pages."""
-    own, same = counts.independent, counts.consistency
-    if not same.total:
-        form = "independent"
-    elif not own.total:
-        form = "consistency"
-    else:
-        form = "both"
-    return sentence(
-        f"counted_checks#{form}",
-        passed=own.passed,
-        total=own.total,
-        same_passed=same.passed,
-        same_total=same.total,
-    )
-
-
-@says("claims")
-def _(found: Finding) -> str:
-    return say_as(found, "some" if found.failed else "all")
+    kinds = {kind: getattr(counts, kind) for kind in ("independent", "consistency")}
+    shown = {kind: own for kind, own in kinds.items() if own.total} or {"independent": counts.independent}
+    said = [
+        sentence("counted_checks", passed=own.passed, total=own.total, kind=word("kind", CHECK_KINDS, kind))
+        for kind, own in shown.items()
+    ]
+    return joined(said, ", ")
 
 
 def _of_claims(found: JudgedTable) -> list[str]:
@@ -236,10 +180,6 @@ def _of_claims(found: JudgedTable) -> list[str]:
 def _(found: LeftOpen) -> str:
     some = any(part.settled or part.up_to_signs for part in found.parts)
     sentences = [_what_speaks(found.counts, settled=some or not found.parts), settled_parts(found)]
-    if found.tolerance and some:
-        sentences.append(
-            say_as(found, "tolerance", mm=as_text(found.tolerance.mm, "g"), deg=as_text(found.tolerance.deg, "g"))
-        )
     sentences += how_far_off(found)
     if found.next_measurement:
         sentences.append(say_as(found, "measurement"))
@@ -248,10 +188,14 @@ def _(found: LeftOpen) -> str:
 
 def settled_parts(found: LeftOpen) -> str:
     """How much of each part of a table is settled, and what is not."""
-    known = [say(part) for part in found.parts if part.settled or part.up_to_signs]
-    confirmed = sentence("validation.left_open#parts", parts=joined(known, ", ")) if known else ""
-    names = unconfirmed(found.parts, found.unbounded)
-    return joined([confirmed, sentence("validation.left_open#open", names=names) if names else ""], " ")
+    known, limit = [say(part) for part in found.parts if part.settled or part.up_to_signs], found.tolerance
+    confirmed = say_as(found, "parts", parts=joined(known, ", "), mm=limit.mm, deg=limit.deg) if known and limit else ""
+    return joined([confirmed, not_confirmed(unconfirmed(found.parts, found.unbounded))], " ")
+
+
+def not_confirmed(names: str) -> str:
+    """What nothing settles, as a sentence; empty where that is nothing."""
+    return sentence("validation.left_open#open", names=names) if names else ""
 
 
 PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
@@ -267,9 +211,9 @@ def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> st
         kind, unsettled = word("part_entries", PART_ENTRIES, part.part), part.entries - part.settled - part.up_to_signs
         more = unsettled - len(own) - len(part.contradicted)
         if part.entries and unsettled == part.entries:
-            named.append(say_as(part, "all", part=kind))
+            named.append(tr("all {part}", part=kind))
         else:
-            excluded = say_as(part, "excluded", names=shortened(part.contradicted)) if part.contradicted else ""
+            excluded = bracketed(shortened(part.contradicted), tr("contradicted")) if part.contradicted else ""
             named += [shortened(own), excluded, say_as(part, "more", more=more, part=kind) if more > 0 else ""]
     return joined([*named, shortened(left)], ", ")
 
@@ -303,16 +247,15 @@ def _part(name: str) -> PartName | None:
 def how_far_off(found: LeftOpen) -> list[str]:
     """How far what is open or weak could put the tool off, each a sentence."""
     sentences = []
-    if found.off.moves:
-        form = "at_least" if found.at_least else "up_to"
-        if round(found.off.mm) == 0:
-            form = "turned_at_least" if found.at_least else "turned"
-        entry = bracketed(sentence("validation.left_open#entry"), shortened(_open_alone(found)))
-        factor = 2 * math.sin(math.radians(min(found.off.deg, 180.0) / 2))
-        parts = {"mm": found.off.mm, "deg": found.off.deg, "factor": factor, "entry": entry}
-        sentences.append(sentence(f"validation.left_open#{form}", **parts))
     if found.unbounded:
-        sentences.insert(0, sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
+        sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
+    if found.off.moves:
+        entry = bracketed(tr("an open or weak entry"), shortened(_open_alone(found)))
+        bound = tr("at least") if found.at_least else tr("up to")
+        off = sentence("validation.off", entry=entry, bound=bound, mm=found.off.mm, deg=found.off.deg)
+        factor = 2.0 if found.at_least else 2 * math.sin(math.radians(min(found.off.deg, 180.0) / 2))
+        tip = sentence("validation.off#tip", factor=factor) if round(found.off.mm) == 0 else ""
+        sentences.append(joined([off, tip], " "))
     return sentences
 
 
@@ -329,8 +272,7 @@ def _what_speaks(counts: CheckCounts, *, settled: bool) -> str:
 def _(found: PartFound) -> str:
     part, settled = word("part_entries", PART_ENTRIES, found.part), found.settled + found.up_to_signs
     signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
-    form = "some" if settled < found.entries else "all"
-    return bracketed(say_as(found, form, part=part, settled=settled), signs)
+    return bracketed(say_as(found, part=part, settled=settled), signs)
 
 
 def shortened(names: Sequence[str]) -> str:
@@ -348,8 +290,7 @@ def _contradiction(found: Finding | None) -> list[str]:
 
 @say.register
 def _(found: NothingToCompare) -> str:
-    text = say_as(found)
-    return joined([text, *_of_claims(found)], " ")
+    return joined([say_as(found), *_of_claims(found)], " ")
 
 
 @say.register
@@ -360,54 +301,39 @@ def _(found: ModelUnsound) -> str:
 
 @say.register
 def _(found: Contradicted) -> str:
-    return joined(
-        [_missed(found, "contradicted"), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " "
-    )
+    return joined([missed_text(found), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
 
 
 @say.register
 def _(found: DefinedOtherwise) -> str:
-    faults = found.diagnosis.faults if found.diagnosis else ()
-    joints = any(is_one(fault, "wrong_offset", "reversed_direction", "counted_from_ground") for fault in faults)
     head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
-    meaning = say_as(found, "joints" if joints else "places")
-    return joined([head, say(found.diagnosis) if found.diagnosis else "", meaning, *_of_claims(found)], " ")
+    return joined([head, say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
 
 
 @say.register
 def _(found: AnotherArm) -> str:
-    excluded = say_as(found, names=shortened(found.contradicted))
-    sentences = [
-        say(found.described) if found.described else "",
-        _missed(found, "described" if found.described else "another_arm"),
-        excluded if found.contradicted else "",
-        *_of_claims(found),
-    ]
-    return joined(sentences, " ")
+    excluded = say_as(found, "entries", names=shortened(found.contradicted)) if found.contradicted else ""
+    described = say(found.described) if found.described else ""
+    return joined([described, missed_text(found), excluded, *_of_claims(found)], " ")
 
 
 @says("contradiction")
 def _(found: Finding) -> str:
-    stated = stated_text(found)
-    if not found.more:
-        return say_as(found, "one", stated=stated)
-    return say_as(found, "more", stated=stated)
+    more = [sentence("more", count=found.more)] if found.more else []
+    return say_as(found, subjects=joined([bracketed(say(found.subject), stated_text(found)), *more], ", "))
 
 
 def stated_text(found: Finding) -> str:
     """The values that references state about one number."""
-    return _chained("or", [with_unit(value, found.unit) for value in distinct(found.stated)])
+    return tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
 
 
 def missed_text(found: Contradicted | AnotherArm) -> str:
     """What a contradicted table gives, and what the documents say."""
-    return _missed(found, "contradicted" if isinstance(found, Contradicted) else "described")
-
-
-def _missed(found: Contradicted | AnotherArm, form: str) -> str:
     measured, expected = (with_unit(value, found.unit) for value in distinct([found.measured, found.expected]))
+    other = isinstance(found, AnotherArm) and not found.described
     return sentence(
-        f"validation.missed#{form}",
+        "validation.another_arm" if other else "validation.contradicted",
         grades=_grades(found.grades),
         own_set=found.reference_set,
         checks=counted_checks(found.counts),
@@ -418,14 +344,12 @@ def _missed(found: Contradicted | AnotherArm, form: str) -> str:
 
 
 def _grades(grades: Sequence[Grade]) -> str:
-    return _chained("and", [word("data", DATA_GRADES, grade) for grade in grades])
+    return tr(" and ").join(word("data", DATA_GRADES, grade) for grade in grades)
 
 
-def _chained(link: str, words: Sequence[str]) -> str:
-    """Words as one text, with "and" or "or" between each two."""
-    if len(words) == 1:
-        return words[0]
-    return sentence(f"chain#{link}", value=words[0], values=_chained(link, words[1:]))
+@says("not_of_this_arm")
+def _(found: Finding) -> str:
+    return say_as(found, reason=word(found.code, SET_ASIDE, found.reason))
 
 
 @says("named_pose")

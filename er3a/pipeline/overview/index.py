@@ -23,6 +23,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.collision import near_shapes
+from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.pages import decision, next_step
@@ -30,10 +31,10 @@ from er3a.pipeline.messages.say import bracketed, joined, say, sentence
 from er3a.pipeline.messages.scope import assumed_text, never_text, say_reserved
 from er3a.pipeline.messages.scope import missed_text as missed_of_check
 from er3a.pipeline.messages.validation import (
-    CONVENTIONS,
     condition,
     how_far_off,
     missed_text,
+    not_confirmed,
     settled_parts,
     shortened,
     stated_text,
@@ -77,7 +78,6 @@ from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.page import PAGES, Head, alternative_table, head_of, status_word
 from er3a.robots.robot import Robot
 
-BORDER_POINT = "tool_point"
 MAX_CHANGED = 6  # files that have changed since, and are named
 Workspaces = Mapping[str, WorkspaceResults | AbsentResults | None]
 Outdated = Mapping[tuple[str, str], tuple[str, ...]]
@@ -501,7 +501,7 @@ def _settled(finding: object, evidence: TableEvidence | None) -> tuple[bool, Ans
     sums = joined([each.entry for each in evidence.combinations] if evidence else [], ", ")
     counted = tr("Counted as one entry, because only the sum matters: {names}.", names=sums) if sums else ""
     names, said = unconfirmed(finding.parts, finding.unbounded), settled_parts(finding)
-    open_ = sentence("validation.left_open#open", names=names) if names else ""
+    open_ = not_confirmed(names)
     lead = joined([open_ or said, conflict], " ")
     rest = joined([said.removesuffix(open_).rstrip() if open_ else "", counted, *how_far_off(finding)], " ")
     return part is not None and not (part.settled or part.up_to_signs), Answer(title, lead, rest, place)
@@ -536,7 +536,7 @@ def _answers(heads: Mapping[str, Head], robot: Robot, placing: Placing | None) -
     if placing is None:
         yield Answer(tr("Tray"), no_box_text(workspace), page="workspace.html#placement")
         return
-    rest = run_again_text(workspace, stand=placing.tray.floor is not None)
+    rest = run_again_text(workspace)
     places = placing.rows if len(placing.rows) > 1 else ()
     yield Answer(tr("Tray"), placing.line, rest, "workspace.html#placement", places)
 

@@ -15,13 +15,3 @@ from er3a.pipeline.stages.workspace.entry import STAGE as WORKSPACE
 STAGES: dict[str, Stage] = {
     stage.name: stage for stage in (VALIDATION, WORKSPACE, COLLISION, INVERSE, TRAJECTORY, PROGRAMS, DYNAMICS, VISION)
 }
-
-
-def all_messages() -> list[str]:
-    """The modules with the sentences of all stages, for pages that show more than one.
-
-    Returns
-    -------
-    modules : full names, to be imported so that findings have texts
-    """
-    return [stage.messages for stage in STAGES.values()]

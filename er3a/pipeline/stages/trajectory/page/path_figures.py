@@ -28,9 +28,7 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 CONDITION_SCALE = LogNorm(3, 300)
-PATH_COLOURS = "viridis_r"
 AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
-MAX_SINGULAR_ARMS = 3  # at singular poses
 
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show

@@ -20,8 +20,8 @@ from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
-from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import shortened
+from er3a.pipeline.messages.say import joined, say, word
+from er3a.pipeline.messages.validation import not_confirmed, shortened
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -344,7 +344,7 @@ def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEv
     if comparable:
         parts.append(tr("What differs is marked."))
     if unconfirmed:
-        parts.append(sentence("validation.left_open#open", names=unconfirmed))
+        parts.append(not_confirmed(unconfirmed))
         parts.append(
             tr(
                 "“One source”: only the source of {robot} gives it, which may contradict another table but confirms "

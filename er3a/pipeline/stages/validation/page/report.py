@@ -15,11 +15,12 @@ from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.language import N_, own_title, tr, with_unit
+from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
 from er3a.pipeline.messages.pages import GRADE_NAMES, decision
 from er3a.pipeline.messages.references import CHECK_KINDS
-from er3a.pipeline.messages.say import joined, say, sentence, word
-from er3a.pipeline.messages.validation import CONVENTIONS, GRADES, GROUPS, counted_checks, unconfirmed
+from er3a.pipeline.messages.say import bracketed, joined, say, word
+from er3a.pipeline.messages.validation import GRADES, GROUPS, counted_checks, unconfirmed
 from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import model
@@ -101,7 +102,7 @@ def check_row(check: Judged) -> list[str]:
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
     if isinstance(check, model.ReferenceCheck):
         grade = word("grade", GRADE_NAMES, check.grade)
-        source = sentence("graded", own_source=own_title(check.source), grade=grade)
+        source = bracketed(own_title(check.source), grade)
     else:
         source = tr("the model itself")
     return [say(check.subject), *values, _tolerance(check), tr(check.unit), source]

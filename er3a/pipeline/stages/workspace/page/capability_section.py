@@ -56,7 +56,7 @@ def tray_rows(
         (tr("Margins"), _margins(place)),
         (tr("Motions"), _hindered(placing)),
         (tr("Payload there"), payload),
-        (tr("What to do first"), run_again_text(results.summary, stand=tray.floor is not None)),
+        (tr("What to do first"), run_again_text(results.summary)),
     ]
 
 

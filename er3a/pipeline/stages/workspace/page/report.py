@@ -108,8 +108,7 @@ def _slices_caption(summary: model.WorkspaceSummary) -> str:
     enclosed = len(summary.enclosed_voids)
     pockets = len(summary.voids) - enclosed
     return tr(
-        "The hull contains {voids} and {pockets}. Every point of the blue area is reached by some joint vector "
-        "within the limits; place nothing outside it.",
-        voids=sentence("workspace.voids", count=enclosed) if enclosed else tr("no enclosed void"),
+        "In the hull: {voids}, {pockets}. Every point of the blue area is reached; place nothing outside it.",
+        voids=sentence("workspace.voids", count=enclosed),
         pockets=sentence("workspace.pockets", count=pockets),
     )
