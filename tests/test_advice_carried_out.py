@@ -36,7 +36,7 @@ CARRIED_OUT = {
     "remedy.zone_too_large": OF_PROGRAMS,
     "remedy.limit": OF_PROGRAMS,
     **{f"remedy.collision#{form}": OF_PROGRAMS for form in ("solid", "links", "solid_at_target")},
-    "left_out.units": "test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read",
+    "gap.units": "test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read",
     "remedy.slower": "test_a_line_at_the_pace_advised_passes",
     "pairs_unexamined": "test_shapes_in_error_are_an_error_of_the_shapes",
     "zone_collides": "test_a_zone_that_allows_a_collision_is_a_caution",
@@ -49,7 +49,7 @@ CARRIED_OUT = {
         ("advice.slower#table", "advice.slower#program"),
         "test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limits",
     ),
-    **dict.fromkeys(("advice.full_speed", "advice.limits#both", "advice.limits#speed"), AT_OVERRIDE),
+    **dict.fromkeys(("advice.full_speed", "advice.limits"), AT_OVERRIDE),
     "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.clear_until#links": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.end": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
@@ -79,12 +79,12 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("clearance_not_proven", "program_not_understood", "singular.elbow", "singular.shoulder", "not_followed.too_far"),
     *("program_nothing_moves", "written_tool_not_given"),
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
-    *("no_correction_fits", "contradiction"),
+    *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
     *("payload.none", "payload.ask"),
     *("validation.off#tip", "validation.defined_otherwise", "far_from_table"),
 }
-NO_ADVICE = {"not_of_this_arm"}
+NO_ADVICE = {"not_of_this_arm", "below_limit", "bad_guess#other_starts"}
 
 
 MOVES_ARM_OR_PART = re.compile(

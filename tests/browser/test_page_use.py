@@ -309,7 +309,6 @@ def test_the_counts_of_the_first_table_lead_to_the_rows_that_fail(browser, small
     [
         ("er3a_c60_article/workspace.html", "volume", ".caveat, .verdict"),
         ("er3a_c60/trajectory.html", "line_clean", ".caveat, .assumed-shapes, .verdict, #line_clean ~ p strong"),
-        ("er3a_c60/vision.html", "grasp_can", ".caveat, .verdict, section:has([download^=grasp_can]) p strong"),
         ("index.html", "void", ".robot h2, .robot .decision, #decisions tr"),
         ("index.html", "void", "#er3a_c60_article, .robot:has(#er3a_c60_article) > details > p strong"),
     ],

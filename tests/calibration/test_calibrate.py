@@ -322,7 +322,7 @@ def test_one_coordinate_to_spare_settles_nothing(random):
     found = er3a.calibrate(robot, [*rows[: short - 1], row])
     assert (found.freedom, len(found.estimates)) == (1, numbers)
     assert found.open == tuple(each.name for each in found.estimates)
-    assert "Nothing is settled: there is only one coordinate more" in lines_of(found)
+    assert "Nothing is settled with one coordinate more" in lines_of(found)
 
 
 def test_too_few_positions_ask_for_poses_that_settle_more(random):

@@ -15,7 +15,7 @@ from testing.small_study import STUDY
 FILES = {
     "pipeline/stages/toy/__init__.py": '"""How long the arm is."""\n',
     "pipeline/stages/toy/entry.py": '''"""The stage in the registry."""
-from er3a.by_value import Finding
+from er3a.finding import fact
 from er3a.files.yaml_file import StrictModel
 from er3a.pipeline.stages.stage import Stage
 
@@ -23,29 +23,21 @@ class ToySettings(StrictModel):
     """``factor``: how many arms in a row."""
     factor: int = 2
 
-class TooLong(Finding, code="toy.too_long"):
-    """A link is too long for this stage."""
-    length_m: float
-
 def applies(robot):
-    return TooLong(robot.a.max()) if robot.a.max() > 0.4 else None
+    return fact("toy.too_long", length_m=float(robot.a.max())) if robot.a.max() > 0.4 else None
 
 STAGE = Stage(name="toy", title="toy", question="How long?", settings={"toy": ToySettings}, views=("report",),
-              applies=applies, absences=(TooLong,))
+              applies=applies)
 ''',
     "pipeline/stages/toy/model.py": '''"""What the stage finds."""
-from er3a.by_value import Finding
+from er3a.finding import Finding
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.tables import Table, column
 
-class Long(Finding, code="toy.long"):
-    """A length."""
-    length_m: float
-
 class ToySummary(Summary):
     """Nothing more."""
-    verdict: Verdict[Long]
+    verdict: Verdict[Finding]
 
 class Lengths(Table):
     """Each length."""
@@ -58,10 +50,11 @@ class ToyResults(Results[ToySummary]):
 RESULTS = ToyResults
 ''',
     "pipeline/stages/toy/compute.py": '''"""Adds lengths."""
+from er3a.finding import fact
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.scope import Coverage
 from er3a.pipeline.stages.toy.entry import ToySettings
-from er3a.pipeline.stages.toy.model import Lengths, Long, ToyResults, ToySummary
+from er3a.pipeline.stages.toy.model import Lengths, ToyResults, ToySummary
 
 def compute(study, name):
     a = study.robot(name).a * study.section(ToySettings).factor
@@ -69,7 +62,7 @@ def compute(study, name):
     if not whole:
         raise ZeroDivisionError("no such arm")
     made = (Coverage("torque", 1, 1),)
-    summary = ToySummary(Verdict("pass", Long(whole)), (Figure("sum", whole, "m"),), checked=made)
+    summary = ToySummary(Verdict("pass", fact("toy.long", length_m=whole)), (Figure("sum", whole, "m"),), checked=made)
     return ToyResults(summary, Lengths(a))
 ''',
     "pipeline/stages/toy/page/__init__.py": '"""Its page."""\n',

@@ -146,7 +146,7 @@ def test_why_it_fails(robot, random):
     (unsolved,) = found.unsolved
     assert (unsolved.why.code, bool(found.solved), int(found.starts)) == ("unreachable", False, 0)
     assert unsolved.why.miss.position_mm == found.position_error * 1000
-    assert say(unsolved).startswith("unreachable: the nearest configuration found misses by ")
+    assert say(unsolved).startswith("unreachable: the nearest configuration misses by ")
     found = solve(robot, forward(robot, q), joints_at_random(robot, random, 60), restarts=0)
     assert [one.pose for one in found.unsolved] == np.flatnonzero(~found.solved).tolist()
     assert 0 < len(found.unsolved) < 60

@@ -67,7 +67,7 @@ def test_the_stages_say_so(small_results):
     count, (tile,) = summary.verdict.finding.safe, (each for each in summary.figures if each.name == "safe")
     assert count == tile.value == len(paths) - len(faults(stored.results))  # which the index counts
     sound = next(path for path in paths if path.verdict == "safe" and path.name not in near)
-    nearer = replace(shapes, near=(*near, sound.name))
+    nearer = shapes.but(near=(*near, sound.name))
     assert (is_safe(sound, shapes), is_safe(sound, nearer)) == (True, False)
     closer = replace(summary, verdict=replace(summary.verdict, shapes=nearer))
     assert len(faults(replace(stored.results, summary=closer))) == len(faults(stored.results)) + 1
@@ -78,7 +78,7 @@ def test_recordings_call_no_path_safe_without_saying_of_what(small_results):
     results = read_results(small_results("trajectory", "er3a_c60", study), RESULTS).results
     summary = results.summary
     sound = [each for each in summary.paths if is_safe(each, summary.verdict.shapes)]
-    nearer = replace(summary.verdict, shapes=replace(summary.verdict.shapes, near=(sound[0].name,)))
+    nearer = replace(summary.verdict, shapes=summary.verdict.shapes.but(near=(sound[0].name,)))
     close = replace(results, summary=replace(summary, verdict=nearer))
     for found, status, words in (
         (results, "plain", "safe in the model"),

@@ -129,7 +129,7 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     [
         ({}, "data/scenes/table_and_post.yaml", 1, ""),
         ({"line_clean": "collides"}, "data/scenes/table_and_post.yaml", 0, "not as expected"),
-        ({}, None, 1, "Not examined, and therefore no pass: obstacles"),
+        ({}, None, 1, "Not checked: collisions with the scene: no scene is given"),
     ],
 )
 def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path, expect, scene, passing, words):
@@ -141,7 +141,7 @@ def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path
     decision, rest = text.split(f"{passing} of 1 paths pass", 1)[1].split("</tr>", 1)
     shown = decision if scene is None else rest.split("The verdict of each stage")[0]
     assert words in shown
-    for other in {"not as expected", "and therefore no pass: obstacles"}:
+    for other in {"not as expected", "Not checked: collisions with the scene"}:
         assert (other in text) == bool(words and other in words)
 
 

@@ -80,7 +80,7 @@ def test_only_grasps_that_pass_are_told_to_succeed(folders):
     verdict, (can, *others) = results.summary.verdict, results.summary.objects
 
     def told(near=(), expect="grasped"):
-        objects, shapes = (replace(can, expect=expect), *others), replace(verdict.shapes, near=near)
+        objects, shapes = (replace(can, expect=expect), *others), verdict.shapes.but(near=near)
         summary = replace(results.summary, objects=objects, verdict=replace(verdict, shapes=shapes))
         return sound_motions(replace(results, summary=summary))
 

@@ -37,6 +37,11 @@ pytestmark = pytest.mark.long  # kernels that take half a minute to compile
 DIRECTIONS, TILTS = 24, 10
 
 
+def place_of(frame, sector):
+    """The middle of a sector, rad about axis 1, or m along the bar."""
+    return np.asarray(frame.width * (sector + (0.5 if frame.bar else 0.0)), dtype=float)
+
+
 def crx_like() -> Robot:
     """Six turning joints without a wrist centre, axes 2 and 3 parallel."""
     rows = [("R", 0, -90, 245, -180, 180), ("R", 710, 0, 0, -100, 100), ("R", 0, -90, 0, -250, 70)]
@@ -121,7 +126,7 @@ def test_reachability_is_what_least_squares_find(make, middle, sector, random):
     count = DIRECTIONS if robot.joints == 7 else DIRECTIONS // 2
     found = map_capability(robot, np.array([middle]), count, asked)
     frame = cell_frame(robot)
-    point = frame.points(np.array(middle[0]), frame.place_of(np.array(sector)), np.array(middle[1]))
+    point = frame.points(np.array(middle[0]), place_of(frame, np.array(sector)), np.array(middle[1]))
     tries = 40 if make in (free_roll, coupled) else 12
     directions = fibonacci_sphere(count) @ frame.R
     share = np.mean([reached(robot, pointing(point, row), random, tries) for row in directions])
@@ -165,7 +170,7 @@ def test_points_of_three_slides_are_a_box():
     robot, frame = gantry(), cell_frame(gantry())
     rho, z = (grid.ravel() for grid in np.meshgrid(np.linspace(0, frame.reach, 9), np.linspace(*frame.heights, 7)))
     found = map_capability(robot, np.stack([rho, z], axis=1), 1, asked_of(robot, 1))
-    place = frame.place_of(np.arange(frame.sectors))
+    place = place_of(frame, np.arange(frame.sectors))
     points = frame.points(rho[:, None], place[None], z[:, None])
     ends = [tool_by_hand(robot, q)[:3, 3] for q in (robot.lower, robot.upper)]
     low, high = np.minimum(*ends), np.maximum(*ends)
