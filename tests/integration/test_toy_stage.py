@@ -146,7 +146,7 @@ def test_its_results_are_written_and_read(with_toy):
     page = (with_toy.folder / "reports/er3_600/toy.html").read_text(encoding="utf-8")
     assert "All lengths" in page
     assert "The arm is 1.00 m long." in page
-    assert "What this verdict did not examine" in page
+    assert "What was checked" in page
     assert "collisions with the tray" not in page, "it looks for none"
 
 

@@ -233,7 +233,7 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
     import_module(STAGES[stage].messages)
     assert verdict.status == "no_reference"
     assert len(verdict.finding.demonstrations) == len(content[listed])
-    assert "nothing else is given to be judged" in say_all(verdict.findings)
+    assert "nothing else to judge" in say_all(verdict.findings)
 
 
 def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
