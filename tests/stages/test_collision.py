@@ -250,9 +250,9 @@ def test_shapes_in_error_are_an_error_of_the_shapes(tmp_path):
     study = with_a_base_too_large(tmp_path)
     verdict = compute(study, "arm").summary.verdict
     assert (verdict.status, verdict.finding.code) == ("fail", "collision.shapes_overlap")
-    assert "an error of the shapes, not of the arm" in say(verdict.finding)
+    assert "Shapes in error: " in say(verdict.finding)
     write_teach_page(study, "arm", tmp_path, tmp_path / "teach.html")
-    assert "Collisions not examined" in (tmp_path / "teach.html").read_text(encoding="utf-8")
+    assert "Not checked, as the shapes overlap" in (tmp_path / "teach.html").read_text(encoding="utf-8")
     robot, program = study.robot("arm"), read_program("data/programs/weld_seam.src")
     check = check_program(program, robot, CheckOptions(start=np.radians(HOME)))
     assert check.level == "caution"
