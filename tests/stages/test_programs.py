@@ -151,7 +151,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     nowhere = replace(summary, programs=(replace(program, findings=told),))
     (fault,) = faults(replace(stored["er3a_c60"].results, summary=nowhere))
     assert not re.search(r"[;.:。；] *[:：]", fault.what), fault.what
-    assert re.search("[Ll]ower this line("[Ll]ower the speed of this line to "#39;|')s speed to ", html)
+    assert re.search("[Ll]ower this line.{1,6}s speed to ", html)
     assert (tmp_path / "programs.rrd").stat().st_size > 100_000
 
 
