@@ -177,7 +177,7 @@ def test_a_link_into_a_fold_opens_it(browser, small_study):
     ("page", "name", "words"),
     [
         ("trajectory", "line_wrist_near", ["wrist singularity", "762 deg/s; limit 360 deg/s", "Slow down from"]),
-        ("trajectory", "line_limits", ["link 2 and link 4 overlap", "lower limit", "end it with the tool at"]),
+        ("trajectory", "line_limits", ["link 2 and link 4 overlap", "lower limit", "instead"]),
         ("programs", "singular_line", ["J4 and J6 in line", "upper limit 180 deg", "Keep J4 within 180 deg"]),
         ("programs", "collision_with_table", ["link 6 and table", "move the target away"]),
     ],
