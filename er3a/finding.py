@@ -74,6 +74,8 @@ class Finding:
     basis: Basis = "documented"
 
     def __post_init__(self) -> None:
+        if taken := {"code", "params", "level", "where", "basis", "but"} & self.params.keys():
+            raise TypeError(f"no parameter of a finding can be called {min(taken)}: it could not be read")
         object.__setattr__(self, "params", ReadOnly({name: _revived(value) for name, value in self.params.items()}))
 
     def __hash__(self) -> int:

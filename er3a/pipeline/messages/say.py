@@ -16,8 +16,8 @@ Numbers are formatted as the English text says, and a finding in a field is said
 by ``", "``, ``"; "`` or ``" "``, whichever stands as their format. Catalogues hold translations by key, so that a
 changed English wording loses none. Where a sentence needs more than that, a function makes it::
 
-    @say.register
-    def _(found: FreeSpace) -> str:
+    @says("free_space")
+    def _(found: Finding) -> str:
         return say_as(found, percent=100 * found.free_ratio)
 
 Views and the command line import the modules whose findings they show.
