@@ -334,26 +334,16 @@ def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, other
 
 def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusions.Conclusion | None:
     """What the best hypothesis amounts to; None if it explains neither all nor most."""
-    before, after, unit = best.residual_before, best.residual_after, best.unit
-    if best.explains:
-        return fact(
-            "named",
-            faults=best.faults,
-            residual_before=before,
-            residual_after=after,
-            unit=unit,
-            alternatives=alternatives,
-        )
-    if best.residual_after < MOSTLY * best.residual_before:
-        return fact(
-            "mostly",
-            faults=best.faults,
-            residual_before=before,
-            residual_after=after,
-            unit=unit,
-            alternatives=alternatives,
-        )
-    return None
+    if not best.explains and best.residual_after >= MOSTLY * best.residual_before:
+        return None
+    return fact(
+        "named" if best.explains else "mostly",
+        faults=best.faults,
+        residual_before=best.residual_before,
+        residual_after=best.residual_after,
+        unit=best.unit,
+        alternatives=alternatives,
+    )
 
 
 def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> conclusions.Conclusion:

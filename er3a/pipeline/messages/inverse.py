@@ -52,7 +52,8 @@ TEXTS = texts(
         "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
         "branches_leave_limits": "solutions outside the limits: {count}",
         "branches_collide": "solutions that collide: {count}",
-        "inverse.solved": "Targets solved within limits, free of collisions: {solved} of {targets}.",
+        "inverse.solved#scene": "Targets solved within limits, free of collisions: {solved} of {targets}.",
+        "inverse.solved#itself": "Targets solved within limits, free of self-collision: {solved} of {targets}.",
         "inverse.unsolved": "No solution: {none_for}.",
         "inverse.singular": "At a singularity, so only joint moves lead there: {names:, }.",
         "reach_missing": "{gap_mm:.4g} mm out of reach",
@@ -75,7 +76,8 @@ TEXTS = texts(
 
 @says("inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
 def _(found: Finding) -> str:
-    solved = sentence("inverse.solved", solved=found.solved, targets=found.targets) if found.targets else ""
+    key = f"inverse.solved#{'scene' if found.collisions else 'itself'}"
+    solved = sentence(key, solved=found.solved, targets=found.targets) if found.targets else ""
     unsolved = sentence("inverse.unsolved", none_for=_none_for(found.unsolved)) if found.unsolved else ""
     singular = sentence("inverse.singular", names=found.singular) if found.singular else ""
     expected = demonstrated(found.demonstrations, found.targets)

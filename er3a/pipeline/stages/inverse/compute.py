@@ -485,51 +485,23 @@ def _verdict(
         )
     if unmet := unmet_expectations(targets, "reached"):
         return Verdict("fail", unmet)
-    shown = demonstrations(targets, "reached")
     asked = [target for target in targets if target.expect in (None, "reached")]
     unsolved = tuple(
         fact("unsolved_target", name=target.name, obstacle=target.obstacle) for target in asked if target.obstacle
     )
     singular = tuple(each.name for each in asked if any(is_one(it, "at_singularity") for it in each.advice))
-    count, solved = len(asked), len(asked) - len(unsolved)
-    if not unsolved:
-        return Verdict(
-            pass_of(asked),
-            fact(
-                "inverse.all_solved",
-                targets=count,
-                solved=solved,
-                unsolved=unsolved,
-                collisions=collisions,
-                demonstrations=shown,
-                singular=singular,
-            ),
-        )
-    if not solved:
-        return Verdict(
-            "fail",
-            fact(
-                "inverse.none_solved",
-                targets=count,
-                solved=solved,
-                unsolved=unsolved,
-                collisions=collisions,
-                demonstrations=shown,
-                singular=(),
-            ),
-        )
-    return Verdict(
-        "caution",
-        fact(
-            "inverse.some_unsolved",
-            targets=count,
-            solved=solved,
-            unsolved=unsolved,
-            collisions=collisions,
-            demonstrations=shown,
-            singular=singular,
-        ),
+    solved = len(asked) - len(unsolved)
+    code = "inverse.some_unsolved" if solved else "inverse.none_solved"
+    found = fact(
+        code if unsolved else "inverse.all_solved",
+        targets=len(asked),
+        solved=solved,
+        unsolved=unsolved,
+        collisions=collisions,
+        demonstrations=demonstrations(targets, "reached"),
+        singular=singular if solved else (),
     )
+    return Verdict(pass_of(asked) if not unsolved else "caution" if solved else "fail", found)
 
 
 def _figures(
