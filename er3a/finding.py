@@ -1,8 +1,8 @@
-"""What was found, as data: a code with parameters, where, how grave, and on what it rests.
+"""What was found, as data: a code with parameters, and on what it rests.
 
 A finding is no sentence: texts stand in ``er3a.pipeline.messages``, one for each code, and are filled in with the
 parameters. A number with a unit is a :class:`Amount`, so that one code serves joints that turn and joints that slide.
-Code decides by code, level and parameters, never by a text.
+What lists findings adds their places and levels. Code decides by code, basis and parameters, never by a text.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import numpy as np
 
 from er3a.by_value import KINDS, Coded, ReadOnly, crude_hash
 
-Level = Literal["pass", "note", "caution", "fail"]
 Basis = Literal["documented", "assumed"]
 
 
@@ -34,26 +33,6 @@ class Amount:
 
 
 @dataclass(frozen=True)
-class Where:
-    """Where something was found, as far as that says something.
-
-    Attributes
-    ----------
-    item : a path, a target, a program or an object, by its name
-    t_s : time along it
-    line : of a program, from 1
-    joint : from 1
-    pair : two bodies, as ``link_2/table``
-    """
-
-    item: str = ""
-    t_s: float | None = None
-    line: int | None = None
-    joint: int | None = None
-    pair: str = ""
-
-
-@dataclass(frozen=True)
 class Finding:
     """Something that was found.
 
@@ -62,19 +41,15 @@ class Finding:
     code : what; its text stands under it
     params : by name, what the text says of it: amounts, words, numbers, other findings, and tuples of these. They
         can be read as attributes
-    level : how grave it is for the question that was asked
-    where : the place
     basis : ``assumed`` where it rests on a value that no document gives
     """
 
     code: str
     params: Mapping[str, Any] = field(default_factory=dict)
-    level: Level = "note"
-    where: Where = Where()
     basis: Basis = "documented"
 
     def __post_init__(self) -> None:
-        if taken := {"code", "params", "level", "where", "basis", "but"} & self.params.keys():
+        if taken := {"code", "params", "basis", "but"} & self.params.keys():
             raise TypeError(f"no parameter of a finding can be called {min(taken)}: it could not be read")
         object.__setattr__(self, "params", ReadOnly({name: _revived(value) for name, value in self.params.items()}))
 
@@ -128,18 +103,15 @@ def plain(value: Any) -> Any:
 
     Parameters
     ----------
-    value : dataclasses, mappings, sequences, arrays and numpy's numbers, however deep; of a finding what is not usual
+    value : dataclasses, mappings, sequences, arrays and numpy's numbers, however deep
 
     Returns
     -------
     value : dicts, lists and plain values; a NaN stays
     """
     if isinstance(value, Finding):
-        usual, found = Finding(value.code), {"code": value.code, "params": plain(value.params)}
-        for name in ("level", "where", "basis"):
-            if (own := getattr(value, name)) != getattr(usual, name):
-                found[name] = plain(own)
-        return found
+        found = {"code": value.code, "params": plain(value.params)}
+        return found | ({"basis": value.basis} if value.basis == "assumed" else {})
     if is_dataclass(value) and not isinstance(value, type):
         return {part.name: plain(getattr(value, part.name)) for part in fields(value)}
     if isinstance(value, Mapping):
@@ -162,8 +134,7 @@ def _revived(value: Any) -> Any:
     if (kind := KINDS.get(value.get("code", ""))) is not None:
         return kind(**{name: _revived(part) for name, part in value.items()})
     if "code" in value:
-        where = Where(**value.get("where", {}))
-        return Finding(**(value | {"where": where}))
+        return Finding(**value)
     return {name: _revived(part) for name, part in value.items()}
 
 

@@ -29,7 +29,6 @@ Check = Literal[
 ]
 GAPS: Mapping[str, Check] = {
     "not_run": "reach",
-    "unsettled": "table",
     "limits_assumed": "limits",
     "not_followed": "reach",
     "points_missed": "reach",
@@ -55,7 +54,6 @@ GAPS: Mapping[str, Check] = {
     "flange_frame": "camera",
     "base_frame": "camera",
     "intrinsics": "camera",
-    "no_calibration": "camera",
     "program_rest": "program_lines",
     "program_findings": "program_lines",
     "program_lines": "program_lines",
