@@ -317,8 +317,7 @@ def test_the_command_tells_positions_held_back(tmp_path):
     alone = found["held_back"]["table_mean_mm"]
     assert alone > found["held_back"]["mean_mm"]
     assert f"as in a robot file, held back: 20 positions, {alone:.4g} mm off" in text
-    table, model = found["left_out"]["mean_mm"], found["beyond"]["left_out"]["mean_mm"]
-    assert f"it errs by {table:.3g} mm on average, with all terms by {model:.3g} mm." in text
+    assert f"the robot file alone errs at poses left out by {found['left_out']['mean_mm']:.4g} mm" in text
     assert text.index("mine_model.json: written; the whole model: er3a.load_calibration") < text.index("mine.yaml: wri")
     written = json.loads((tmp_path / "mine_model.json").read_text(encoding="utf-8"))
     assert written | {"output": None} == found
