@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import gettext
 import io
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
@@ -282,3 +283,18 @@ def _load(file: Path) -> gettext.NullTranslations:
         write_mo(compiled, read_po(source))
     compiled.seek(0)
     return gettext.GNUTranslations(compiled)
+
+
+def first_sentence(text: str) -> tuple[str, str]:
+    """A text up to the end of its first sentence, and the rest.
+
+    Parameters
+    ----------
+    text : in English or Chinese
+
+    Returns
+    -------
+    first, rest : the rest is empty for a single sentence
+    """
+    end = re.search(r"\.(?= )|。", text)
+    return (text[: end.end()], text[end.end() :].strip()) if end else (text, "")
