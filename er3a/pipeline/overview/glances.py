@@ -103,4 +103,4 @@ def _(results: VisionResults) -> Glance:
 
 
 def _caught(count: int) -> str:
-    return tr("faulty ones caught: {count}", count=count) if count else ""
+    return tr("{count} caught", count=count) if count else ""
