@@ -46,7 +46,9 @@ def _(results: ValidationResults) -> Glance:
     value = f"{counts.passed}/{counts.total}" if counts.total else "–"
     if summary.verdict.status == "fail":
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
-    return value, tr("sources disagree") if summary.conflicts else tr("{count} unconfirmed", count=open_) if open_ else ""
+    return value, tr("sources disagree") if summary.conflicts else tr(
+        "{count} unconfirmed", count=open_
+    ) if open_ else ""
 
 
 @glance.register

@@ -133,9 +133,7 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
     ]
     use, said = _use(table, heads.get("validation"), failed, instead)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
-    asked = [
-        cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)
-    ]
+    asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
     return Entry(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
 
 
@@ -214,11 +212,15 @@ def _steps(chosen: Entry, stored: Results) -> list[tuple[str, str]]:
         return [(tr("Validate the table."), address)]
     finding, evidence = results.summary.verdict.finding, results.summary.evidence
     steps = []
-    open_ = [each.entry for each in evidence.entries if each.status in ("open", "weak", "consistent")] if evidence else []
+    open_ = (
+        [each.entry for each in evidence.entries if each.status in ("open", "weak", "consistent")] if evidence else []
+    )
     unsettled = [*open_, *getattr(finding, "unbounded", ())] if isinstance(finding, LeftOpen) else open_
     if any(name.startswith("direction") for name in unsettled):
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#entries"))
-    left = [each for each in dict.fromkeys(unsettled) if each.rstrip("0123456789") in ("a", "alpha", "d", "beta", "offset")]
+    left = [
+        each for each in dict.fromkeys(unsettled) if each.rstrip("0123456789") in ("a", "alpha", "d", "beta", "offset")
+    ]
     if left:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
         steps.append((tr("Read one pose: it settles {names}.", names=named), f"{address}#table-described"))

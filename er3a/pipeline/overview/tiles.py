@@ -120,7 +120,7 @@ def _from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, pl
     bottom, top = (1000 * corner for corner in placing.tray.corners)
     corners = np.array([[bottom[0], bottom[1]], [top[0], bottom[1]], [top[0], top[1]], [bottom[0], top[1]]])
     parts.append(Markup('<polygon class="tray" points="{}"/>').format(_seen(corners)))
-    parts.append(_word(np.array([top[0], (bottom + top)[1] / 2]) + [letters, 0], letters, tr("tray"), "tray"))
+    parts.append(_word(np.array([top[0] + letters, (bottom + top)[1] / 2]), letters, tr("tray"), "tray"))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(0.06 * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))

@@ -8,8 +8,8 @@ from typing import Literal
 from urllib.parse import urlencode
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.language import first_sentence, tr
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.viewing.answer import Fix, Part, Row
 
 Weight = Literal["plain", "caution", "fail"]
@@ -169,6 +169,5 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
         if fault.instead and fault.to_do:
-            motion, address = fault.instead
-            return Fix(f"{fault.name}: {first_sentence(fault.to_do)[0]}", address)
+            return Fix(f"{fault.name}: {first_sentence(fault.to_do)[0]}", fault.instead[1])
     return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -115,7 +115,9 @@ def _arm(arm: SeenArm, thick: float) -> Markup:
     joints = Markup("").join(
         Markup('<circle cx="{:.0f}" cy="{:.0f}" r="{:.0f}"/>').format(x, -z, 0.22 * thick) for x, z in arm.points_mm
     )
-    drawn = Markup('<polyline class="edge" points="{0}" stroke-width="{1:.0f}"/><polyline points="{0}" stroke-width="{2:.0f}"/>')
+    drawn = Markup(
+        '<polyline class="edge" points="{0}" stroke-width="{1:.0f}"/><polyline points="{0}" stroke-width="{2:.0f}"/>'
+    )
     return Markup('<g class="bones {}">{}{}</g>').format(arm.kind, drawn.format(line, thick, 0.78 * thick), joints)
 
 
@@ -137,6 +139,7 @@ def _scale(low: Reals, wide: float, letters: float) -> Markup:
     """A bar of a round length, in the lower corner."""
     length = max((each for each in SCALES_MM if each < wide / 3), default=SCALES_MM[0])
     x, y = low[0] + letters, -low[1] - letters
-    return Markup(
-        '<g class="scale"><path d="M{0:.0f} {1:.0f}h{2}"/><text x="{0:.0f}" y="{3:.0f}" font-size="{4:.0f}">{5}</text></g>'
-    ).format(x, y, length, y - 0.5 * letters, 0.8 * letters, escape(tr("{length} mm", length=length)))
+    bar = Markup('<path d="M{:.0f} {:.0f}h{}"/>').format(x, y, length)
+    text = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>')
+    said = text.format(x, y - 0.5 * letters, 0.8 * letters, tr("{length} mm", length=length))
+    return Markup('<g class="scale">{}{}</g>').format(bar, said)

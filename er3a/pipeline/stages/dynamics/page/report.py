@@ -165,11 +165,17 @@ def _answer(summary: model.DynamicsSummary) -> Answer:
         if limited
         else tr("Motor limits are unknown.")
     )
-    keys = [(with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))]
+    keys = [
+        (with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))
+    ]
     rows = [_row(motor, worst.peak) for motor in summary.motors]
-    return Answer(tr("J{joint} needs most: {torque}.", joint=worst.joint, torque=most), rest, "", keys, (
-        Group(tr("Greatest torque on the paths"), rows),
-    ))
+    return Answer(
+        tr("J{joint} needs most: {torque}.", joint=worst.joint, torque=most),
+        rest,
+        "",
+        keys,
+        (Group(tr("Greatest torque on the paths"), rows),),
+    )
 
 
 def _mark(motor: model.MotorNeed) -> Mark:
@@ -185,7 +191,9 @@ def _row(motor: model.MotorNeed, most: float) -> Row:
     limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
     full = motor.peak_limit or most or 1.0
     note = joined([size, limit or tr("holding {value}", value=with_unit(number(motor.holding, 3), motor.unit))], ", ")
-    return Row(_mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")])
+    return Row(
+        _mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")]
+    )
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

@@ -197,7 +197,9 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     if summary.round_trips:
         keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
     failed = Group(tr("No solution to take"), [_row(each) for each in shown if each.outcome != "reached"])
-    return Answer(headline, rest, "", keys, (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met])))
+    return Answer(
+        headline, rest, "", keys, (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met]))
+    )
 
 
 def _row(target: model.TargetResult) -> Row:

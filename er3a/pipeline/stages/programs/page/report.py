@@ -91,7 +91,9 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     headline, rest = may_run(len(sound), len(known) - caught, caught, tr("programs"))
     clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    fix = next((Fix(f"{each.name}: {first_sentence(each.to_do)[0]}", f"#{each.name}") for each in wrong if each.to_do), None)
+    fix = next(
+        (Fix(f"{each.name}: {first_sentence(each.to_do)[0]}", f"#{each.name}") for each in wrong if each.to_do), None
+    )
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix)
 

@@ -318,11 +318,20 @@ def _answer(summary: model.ValidationSummary, instead: str | None, has_entries: 
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
     status = [each.status for each in evidence.entries if each.value is not None] if evidence else []
-    bad, unsure = status.count("contradicted"), sum(each not in SETTLED for each in status) - status.count("contradicted")
+    bad, unsure = (
+        status.count("contradicted"),
+        sum(each not in SETTLED for each in status) - status.count("contradicted"),
+    )
     headline, rest = _headline(summary, bad, unsure)
     passed = tr("{passed} of {total}", passed=counts.passed, total=counts.total)
     keys = [(passed, tr("checks pass"))] if counts.total else []
-    keys += [(str(bad), tr("entries contradicted"))] if bad else [(str(unsure), tr("entries unconfirmed"))] if status else []
+    keys += (
+        [(str(bad), tr("entries contradicted"))]
+        if bad
+        else [(str(unsure), tr("entries unconfirmed"))]
+        if status
+        else []
+    )
     if instead:
         fix = Fix(tr("use the table of {robot}.", robot=instead), "#table-to-use")
     elif isinstance(found, model.LeftOpen) and found.next_measurement:
@@ -340,7 +349,7 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
     if status == "fail":
         another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
         return another, tr("{count} entries are contradicted.", count=bad) if bad else ""
-    if status == "conflict" or summary.conflicts:
+    if summary.conflicts:
         return tr("Sources disagree."), tr("Measure before you rely on it.")
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")

@@ -167,7 +167,9 @@ def _answer(summary: model.VisionSummary) -> Answer:
     groups = [Group(tr("Objects"), shown)]
     if found and (found.suspects or found.warnings):
         texts = [say(each) for each in (*found.suspects, *found.warnings)]
-        groups.append(Group(tr("Doubts"), [Row("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)]))
+        groups.append(
+            Group(tr("Doubts"), [Row("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)])
+        )
     return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
 
 

@@ -70,11 +70,18 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: b
     far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
     holes = summary.enclosed_voids
     litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
-    rest = tr("One hole, {size}.", size=litres) if len(holes) == 1 else tr("{count} holes, {size}.", count=len(holes), size=litres)
+    rest = (
+        tr("One hole, {size}.", size=litres)
+        if len(holes) == 1
+        else tr("{count} holes, {size}.", count=len(holes), size=litres)
+    )
     heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
     keys = [
         (with_unit(tr("{low} to {high}", low=heights[0], high=heights[1]), "mm"), tr("height along axis 1")),
-        (with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"), tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2))),
+        (
+            with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
+            tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
+        ),
     ]
     groups = (
         Group(tr("Holes and pockets"), [_void_as_row(n, void) for n, void in enumerate(summary.voids, start=1)]),
@@ -100,7 +107,9 @@ def _tray_as_rows(placing: Placing | None) -> list[Row]:
     for k, tried in enumerate(placing.tried):
         blocked = sum(map(len, placing.hindered(tried).values()))
         note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
-        rows.append(Row("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement"))
+        rows.append(
+            Row("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement")
+        )
     return rows
 
 
