@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Finding, is_one
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.numbers import at_least, at_most
@@ -206,39 +206,6 @@ def run_again_text(summary: Summary) -> str:
     """What to do before a motion is run beside the tray, or with a tool."""
     bare = any(each.reason == "tool" for each in summary.assumed)
     return joined([sentence("box.run_again"), sentence("box.no_tool") if bare else ""], " ")
-
-
-def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
-    """The void that the verdict tells of: its bounds, centre and what it means; then where it lies, its cause and a
-    larger open pocket. Empty where voids were not judged. ``confirmed``: whether independent documents settle the
-    joints' limits."""
-    finding = summary.verdict.finding
-    if is_one(finding, "workspace.no_void"):
-        return say(finding), ""
-    normal = is_one(finding, "workspace.void_at_shoulder")
-    if not isinstance(summary, model.WorkspaceSummary) or not (normal or isinstance(finding, model.VoidUnexpected)):
-        return "", ""
-    voids, judged = summary.enclosed_voids, judged_void(summary)
-    means = sentence("void.normal" if normal else "void.not_normal")
-    lead = joined([sentence("void.at", **_void_parts(judged)), means], " ")
-    limits = _limits(judged.cause)
-    pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
-    texts = [
-        sentence("void.within", **_void_parts(judged)),
-        _cause(judged.cause),
-        sentence("void.rests", limits=limits) if limits and not confirmed else "",
-        sentence("void.larger") if normal else "",
-        sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else "",
-        sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else "",
-    ]
-    return lead, joined(texts, " ")
-
-
-def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
-    """The enclosed void that the verdict tells of."""
-    voids = summary.enclosed_voids
-    unexpected = (void for void in voids if not void.holds_shoulder)
-    return next(unexpected, voids[0])
 
 
 def _limits(cause: VoidCause) -> str:

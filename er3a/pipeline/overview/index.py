@@ -36,7 +36,7 @@ Results = Mapping[str, Stored[Any]]
 
 
 @dataclass(frozen=True)
-class Cell:
+class StageCell:
     """A stage of a robot: its verdict, its number, and what is to be known of that in few words."""
 
     stage: str
@@ -46,7 +46,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Entry:
+class RobotRow:
     """A robot on the index.
 
     Attributes
@@ -63,7 +63,7 @@ class Entry:
     table: str
     use: str
     decision: str
-    cells: Sequence[Cell | None]
+    cells: Sequence[StageCell | None]
     instead: str | None
     outdated: str
 
@@ -107,7 +107,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     write_junit(verdicts, folder / "junit.xml")
 
 
-def _by_text(entries: Sequence[Entry]) -> dict[str, list[str]]:
+def _by_text(entries: Sequence[RobotRow]) -> dict[str, list[str]]:
     """Of which robots what has changed since they were computed."""
     found: dict[str, list[str]] = {}
     for entry in entries:
@@ -122,7 +122,7 @@ def _computed(study: Study, name: str, folder: Path) -> Results:
     }
 
 
-def _entry(study: Study, name: str, stored: Results, instead: str | None, outdated: str) -> Entry:
+def _entry(study: Study, name: str, stored: Results, instead: str | None, outdated: str) -> RobotRow:
     """What the index shows of a robot; ``instead``: the robot whose table is to be used in place of its own."""
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
     table = heads["validation"].status if "validation" in heads else "not_examined"
@@ -134,7 +134,7 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
     use, said = _use(table, heads.get("validation"), failed, instead)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
     asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
-    return Entry(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
+    return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str], instead: str | None) -> tuple[str, str]:
@@ -148,24 +148,29 @@ def _use(table: str, head: Head | None, failed: Sequence[str], instead: str | No
         return "use", tr("confirmed")
     if table == "not_examined":
         return "measure", tr("not examined yet")
-    conflict = getattr(head.finding, "contradiction", None) if head else None
-    if table in ("conflict", "no_reference", "not_computed") or conflict:
+    finding = head.finding if head else None
+    if table != "caution" or not isinstance(finding, LeftOpen) or finding.contradiction or not _some_settled(finding):
         return "measure", tr("don't rely on it yet")
     return "plan", tr("plan only")
 
 
-def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> Cell:
+def _some_settled(finding: LeftOpen) -> bool:
+    """Whether independent documents settle any length or twist."""
+    return any(part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry")
+
+
+def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
     """A stage's number; of a table that evidence contradicts it counts for nothing."""
     if stage not in heads:
-        return Cell(stage, "not_computed", "–", tr("not computed yet"))
+        return StageCell(stage, "not_computed", "–", tr("not computed yet"))
     head = heads[stage]
     if head.status == "not_computed":
-        return Cell(stage, "not_computed", "–", tr("not computed"))
+        return StageCell(stage, "not_computed", "–", tr("not computed"))
     value, note = glance(stored[stage].results)
-    return Cell(stage, "no_verdict" if head.no_verdict else head.status, value, "" if head.no_verdict else note)
+    return StageCell(stage, "no_verdict" if head.no_verdict else head.status, value, "" if head.no_verdict else note)
 
 
-def _picture(study: Study, entries: Sequence[Entry], stored: Mapping[str, Results]) -> str:
+def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
     """The first arm that may be relied on over the first that may not, or the first two, with what they reach."""
     wrong = [entry for entry in entries if entry.use == "never"][:1]
     right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
@@ -173,7 +178,7 @@ def _picture(study: Study, entries: Sequence[Entry], stored: Mapping[str, Result
     return side_view(drawn)
 
 
-def _seen(study: Study, entry: Entry, stored: Results, *, first: bool) -> SeenArm:
+def _seen(study: Study, entry: RobotRow, stored: Results, *, first: bool) -> SeenArm:
     kind: Kind = "wrong" if entry.use == "never" else "right" if first else "other"
     found = stored["workspace"].results if "workspace" in stored else None
     if not isinstance(found, WorkspaceResults):
@@ -183,7 +188,7 @@ def _seen(study: Study, entry: Entry, stored: Results, *, first: bool) -> SeenAr
     return seen_arm(study.robot(entry.name), entry.title, tr("reaches {far}", far=far), kind, lines)
 
 
-def _keys(chosen: Entry, entries: Sequence[Entry], stored: Mapping[str, Results]) -> list[tuple[str, str, str]]:
+def _keys(chosen: RobotRow, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[tuple[str, str, str]]:
     """Reach, volume and checks of the arm that may be relied on; beside each that of the first that may not."""
     wrong = next((entry for entry in entries if entry.use == "never"), None)
     own = dict(_figures(stored[chosen.name]))
@@ -204,7 +209,7 @@ def _figures(stored: Results) -> list[tuple[str, str]]:
     return shown
 
 
-def _steps(chosen: Entry, stored: Results) -> list[tuple[str, str]]:
+def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     """What to confirm before the real arm moves, each with the page that says how."""
     results = stored["validation"].results if "validation" in stored else None
     address = f"{chosen.name}/validation.html"
@@ -230,7 +235,7 @@ def _steps(chosen: Entry, stored: Results) -> list[tuple[str, str]]:
     return steps
 
 
-def _tiles(study: Study, entries: Sequence[Entry], stored: Mapping[str, Results]) -> list[Any]:
+def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[Any]:
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
     doubtful = [entry.name for entry in entries if entry.use == "never"] or [entries[0].name]
     instead = next((entry.instead for entry in entries if entry.name == doubtful[0]), None)

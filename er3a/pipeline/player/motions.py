@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import first_sentence, tr
 from er3a.pipeline.messages.say import joined
-from er3a.pipeline.viewing.answer import Fix, Part, Row
+from er3a.pipeline.viewing.answer import Fix, ListRow, Part
 
 Weight = Literal["plain", "caution", "fail"]
 
@@ -137,7 +137,7 @@ def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
 
 
-def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length: float, note: str = "") -> Row:
+def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length: float, note: str = "") -> ListRow:
     """A path or program that may not be run as it is, as a row of the list at the picture's side.
 
     Parameters
@@ -148,7 +148,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
     note : in few words why; its verdict if empty
     """
     seen = fault.moments[0].seen_s
-    return Row(
+    return ListRow(
         "fail" if fault.status == "fail" else "caution",
         fault.name,
         note or fault.verdict,

@@ -34,7 +34,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Row:
+class ListRow:
     """One path, program, target, object or entry: its mark, its name, and what is to be known of it in few words.
 
     Attributes
@@ -59,7 +59,7 @@ class Group:
     """Rows under one title; ``count`` is what the title says of how many there are."""
 
     title: str
-    rows: Sequence[Row]
+    rows: Sequence[ListRow]
 
     @property
     def count(self) -> int:

@@ -91,7 +91,6 @@ FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's hea
     "not_computed": N_("table unchecked"),
 }
 
-WHOLE, LED = 300, 260  # characters of a verdict that is shown in one, and those before which a longer one breaks
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
     "csv": N_("CSV"),
@@ -436,7 +435,6 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         "tr": tr,
         "own": language.own_title,
         "sentence": whole_sentence,
-        "led": led,
         "first_sentence": language.first_sentence,
         "linked": linked,
         "breakable": breakable,
@@ -532,27 +530,6 @@ def closed_up(html: str) -> str:
     html : text within ``<code>`` keeps its brackets
     """
     return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
-
-
-def led(text: str) -> tuple[str, str]:
-    """A verdict's text in two parts, of which a page shows the first large.
-
-    Parameters
-    ----------
-    text : of one or more sentences
-
-    Returns
-    -------
-    first, rest : up to the end of a sentence, or else of a clause; the rest is empty for a short text
-    """
-    ends = [[found.end() for found in re.finditer(end, text[:LED])] for end in (r"\.(?= )|。", r";(?= )|；")]
-    cut = next((found[-1] for found in ends if found), 0)
-    if len(text) <= WHOLE or not cut:
-        return text, ""
-    first, rest = text[:cut], text[cut:].strip()
-    if first[-1] in ".。":
-        return first, rest
-    return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:

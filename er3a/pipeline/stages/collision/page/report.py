@@ -23,7 +23,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Row
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, REFERENCE, VERDICTS
@@ -162,11 +162,11 @@ def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest]) -
     return Answer(headline, rest, "", keys, groups)
 
 
-def _row(found: model.Closest) -> Row:
+def _row(found: model.Closest) -> ListRow:
     """A path or chosen solution: how near it comes, and to what."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     play = None if found.t_s is None else (found.name, found.t_s)
-    return Row("fail" if found.clearance_mm < 0 else "pass", found.name, note, "" if play else "#clearance", play)
+    return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, "" if play else "#clearance", play)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[str]]:

@@ -18,7 +18,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import motions
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Mark, Part, Row
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
@@ -185,13 +185,13 @@ def _mark(motor: model.MotorNeed) -> Mark:
     return "pass" if motor.peak <= motor.peak_limit else "fail"
 
 
-def _row(motor: model.MotorNeed, most: float) -> Row:
+def _row(motor: model.MotorNeed, most: float) -> ListRow:
     """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
     size = with_unit(number(motor.peak, 3), motor.unit)
     limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
     full = motor.peak_limit or most or 1.0
     note = joined([size, limit or tr("holding {value}", value=with_unit(number(motor.holding, 3), motor.unit))], ", ")
-    return Row(
+    return ListRow(
         _mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")]
     )
 

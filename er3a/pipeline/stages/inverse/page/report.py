@@ -30,7 +30,7 @@ from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Row
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
@@ -202,14 +202,14 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     )
 
 
-def _row(target: model.TargetResult) -> Row:
+def _row(target: model.TargetResult) -> ListRow:
     """A target: how many branches serve it, or what it came to."""
     note = (
         tr("{within} of {all} solutions within limits", within=target.within_limits, all=target.solutions)
         if target.outcome == "reached"
         else outcome_word(target.outcome)
     )
-    return Row("pass" if target.outcome == "reached" else "fail", target.name, note, f"#{target.name}")
+    return ListRow("pass" if target.outcome == "reached" else "fail", target.name, note, f"#{target.name}")
 
 
 def _section(

@@ -35,7 +35,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, Row, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import condition_of
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
@@ -83,7 +83,7 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
         for each in wrong
     }
     sound = [
-        Row("pass", name, _passed(each), f"#{name}", (name, 0.0), shares[name])
+        ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), shares[name])
         for name, each in known.items()
         if name not in bad
     ]

@@ -45,7 +45,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Row, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import condition_of, program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.page import packed_text, render_stage
@@ -156,10 +156,10 @@ def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault]) ->
     )
 
 
-def _sound_row(path: model.PathSummary, length: float) -> Row:
+def _sound_row(path: model.PathSummary, length: float) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return Row("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
 
 
 def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_tra
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
-from er3a.pipeline.messages.pages import GRADE_NAMES, decision
+from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS, counted_checks, unconfirmed
@@ -36,10 +36,8 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
-    Head,
     Picture,
     alternative_table,
-    head_of,
     render_stage,
     text_address,
 )
@@ -275,7 +273,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         _answer(summary, instead, evidence is not None),
         arms=_both_arms(robot, study.robot(instead) if instead else other_robot(robot, summary.evidence)),
         at_side=evidence is not None,
-        head=_head(stored, instead),
+        head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
         table_evidence=evidence,
@@ -365,21 +363,6 @@ def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, mo
     summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
     parts = summary.evidence.parts if summary.evidence else ()
     return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ())), summary.evidence
-
-
-def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
-    """The head; the verdict on a table that evidence contradicts begins with what to do.
-
-    Parameters
-    ----------
-    instead : a model of the same arm that evidence does not contradict
-    """
-    head = head_of(stored)
-    if head.status != "fail":
-        return head
-    same_arm = isinstance(head.finding, model.DefinedOtherwise)
-    text = joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " ")
-    return replace(head, text=text, links={instead: f"../{instead}/validation.html"} if instead else {})
 
 
 def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.KeyPoses) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Row
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -168,17 +168,17 @@ def _answer(summary: model.VisionSummary) -> Answer:
     if found and (found.suspects or found.warnings):
         texts = [say(each) for each in (*found.suspects, *found.warnings)]
         groups.append(
-            Group(tr("Doubts"), [Row("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)])
+            Group(tr("Doubts"), [ListRow("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)])
         )
     return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
 
 
-def _row(each: model.ObjectResult) -> Row:
+def _row(each: model.ObjectResult) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
-        return Row("fail", each.name, say(each.refusal) if each.refusal else tr("none"), "#objects")
+        return ListRow("fail", each.name, say(each.refusal) if each.refusal else tr("none"), "#objects")
     note = tr("{percent} % success", percent=fixed(100 * each.grasp.probability, 1))
-    return Row("pass", each.name, note, "#objects", (each.name, 0.0))
+    return ListRow("pass", each.name, note, "#objects", (each.name, 0.0))
 
 
 def _image_folder(study: Study, name: str) -> Path:

@@ -21,7 +21,7 @@ from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
 from er3a.pipeline.stages.workspace.page.tray import Placing, millimetres, placing_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, Row
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
 
@@ -91,24 +91,24 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: b
     return Answer(tr("Reaches {far}.", far=far), rest if holes else tr("No holes."), point, keys, groups)
 
 
-def _void_as_row(number_: int, void: model.VoidSummary) -> Row:
+def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: what kind, how large."""
     kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    return Row("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#void-{number_}")
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#void-{number_}")
 
 
-def _tray_as_rows(placing: Placing | None) -> list[Row]:
+def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     """The best place of the tray on each surface; one row that says so where there is none."""
     if placing is None:
-        return [Row("caution", tr("nowhere"), tr("no place fits"), "#placement")]
+        return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
     rows = []
     for k, tried in enumerate(placing.tried):
         blocked = sum(map(len, placing.hindered(tried).values()))
         note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
         rows.append(
-            Row("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement")
+            ListRow("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement")
         )
     return rows
 
