@@ -815,21 +815,28 @@ def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
     return min(beyond or given, key=lambda rate: rate.value, default=None)
 
 
+ZONES: dict[str, tuple[instructions.ZoneKind, str, float]] = {
+    "C_PTP": ("share", "$APO.CPTP", 100.0),
+    "C_DIS": ("distance", "$APO.CDIS", 1000.0),
+    "C_ORI": ("angle", "$APO.CORI", math.degrees(1.0)),
+    "C_VEL": ("velocity", "$APO.CVEL", 100.0),
+}
+"""Words after a motion: the kind of their zone, the variable of its size, and how many of its units make one of SI."""
+
+
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:
     given = [word for word in words if word.startswith("C_")]
     if not given:
         return instructions.FINE
-    word, size = given[0], None
-    distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
-    joint_word = word == "C_PTP" or (word == "C_SPL" and kind == "joint")
     if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
         return instructions.Zone("named", 0.0, " ".join(given))
-    if joint_word and (share := syntax.number(joint_zone)) is not None:
-        return instructions.Zone("share", share / 100, word)
-    if distance is not None and (word in ("C_DIS", "C_SPL") or (joint_word and joint_zone == "#CDIS")):
-        return instructions.Zone("distance", distance / 1000, word)
-    if word == "C_ORI" and (size := syntax.number(memory.read("$APO.CORI"))) is not None:
-        return instructions.Zone("angle", math.radians(size), word)
-    if word == "C_VEL" and (size := syntax.number(memory.read("$APO.CVEL"))) is not None:
-        return instructions.Zone("velocity", size / 100, word)
+    word = given[0]
+    meant: tuple[str, ...] = (word,)
+    if word == "C_SPL":
+        meant = ("C_PTP", "C_DIS") if kind == "joint" else ("C_DIS",)
+    if "C_PTP" in meant and memory.read("$APO.CPTP") == "#CDIS":
+        meant = ("C_DIS",)
+    for form, variable, scale in (ZONES[each] for each in meant if each in ZONES):
+        if (size := syntax.number(memory.read(variable))) is not None:
+            return instructions.Zone(form, size / scale, word)
     return instructions.Zone("named", 0.0, word)
