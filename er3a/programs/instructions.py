@@ -21,7 +21,7 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one is 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -319,21 +319,7 @@ class Listing:
     @property
     def motions(self) -> tuple[ArmMotion, ...]:
         """The motions alone."""
-        return tuple(motions_of(self.instructions))
-
-
-def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
-    """The motions among instructions.
-
-    Parameters
-    ----------
-    instructions : in any order
-
-    Returns
-    -------
-    motions : in the same order, made as they are asked for
-    """
-    return (each for each in instructions if isinstance(each, ArmMotion))
+        return tuple(each for each in self.instructions if isinstance(each, ArmMotion))
 
 
 Convention = Literal["kuka", "efort", "ur", "abb"]

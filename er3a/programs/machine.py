@@ -355,7 +355,7 @@ class Machine:
         value = memory.value(each.value)
         key = memory.key(each.target)
         name = key or memory.shown(each.target)
-        if self.dialect.is_signal(name):  # which others may set too
+        if name.startswith(self.dialect.signals):  # which others may set too
             return instructions.Output(name, syntax.shown(value))
         if key is None and memory.outside:  # where the controller stops: nothing is set
             return None
@@ -364,7 +364,7 @@ class Machine:
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default
             memory.assign(each.target, value, each.local or (not declared and _is_new(memory, name)))
-        if self.dialect.named(name):
+        if name in self.dialect.frames:
             of = memory.key(each.value) if isinstance(each.value, syntax.Element) else None
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
         return None if self.dialect.is_followed(name) else instructions.Unknown(each.text, False, shapes=True)

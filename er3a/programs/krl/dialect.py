@@ -11,7 +11,16 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, SIZES, Dialect, ProgramMemory, evaluated, root, unresolved
+from er3a.programs.evaluation import (
+    IN_DEGREES,
+    SIZES,
+    Dialect,
+    ProgramMemory,
+    evaluated,
+    external_axes,
+    root,
+    unresolved,
+)
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -128,12 +137,12 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         return instructions.UnresolvedTarget(text, "position_unknown")
     offset = instructions.pose_of([each or 0.0 for each in given], "kuka")
     if in_tool:
-        return instructions.PoseTarget(seen @ offset, external=_external(found))
+        return instructions.PoseTarget(seen @ offset, external=external_axes(found, EXTERNAL_KEYS))
     # Along and about the axes of the base, with the tool point as the centre of the turn.
     pose = seen.copy()
     pose[:3, 3] += offset[:3, 3]
     pose[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return instructions.PoseTarget(pose, external=_external(found))
+    return instructions.PoseTarget(pose, external=external_axes(found, EXTERNAL_KEYS))
 
 
 def _position(memory: ProgramMemory, value: syntax.Value, text: str) -> syntax.Record | instructions.UnresolvedTarget:
@@ -170,13 +179,6 @@ def _components(
     return found
 
 
-def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
-    """Axes beside the arm that are given and not 0; NaN where the value is not known."""
-    given = ((key, value.get(key)) for key in EXTERNAL_KEYS)
-    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given)
-    return tuple((key, each) for key, each in known if each)
-
-
 def _joints(memory: ProgramMemory, value: syntax.Record, text: str, missing: Reals) -> instructions.Target:
     degrees = _components(value, AXIS_KEYS, text)
     if isinstance(degrees, instructions.UnresolvedTarget):
@@ -185,7 +187,7 @@ def _joints(memory: ProgramMemory, value: syntax.Record, text: str, missing: Rea
     if any(degrees[count:]):
         return instructions.UnresolvedTarget(text, "too_many_joints")
     joints = [missing[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
-    return instructions.JointTarget(np.array(joints), _external(value))
+    return instructions.JointTarget(np.array(joints), external_axes(value, EXTERNAL_KEYS))
 
 
 def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str) -> instructions.Target:
@@ -202,7 +204,7 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     configuration = tuple((key, each) for key, each in given_words if each is not None)
     pose = instructions.pose_of([each or 0.0 for each in given], "kuka")
     branch = _branch(syntax.number(value.get("T")), memory.cell.joints)
-    return instructions.PoseTarget(pose, configuration, external=_external(value), branch=branch)
+    return instructions.PoseTarget(pose, configuration, external=external_axes(value, EXTERNAL_KEYS), branch=branch)
 
 
 def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
@@ -528,20 +530,12 @@ class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     frames = ("$TOOL", "$BASE")
+    signals = ("$OUT[", "$ANOUT[")
     whole_division = True
     modal = frozenset((*MODAL, "PDAT_ACT", "LDAT_ACT", "FDAT_ACT"))
     harmless = HARMLESS | EVALUATED | OF_SETTINGS
     reading = READING | EVALUATED | OF_SETTINGS | {"BAS"}
     by_reference = True
-
-    def is_signal(self, name: str) -> bool:
-        """Whether a name is an output of the controller.
-
-        Returns
-        -------
-        signal : True for ``$OUT[n]`` and ``$ANOUT[n]``
-        """
-        return name.startswith(("$OUT[", "$ANOUT["))
 
     def reads_back(self, name: str) -> bool:
         """Whether reading a variable gives the value that the program set last.
@@ -561,15 +555,6 @@ class KrlDialect(Dialect):
             (``HARMLESS_VARIABLES``)
         """
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
-
-    def named(self, name: str) -> bool:
-        """Whether a variable keeps the name of what it is set to.
-
-        Returns
-        -------
-        named : True for ``$TOOL`` and ``$BASE``, so that a frame that only the controller knows is called by its name
-        """
-        return name in ("$TOOL", "$BASE")
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a type holds: coordinates are REAL, however they are written, and a frame has no posture.
