@@ -138,7 +138,7 @@ class Judge:
 
     def __call__(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         """A motion from joints (n,), None where they are not known."""
-        key = pickle.dumps(motion), _rounded(before)
+        key = pickle.dumps(motion), _rounded(before)  # equal bytes are equal motions; hashes of arrays are crude
         if key not in self.motions:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
