@@ -36,7 +36,6 @@ from er3a.pipeline.stages.programs.page.played import (
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
-from er3a.pipeline.viewing.conditions import condition_of
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -68,7 +67,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
-        condition="" if stored.rests_on.get("validation") == "fail" else condition_of(stored.validated),
     )
 
 

@@ -46,7 +46,7 @@ from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
-from er3a.pipeline.viewing.conditions import condition_of, program_head
+from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
@@ -96,7 +96,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         drawn_paths=count,
         player=player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
-        condition=condition_of(stored.validated),
     )
 
 

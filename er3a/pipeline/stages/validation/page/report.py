@@ -19,7 +19,6 @@ from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
 from er3a.pipeline.messages.pages import GRADE_NAMES
-from er3a.pipeline.messages.references import CHECK_KINDS
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS, counted_checks, unconfirmed
 from er3a.pipeline.results import Stored, read_stage
@@ -65,16 +64,6 @@ def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     found: dict[str, list[Judged]] = {}
     for check in checks:
         found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    return found
-
-
-def by_kind(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
-    """Checks by their set and what they rest on, as the page names both."""
-    found: dict[str, list[Judged]] = {}
-    for title, own in by_set(checks).items():
-        for check in own:
-            kind = check.kind and word("check_kind", CHECK_KINDS, check.kind)
-            found.setdefault(tr("{set}, {kind}", set=title, kind=kind) if kind else title, []).append(check)
     return found
 
 
@@ -286,10 +275,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
-        passed={
-            title: [check_row(check) for check in own if check.status == "pass"]
-            for title, own in by_kind(judged).items()
-        },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
