@@ -191,7 +191,7 @@ def test_unreachable_target_is_a_verdict(computed):
     assert (target.outcome, target.expect) == ("unreachable", "unreachable")
     assert (verdict.status, verdict.finding.code) == ("caution", "inverse.all_solved")  # no scene was looked at
     assert ("too_far", ("unreachable",)) in {(one.name, one.found) for one in verdict.finding.demonstrations}
-    assert "expected to fail, and did: " in say(verdict.finding)
+    assert "Expected to fail, and did: " in say(verdict.finding)
     arm, near = load_robot(name), target.neighbours
     assert np.linalg.norm(np.array(near.shifted_to_mm) - target.xyz_mm) == pytest.approx(near.least_shift_mm)
     assert [advice.code for advice in target.advice][1] == "shift_tool"

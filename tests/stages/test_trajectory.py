@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.pairs import LinkAndSolid
 from er3a.errors import InputError
 from er3a.files.path_file import ProgramPath
 from er3a.files.program_file import load_programs
@@ -149,7 +148,7 @@ def test_collisions_are_told_with_what_is_met_and_where(results, name):
     (meeting,) = path.collisions
     assert 0 < meeting.t0_s < meeting.t1_s <= path.duration_s
     assert 0 < meeting.s0_m < meeting.s1_m
-    assert "post" in {pair.solid for pair in meeting.cause.pairs if isinstance(pair, LinkAndSolid)}
+    assert "post" in {each.pair.params.get("solid") for each in meeting.cause.touches}
     assert meeting.cause.depth_mm == -path.clearance.least_mm
     assert f"post overlap from t = {meeting.t0_s:.4g} s, up to" in path_text(path)
     rows = results[name].clearance.take(results[name].clearance.path == "line_collides")
@@ -226,7 +225,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
     out = paths["line_out"]
-    assert "; out of reach from t = " in advice(out)
+    assert "out of reach from t = " in advice(out)
     assert ("End it at t = " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import SIDES
-from er3a.pipeline.messages.say import bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete
 
@@ -89,26 +89,26 @@ TEXTS = texts(
         "reach": "{extreme} distance of the {point} from axis {axis}",
         "motion_of_joint": "+J{joint}: {motion}",
         "entry_of_table": "{own_entry}, measured",
-        "read_limit": "read J{joint}'s {side} in the controller's settings; don't drive there",
+        "read_limit": "read J{joint}'s {side:side} in the controller's settings; don't drive there",
         "time_joint": ("in a cleared cell, time a long turn of J{joint} at full speed, to ±{half_width_deg_s:g} deg/s"),
-        "measure": "measure {own_entry} to ±{half_width:g}: {what}",
+        "measure_entry": "measure {own_entry} to ±{half_width:g}: {what}",
         "look_at_motion": (
             "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from {start} and see, from behind "
             "the arm, whether {motion}"
         ),
         "not_the_robot_described": (
-            "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
-            "{tried} corrections of one or two entries leave {left_mm:.1f} mm or more."
+            "This is not the robot that these describe: {against:own; }. Positions differ by up to "
+            "{mismatch_mm:.0f} mm; {tried} corrections of one or two entries leave {left_mm:.1f} mm or more."
         ),
         "inconsistent_with_own_text": (
-            "The table contradicts its own text ({against:; }), which asks for {entry} = {needed:g} {unit}, not "
-            "{given:g}. The text is no evidence about a real robot."
-        ),
-        "inconsistent_unexplained": (
-            "The table contradicts its own text ({own_documents}); no single sign or quarter turn mends it."
+            "The table contradicts its own text ({against:own; })[, which asks for {entry} = {needed:g} "
+            "{unit:unit}, not {given:g}. The text is no evidence about a real robot.][; no single sign or quarter "
+            "turn mends it.{entry:!}]"
         ),
     }
 )
+WORDS["side"] = SIDES
+FORMATS["unit"] = tr
 
 
 def quoted(subject: subjects.Subject) -> str:
@@ -186,27 +186,9 @@ def _(found: Finding) -> str:
     return say_as(found, start=start, motion=motion)
 
 
-@says("read_limit")
-def _(found: Finding) -> str:
-    return say_as(found, side=word("side", SIDES, found.side))
-
-
 @says("measure_angle", "measure_length")
 def _(found: Finding) -> str:
     mm = is_one(found, "measure_length")
     half_width = Amount(found.half_width_mm, "mm") if mm else Amount(found.half_width_deg, "deg")
     what = tr(MEASURED[found.column], joint=found.joint, before=found.joint - 1)
-    return sentence("measure", own_entry=found.entry, half_width=half_width, what=what)
-
-
-@says("inconsistent_with_own_text")
-def _(found: Finding) -> str:
-    against = tuple(map(own_title, found.against))
-    if found.entry is None:
-        return sentence("inconsistent_unexplained", own_documents=joined(against))
-    return say_as(found, against=against, unit=tr(found.unit))
-
-
-@says("not_the_robot_described")
-def _(found: Finding) -> str:
-    return say_as(found, against=tuple(map(own_title, found.against)))
+    return sentence("measure_entry", own_entry=found.entry, half_width=half_width, what=what)

@@ -28,7 +28,7 @@ from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.pages import decision, next_step
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence
-from er3a.pipeline.messages.scope import assumed_text, never_text, say_reserved
+from er3a.pipeline.messages.scope import assumed_text, never_text, not_checked, say_reserved
 from er3a.pipeline.messages.scope import missed_text as missed_of_check
 from er3a.pipeline.messages.validation import (
     condition,
@@ -46,7 +46,6 @@ from er3a.pipeline.results import (
     THE_CODE,
     THE_SETTINGS,
     AbsentResults,
-    NotChecked,
     Provenance,
     Stored,
     is_computed,
@@ -400,7 +399,7 @@ def _entry(
         "bodies": [each.name for each in scene.solids] if (scene := study.scene(name, "trajectory")) else [],
         "runs": runs,
         "grasped": grasped,
-        "grasps_missed": say(NotChecked(missed))
+        "grasps_missed": not_checked(missed)
         if "vision" in computed and (missed := computed["vision"].results.summary.verdict.missed)
         else "",
         "condition": condition(_parts(heads), getattr(finding, "unbounded", ()), rates := _assumed_rates(heads)),
@@ -606,7 +605,7 @@ def _run(stage: str, robot: str, results: TrajectoryResults | ProgramsResults) -
         "faults": faults,
         "missed": [missed_of_check(each) for each in scope.checked if not each.complete],
         "assumed": [assumed_text(each) for each in scope.assumed],
-        "no_pass": say(NotChecked(missed)) if (missed := results.summary.verdict.missed) else "",
+        "no_pass": not_checked(results.summary.verdict.missed),
     }
 
 
