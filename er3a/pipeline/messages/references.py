@@ -79,16 +79,19 @@ MEASURED = {
 TEXTS = texts(
     {
         "axis_direction": "axis {joint} direction",
-        "drawing_extent": "{extreme} {axis} in the side view",
+        "drawing_extent": "{extreme:extreme} {axis} in the side view",
         "joint_speed": "J{joint} speed",
-        "orientation_at_pose": "orientation of the flange",
+        "orientation_at_pose": "orientation of the flange[ {coordinate:coordinate}]",
+        "point_at_pose": "{point:point}[ {coordinate:coordinate}]",
+        "segment_inclination": "{segment:segment}",
+        "joint_limit": "J{joint} {side:side}",
         "pose_excess": "outside the limits by",
-        "axis_position": "axis {joint}",
+        "axis_position": "axis {joint}[ {coordinate:coordinate}]",
         "at_pose": "{own_pose}: {seen}",
-        "drawing_corner": "corner ({q2_deg:g}, {q3_deg:g})",
-        "reach": "{extreme} distance of the {point} from axis {axis}",
+        "drawing_corner": "corner ({q2_deg:g}, {q3_deg:g})[ {coordinate:coordinate}]",
+        "reach": "{extreme:extreme} distance of the {point:point} from axis {axis}",
         "motion_of_joint": "+J{joint}: {motion}",
-        "entry_of_table": "{own_entry}, measured",
+        "entry_of_table": "{column}{joint}, measured",
         "read_limit": "read J{joint}'s {side:side} in the controller's settings; don't drive there",
         "time_joint": ("in a cleared cell, time a long turn of J{joint} at full speed, to ±{half_width_deg_s:g} deg/s"),
         "measure_entry": "measure {own_entry} to ±{half_width:g}: {what}",
@@ -107,46 +110,29 @@ TEXTS = texts(
         ),
     }
 )
-WORDS["side"] = SIDES
+WORDS.update(
+    {
+        "side": SIDES,
+        "coordinate": LABELS,
+        "extreme": EXTREMES,
+        "point": POINT_WORDS,
+        "segment": SEGMENT_WORDS,
+    }
+)
 FORMATS["unit"] = tr
+
+
+AtPose = subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess
 
 
 def quoted(subject: subjects.Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
-    if isinstance(subject, subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess):
-        return bracketed(_seen(subject), own_title(subject.pose))
-    return say(subject)
+    return bracketed(say_as(subject), own_title(subject.pose)) if isinstance(subject, AtPose) else say(subject)
 
 
 @say.register
-def _(found: subjects.AxisPosition | subjects.DrawingCorner) -> str:
-    return _with_coordinate(say_as(found), found.coordinate)
-
-
-@say.register
-def _(found: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
-    return sentence("at_pose", own_pose=own_title(found.pose), seen=_seen(found))
-
-
-@say.register
-def _(found: subjects.SegmentInclination) -> str:
-    return word(found.code, SEGMENT_WORDS, found.segment)
-
-
-@say.register
-def _(found: subjects.DrawingExtent) -> str:
-    return say_as(found, extreme=word("extreme", EXTREMES, found.extreme))
-
-
-@say.register
-def _(found: subjects.JointLimit) -> str:
-    return f"J{found.joint} {word('side', SIDES, found.side)}"
-
-
-@say.register
-def _(found: subjects.Reach) -> str:
-    point = word("point", POINT_WORDS, found.point)
-    return say_as(found, extreme=word("extreme", EXTREMES, found.extreme), point=point)
+def _(found: AtPose) -> str:
+    return sentence("at_pose", own_pose=own_title(found.pose), seen=say_as(found))
 
 
 @say.register
@@ -154,28 +140,11 @@ def _(found: subjects.MotionOfJoint) -> str:
     return say_as(found, motion=motion_seen(found))
 
 
-@say.register
-def _(found: subjects.EntryOfTable) -> str:
-    return say_as(found, own_entry=f"{found.column}{found.joint}")
-
-
 def motion_seen(found: subjects.MotionOfJoint) -> str:
     """What is seen, as a clause."""
     manner, *others = found.seen.split("_")
     way = word("way", WAYS, others[-1] if others else manner)
     return tr(MANNERS[manner if others else "moves"], point=word("point", POINT_WORDS, found.point), way=way)
-
-
-def _seen(subject: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
-    if isinstance(subject, subjects.OrientationAtPose):
-        return _with_coordinate(say_as(subject), subject.coordinate)
-    if isinstance(subject, subjects.PoseExcess):
-        return say_as(subject)
-    return _with_coordinate(word("point", POINT_WORDS, subject.point), subject.coordinate)
-
-
-def _with_coordinate(vector: str, coordinate: str | None) -> str:
-    return f"{vector} {LABELS.get(coordinate, coordinate)}" if coordinate else vector
 
 
 @says("look_at_motion")
