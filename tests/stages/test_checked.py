@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts, solids_met
-from er3a.collision.pairs import ASSUMED_MARGIN, link_label
+from er3a.collision.pairs import ASSUMED_MARGIN, label_of, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
 from er3a.files.path_file import load_paths
@@ -828,7 +828,7 @@ def test_an_allowed_pair_that_overlaps_in_few_poses_hides_something():
     arm = arm.replace(envelopes=(*shapes, far))
     q = quasi_random_points(arm.lower, arm.upper, 1024)
     plain = Bodies(arm, None)
-    (pair,) = [k for k, each in enumerate(plain.pairs) if each.label == "link_1/link_2"]
+    (pair,) = [k for k, each in enumerate(plain.pairs) if label_of(each) == "link_1/link_2"]
     assert not plain.overlaps(q)[:, pair].any()
     allowing = arm.replace(pair_rules=(PairRule("link_1", "link_2", "allow", "a test"),))
     found = {each.reason: each.names for each in open_points(allowing, None)}

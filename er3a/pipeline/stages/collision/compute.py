@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -213,7 +213,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
 def _free_space(
     space: free_space.JointSpace,
     places: model.PlacesSummary,
-    at_targets: Sequence[model.Closest],
+    at_targets: list[model.Closest],
     blocked: tuple[Finding, ...],
     colliding: tuple[Finding, ...],
 ) -> Finding:
