@@ -19,12 +19,11 @@ from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.pages import caveat
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
-from er3a.pipeline.messages.vision import say
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
-from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.page.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
@@ -100,7 +99,7 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
 
 
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():
-    torque = NoLimits(5, 2, 14.0, 4.1, "N m", "arc", (), 0, None)
+    torque = fact("dynamics.no_limits", torques=(), missing_links=(), doubts=0, grade=None)
     assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
     assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
 

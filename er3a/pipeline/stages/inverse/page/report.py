@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 
 from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
-from er3a.kinematics.solutions import ClosedForm
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
@@ -231,7 +230,7 @@ def _section(
         reason=say(target.reason),
         advice=own if contradicted else listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
-        method="" if isinstance(target.method, ClosedForm) else say(target.method),
+        method="" if is_one(target.method, "closed_form") else say(target.method),
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),

@@ -12,14 +12,14 @@ from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS
+from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres, void_text
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
-from er3a.pipeline.stages.workspace.page.tray import Placing, millimetres, placing_of
+from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
@@ -45,6 +45,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
+        void_texts=void_text(summary, confirmed=stored.rests_on.get("validation") == "pass"),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         wide=100 * summary.proof.width,
         **context,
