@@ -9,7 +9,7 @@ from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_, as_text, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import FORMATS, joined, say_as, says, sentence, texts
+from er3a.pipeline.messages.say import FORMATS, joined, say, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
 from er3a.workspace.causes import SingleChange, VoidCause
