@@ -311,7 +311,9 @@ def _pass(event: model.Singularity) -> PlayedEvent:
 
 
 def _few_words(part: model.Stretch[Any]) -> str:
-    """Why a stretch is an event."""
+    """Why a stretch is an event; of bodies that overlap the first two."""
+    if is_one(part.cause, "bodies_overlap"):
+        return say(part.cause.touches[0].pair)
     return rate_needed(part.cause) if is_one(part.cause, *RATES) else cause_text(part)
 
 

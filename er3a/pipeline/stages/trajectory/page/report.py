@@ -148,7 +148,7 @@ def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault]) ->
     if not wrong:
         return ""
     return tr(
-        "Of the others {mended} can be repaired, {early} end early, {rest} can't run.",
+        "{mended} can be repaired, {early} end early, {rest} can't run.",
         mended=mended,
         early=early,
         rest=len(wrong) - mended - early,
