@@ -31,6 +31,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.study import load_study
 from er3a.pipeline.teach import panel as teach_page
 from er3a.pipeline.teach.panel import WORDS
+from er3a.pipeline.viewing.still import FLAT
 from er3a.planning.commands import CommandSource
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
@@ -358,13 +359,15 @@ def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypat
     monkeypatch.setattr(teach_page, "WORDS", marked(WORDS))
     panel = Panel(browser, folder / "marked.html").open()
     assumed = browser.find_element(By.CLASS_NAME, "assumed-shapes").text
+    scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
     for degrees in ([0] * 6, [30, -20, 15, 40, 60, 10], [167, 90, 105, 180, 2, 360]):
         panel.move(*degrees)
         time.sleep(0.3)
         texts = panel.texts()
         assert len(texts) > 100
         words = [text for text in texts if re.search("[A-Za-z]{3}", text) and not re.match("(<p>)?⟦", text)]
-        assert {text for text in words if text not in assumed} <= {*BRANCHES.values(), *FOUNDATIONS.values()}
+        known = {*BRANCHES.values(), *FOUNDATIONS.values(), FLAT, *(solid.name for solid in scene.solids)}
+        assert {text for text in words if text not in assumed} <= known
 
 
 @pytest.fixture

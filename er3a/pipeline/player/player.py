@@ -6,6 +6,7 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
+from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, tr
@@ -84,6 +86,7 @@ def player(
     scene: Scene | None = None,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
+    opening: tuple[str, float] | None = None,
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
@@ -91,12 +94,14 @@ def player(
     ----------
     beside : further arms, which move at the same time; their bases say where they stand
     signs : what is written below the base of each arm, the first included; nothing if empty
+    opening : the motion and the moment (s) that are shown at first; None for the worst contact, or else the first start
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
     data = _data(robot, shown, scene, words, beside, signs)
+    data["opening"] = dict(zip(("name", "t"), opening or _worst(robot, shown)))
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
@@ -158,17 +163,23 @@ def _data(
         "scene": drawn_scene(scene.solids if scene else (), robot),
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "motions": [_motion(motion, most) for motion in motions],
-        "opening": _opening(motions),
         "joints": _joints(robot),
         "words": words,
     }
 
 
-def _opening(motions: Sequence[PlayedMotion]) -> dict[str, Any]:
-    """The moment that the player opens at: the first contact that a motion fails by, or else the first one's start."""
-    contacts = ((m.name, e.t) for m in motions for e in m.events if e.status == "fail" and e.bodies)
-    name, t = next(contacts, (motions[0].name, float(motions[0].t[0])))
-    return {"name": name, "t": t}
+def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
+    """The first contact that a motion fails by, rather with what is around the arm than with itself; or else the first
+    motion's start."""
+    arm = {link_label(link) for link in range(robot.rows + 1)}
+    contacts = [
+        (set(event.bodies) <= arm, motion.name, event.t)
+        for motion in motions
+        for event in motion.events
+        if event.status == "fail" and event.bodies
+    ]
+    _, name, t = min(contacts, key=itemgetter(0), default=(True, motions[0].name, float(motions[0].t[0])))
+    return name, t
 
 
 def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:

@@ -93,18 +93,20 @@ export class Space extends Orbit {
       mesh.matrix.multiplyMatrices(matrix(poses[Math.min(shape.frame, poses.length - 1)]), local);
       mesh.updateMatrixWorld(true);
       const through = shape.pale || pale(mesh);
-      mesh.material = this.material(colours.get(shape.name) ?? (shape.pale ? this.page.grid : shape.colour), through);
+      const own = shape.pale ? this.page.grid : shape.colour;
+      mesh.material = this.material(colours.get(shape.name) ?? own, through, colours.has(shape.name));
       mesh.castShadow = !through;
       mesh.visible = true;
     }
   }
 
-  /** A matt surface of a CSS colour. */
-  material(css, pale = false) {
-    const key = `${css} ${pale}`;
+  /** A matt surface of a CSS colour; one that is marked is seen where it coincides with others. */
+  material(css, pale = false, marked = false) {
+    const key = `${css} ${pale} ${marked}`;
     if (!this.materials.has(key)) {
       const through = pale ? { transparent: true, opacity: PALE, depthWrite: false } : {};
-      this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...through }));
+      const nearer = { polygonOffset: marked, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
+      this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...nearer, ...through }));
     }
     return this.materials.get(key);
   }
