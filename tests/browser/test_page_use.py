@@ -20,6 +20,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
     sortable = page in STAGE_PAGES and browser.execute_script(HAS_TABLES)
     if sortable:  # the page's script adds its controls when it gets to run
         WebDriverWait(browser, PAUSE).until(lambda shown: shown.find_elements(By.CSS_SELECTOR, ".sort"))
+    WebDriverWait(browser, PAUSE).until(lambda shown: shown.execute_script(DRAWN))
     expected = browser.execute_script(CONTROLS)
     reached = []
     for _ in range(min(len(expected), MAX_TABS)):
@@ -466,6 +467,7 @@ def plain(text: str) -> str:
     return text.replace("\u202f", "").replace("−", "-").translate(superscripts).replace("·10", "e")
 
 
+DRAWN = "return !document.getElementById('three') || performance.getEntriesByType('mark').length > 0"
 PAINTED = """const canvas = document.querySelector("#turning canvas");
 const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
 copy.drawImage(canvas, 0, 0);
