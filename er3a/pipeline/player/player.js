@@ -14,6 +14,7 @@ import { decodeValues, posesOf, valuesAt } from "er3a/values";
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const WORLD = translation(0, 0, 0);
+const SLOW = 60; // ms between two frames: the next ones have fewer pixels
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
@@ -67,6 +68,7 @@ export function goTo(name, time) {
 function play(on) {
   if (on && t >= playedUntil()) t = start();
   playing = on;
+  space.fineness = 1;
   place.toggleAttribute("data-playing", on);
   if (!on) dispatchEvent(new Event("player-rests"));
   part("play").textContent = on ? words.pause : words.play;
@@ -83,6 +85,7 @@ function frame(now) {
   awaited = false;
   if (playing) {
     const until = playedUntil();
+    if (now - last > SLOW) space.fineness = 0.5;
     t += ((now - last) / 1000) * Number(part("speed").value);
     last = now;
     if (t >= until) {

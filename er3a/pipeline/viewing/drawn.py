@@ -29,6 +29,7 @@ from er3a.robots.robot import Robot
 MAX_FACES, MIN_CORNERS = 2000, 12  # of an arm, and of a convex piece
 SCENE_COLOUR = "#c3a97e"
 LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
+SHORTEST_AXIS = 0.06  # half of a joint's axis, in parts of the arm's size: it is to be seen beyond a housing
 ROD, SHORTEST = 0.016, 1e-6  # radius of a link that has no shape, in parts of the arm's size; m
 PLATE_RADIUS, PLATE_HEIGHT = 0.1, 0.008  # of the plate below the arm, in parts of its size
 RING, CAP = (1.03, 0.3), (0.62, 1.03)  # radius and half length of a joint, in radii of the link
@@ -64,7 +65,11 @@ def drawn_arm(robot: Robot) -> dict[str, Any]:
         own += _rest(robot, {shape["frame"] for shape in own}, shapes if name == "checked" else None)
     radii = [_radius(robot, shapes, k) for k in range(robot.rows)]
     middles = link_parts(robot)[1:, ALONG_Z, :3, 3] / 2
-    rows = [{"middle": middle.tolist(), "half": 1.3 * radius} for middle, radius in zip(middles, radii)]
+    size = drawn_size(robot)
+    rows = [
+        {"middle": middle.tolist(), "half": max(1.3 * radius, SHORTEST_AXIS * size)}
+        for middle, radius in zip(middles, radii)
+    ]
     return {"looks": looks, "rows": rows}
 
 

@@ -58,6 +58,7 @@ export class Space extends Orbit {
   strokes = new three.Group();
   camera = new three.PerspectiveCamera();
   materials = new Map();
+  fineness = 1; // less where frames have to come faster
 
   /** Looks at `target` (m), round which there is about `length` to be seen; `draw` has the picture drawn again. */
   constructor(canvas, target, length, draw) {
@@ -145,7 +146,7 @@ export class Space extends Orbit {
     const { renderer, width, height } = this;
     if (!renderer || !width || !height) return;
     const most = Math.sqrt(MAX_PIXELS / (width * height));
-    const ratio = Math.min(devicePixelRatio || 1, Math.max(most, 0.5));
+    const ratio = this.fineness * Math.min(devicePixelRatio || 1, Math.max(most, 0.5));
     if (this.size !== `${width} ${height} ${ratio}`) {
       this.size = `${width} ${height} ${ratio}`;
       renderer.setPixelRatio(ratio);
