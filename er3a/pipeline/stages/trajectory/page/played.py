@@ -46,6 +46,7 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
+SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
 
@@ -307,7 +308,8 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
 
 def _pass(event: model.Singularity) -> PlayedEvent:
     """A singular pose, or a pass by one."""
-    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
+    axes = event.axes or SINGULAR_AXES.get(event.type, ())
+    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution", axes=axes)
 
 
 def _few_words(part: model.Stretch[Any]) -> str:
