@@ -1,4 +1,4 @@
-"""Headless Chromium, without a graphics processor and without the network."""
+"""Headless Chromium, without the network; the processor draws what else a graphics processor would."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from selenium import webdriver
 SWITCHES = (
     "headless",
     "no-sandbox",
-    "disable-gpu",
+    "use-gl=angle",
+    "use-angle=swiftshader",
+    "enable-unsafe-swiftshader",
     "disable-quic",
     "no-first-run",
     "disable-background-networking",

@@ -429,7 +429,7 @@ def bodies_of(robot: Robot, scene: Scene | None) -> Bodies:
     return Bodies(robot, scene)
 
 
-def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
+def clearance(robot: Robot, q: Reals, scene: Scene | None = None) -> Clearance:
     """Smallest distance of the arm from the scene's solids and from itself, at each joint vector.
 
     Parameters
@@ -439,7 +439,7 @@ def clearance(robot: Robot, q: Reals, scene: Scene | None) -> Clearance:
 
     Returns
     -------
-    clearance : distances (N,) in m, negative by the depth of overlap, and the nearest pairs
+    clearance : distances (N,) in m, 0 where bodies touch, negative by the depth of overlap, and the nearest pairs
 
     Raises
     ------

@@ -15,7 +15,7 @@ FOLDERS = "messages", "viewing", "player", "teach", "page", "overview", "article
 FILES = "check", "cli", "dictionary", "program_reports", "run_study", "verdicts", "working_folder"
 VIEWS = frozenset((*FOLDERS, *(f"{name}.py" for name in FILES)))
 """Folders and files of ``pipeline/`` on which no number rests: computing imports none of them (import-linter)."""
-_KINDS = (".py", ".j2", ".css", ".js")
+_KINDS = (".py", ".j2", ".css", ".js", ".mjs")
 
 
 @cache

@@ -20,6 +20,7 @@ def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, pa
     sortable = page in STAGE_PAGES and browser.execute_script(HAS_TABLES)
     if sortable:  # the page's script adds its controls when it gets to run
         WebDriverWait(browser, PAUSE).until(lambda shown: shown.find_elements(By.CSS_SELECTOR, ".sort"))
+    WebDriverWait(browser, PAUSE).until(lambda shown: shown.execute_script(DRAWN))
     expected = browser.execute_script(CONTROLS)
     reached = []
     for _ in range(min(len(expected), MAX_TABS)):
@@ -466,8 +467,11 @@ def plain(text: str) -> str:
     return text.replace("\u202f", "").replace("−", "-").translate(superscripts).replace("·10", "e")
 
 
+DRAWN = "return !document.getElementById('three') || performance.getEntriesByType('mark').length > 0"
 PAINTED = """const canvas = document.querySelector("#turning canvas");
-const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+copy.drawImage(canvas, 0, 0);
+const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
 return data.filter((value, i) => i % 4 === 3 && value > 0).length;"""
 
 
@@ -478,5 +482,12 @@ def test_the_figure_in_space_is_drawn_and_leaves_out_what_it_is_asked_to(browser
     painted = browser.execute_script(PAINTED)
     checks = figure.find_elements(By.CSS_SELECTOR, ".key input")
     assert len(checks) > 1
-    browser.execute_script("arguments[0].click()", checks[0])
+    move = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))"
+    knife = figure.find_element(By.CSS_SELECTOR, ".cut")
+    browser.execute_script(move, knife, 0)
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(PAINTED) > painted)  # whole
+    browser.execute_script(move, knife, 1)
     WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(PAINTED) < painted)
+    emptied = browser.execute_script(PAINTED)
+    browser.execute_script("arguments[0].click()", checks[-1])
+    WebDriverWait(browser, PAUSE).until(lambda _: browser.execute_script(PAINTED) < emptied)

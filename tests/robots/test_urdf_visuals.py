@@ -12,7 +12,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import DRAWN_TRIANGLES, export_urdf, import_urdf
 from er3a.kinematics.forward import frames
-from er3a.pipeline.player.player import drawn_shapes
+from er3a.pipeline.viewing.drawn import drawn_arm
 
 RADIUS, SIZE = 0.05, (0.1, 0.2, 0.3)
 URDF = """<robot name="r"><link name="base"><visual><geometry><mesh filename="lost.stl"/></geometry></visual></link>
@@ -80,12 +80,11 @@ def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_pat
 
 
 def test_pages_get_the_looks_beside_all_shapes_that_are_checked(imported):
-    drawn = drawn_shapes(imported.robot)
-    assert [each["link"] for each in drawn["visuals"]] == [1, 2]
-    (sphere,) = drawn["pieces"]
-    assert sphere["link"] == 1
-    assert np.ptp(sphere["points"], axis=0) == pytest.approx(0.12, abs=0.01)
-    assert drawn_shapes(imported.robot.replace(visuals=()))["visuals"] == []
+    looks = drawn_arm(imported.robot)["looks"]
+    assert [each["frame"] for each in looks["visual"] if each["kind"] == "mesh"] == [1, 2]
+    (sphere,) = (each for each in looks["checked"] if each["kind"] == "capsule" and each["frame"] == 1)
+    assert sphere["radius"] == pytest.approx(0.06)
+    assert "visual" not in drawn_arm(imported.robot.replace(visuals=()))["looks"]
 
 
 @pytest.mark.parametrize("damage", ["faces: AAA", "faces: ////////", "points_mm: AAAA"])

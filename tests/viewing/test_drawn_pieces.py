@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from er3a.pipeline.player.player import MAX_FACES, drawn_shapes, drawn_size
+from er3a.pipeline.viewing.drawn import MAX_FACES, drawn_arm, drawn_size
 from er3a.robots.robot import ConvexPiece
 from testing.arms import gantry, make_arm
 
@@ -18,9 +18,13 @@ def pieces(count: int, corners: int) -> tuple[ConvexPiece, ...]:
     return tuple(ConvexPiece(k % 7, tuple(map(tuple, own.tolist())), 0.0) for k, own in enumerate(points))
 
 
+def meshes(robot, look: str = "checked") -> list[dict]:
+    return [shape for shape in drawn_arm(robot)["looks"].get(look, ()) if shape["kind"] == "mesh"]
+
+
 def test_pieces_are_closed_and_face_outwards():
-    drawn = drawn_shapes(make_arm(hulls=pieces(3, 40)))["pieces"]
-    assert [piece["link"] for piece in drawn] == [0, 1, 2]
+    drawn = meshes(make_arm(hulls=pieces(3, 40)))
+    assert [piece["frame"] for piece in drawn] == [0, 1, 2]
     for piece in drawn:
         points, faces = np.array(piece["points"]), np.array(piece["faces"])
         a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
@@ -30,11 +34,11 @@ def test_pieces_are_closed_and_face_outwards():
 
 
 def test_many_pieces_are_drawn_with_fewer_faces():
-    drawn = drawn_shapes(make_arm(hulls=pieces(70, 64)))["pieces"]
+    drawn = meshes(make_arm(hulls=pieces(70, 64)))
     assert sum(len(piece["faces"]) for piece in drawn) <= 1.05 * MAX_FACES
 
 
 def test_flat_pieces_are_left_out_and_an_arm_without_lengths_has_a_size():
     flat = ConvexPiece(1, ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)), 0.0)
-    assert drawn_shapes(make_arm(hulls=(flat,)))["pieces"] == []
+    assert meshes(make_arm(hulls=(flat,))) == []
     assert drawn_size(gantry()) == 2.5

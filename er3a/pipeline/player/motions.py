@@ -20,7 +20,7 @@ class PlayedEvent:
     """Something to be seen from ``t`` to ``until`` (s); ``status`` (``plain``, ``caution``, ``fail``) colours it.
 
     ``bodies`` (``base``, ``link_3``, names of solids) are red then; ``joints`` (from 1) fail, each with what it would
-    need, in few words, or nothing.
+    need, in few words, or nothing; ``axes`` (rows of the table from 1) of a singular pose are drawn then.
     """
 
     t: float
@@ -29,6 +29,7 @@ class PlayedEvent:
     status: Weight
     bodies: tuple[str, ...] = ()
     joints: tuple[tuple[int, str], ...] = ()
+    axes: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, moved, scaled, subtract } from "er3a/algebra";
+import { add, column, moved, scaled, subtract, translation } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
-import { Orbit } from "er3a/orbit";
-import { alongArm, ARM, eyeOf, Picture } from "er3a/scene";
-import { armLooks, drums, recoloured, sceneSolids } from "er3a/solids";
+import { alongArm, Arm, ARM, Space } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
+const WORLD = translation(0, 0, 0);
+const SLOW = 60; // ms between two frames: the next ones have fewer pixels
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
@@ -23,13 +23,6 @@ const { words, table } = data;
 const part = (name) => place.querySelector(`.${name}`);
 const [canvas, chooser, bar, clock, nowShown] = ["arm", "motion", "time", "clock", "now-shown"].map(part);
 const motions = new Map(data.motions.map((motion) => [motion.name, prepared(motion)]));
-const arms = [data, ...data.beside].map((arm, k) => {
-  const carried = k === 0 ? sceneSolids(data.carried, table.a.length + 1) : [];
-  return { table: arm.table, links: constantLinks(arm.table), looks: armLooks(arm.table, data.size, data.colours, arm, carried) };
-});
-const surroundings = sceneSolids(data.scene);
-const joints = drums(table, data.size);
-const picture = new Picture(canvas);
 const floor = data.floor ?? column(table.base, 3)[2];
 
 let motion = motions.values().next().value;
@@ -38,8 +31,12 @@ let playing = false;
 let last = 0;
 let awaited = false;
 
-const orbit = new Orbit(canvas, data.target, 0.75 * data.width, refresh);
-if (arms.length > 1) orbit.turn(0.7, 0); // arms that stand beside each other along y
+const space = new Space(canvas, data.target, data.length, refresh);
+const arms = [data, ...data.others].map((arm, k) => ({
+  table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
+}));
+const surroundings = space.add(data.scene);
+if (arms.length > 1) space.turn(data.turned, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -71,6 +68,7 @@ export function goTo(name, time) {
 function play(on) {
   if (on && t >= playedUntil()) t = start();
   playing = on;
+  space.fineness = 1;
   place.toggleAttribute("data-playing", on);
   if (!on) dispatchEvent(new Event("player-rests"));
   part("play").textContent = on ? words.pause : words.play;
@@ -87,6 +85,7 @@ function frame(now) {
   awaited = false;
   if (playing) {
     const until = playedUntil();
+    if (now - last > SLOW) space.fineness = 0.5;
     t += ((now - last) / 1000) * Number(part("speed").value);
     last = now;
     if (t >= until) {
@@ -103,56 +102,64 @@ const isNow = ({ t: from, until }) => t >= from - 1e-9 && t <= until + 1e-9;
 
 function draw() {
   const now = motion.events.filter(isNow);
-  const bodies = (grave) => new Set(now.filter(({ status }) => (status === "caution") !== grave).flatMap((event) => event.bodies));
-  const [touching, doubtful] = [bodies(true), bodies(false)];
-  const seen = (solids) => recoloured(recoloured(solids, doubtful, data.colours.caution), touching, data.colours.touching);
-  const shown = arms.flatMap((arm, k) => {
-    const poses = posesOf(arm, valuesAt(motion.times, motion.values[k], t));
-    return arm.looks(part("looks")?.value).map(({ solids, ghost }) => ({ solids: seen(solids), poses, ghost }));
-  });
-  const { page } = orbit;
-  picture.fit();
-  picture.begin(eyeOf(orbit));
-  picture.floor(column(table.base, 3), data.size / 10, floor, page.grid);
-  for (const { solids, poses } of shown) picture.shadow(solids, poses, floor, page.grid);
-  picture.solids([...picture.around(seen(surroundings), shown.flatMap(({ poses }) => poses)), ...shown]);
+  const colours = new Map();
+  for (const grave of [false, true]) {
+    const css = grave ? data.colours.touching : data.colours.caution;
+    for (const event of now) if ((event.status !== "caution") === grave) for (const name of event.bodies) colours.set(name, css);
+  }
+  const touching = new Set([...colours.keys()].filter((name) => colours.get(name) === data.colours.touching));
+  const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
+  const { page } = space;
+  space.begin();
+  space.floor(column(table.base, 3), data.size / 10, floor);
+  arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
+  const hiding = space.hiding(surroundings, poses.flat());
+  space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
-  for (const trail of motion.trails) picture.line(trail, page.ink, 1.5);
+  for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
     const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
-    if (status !== "plain" && way.length > 1) picture.line(way, data.colours[status], 3);
+    if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
   }
+  for (const T of poses) toolFrame(T.at(-1));
+  for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
   const marks = (motion.marks ?? []).filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
-  for (const { from, to } of marks) {
-    const point = String(from) === String(to);
-    picture.line([from, point ? add(to, [0, 0, 1e-3 * data.size]) : to], data.colours.mark, point ? 9 : 3);
+  space.keepClear(poses.flatMap(alongArm), ARM * data.size);
+  space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
+  for (const { from, to, text } of marks) {
+    if (String(from) === String(to)) space.dot(from, page.touching, 5, true);
+    else space.line([from, to], data.colours.mark, 3);
+    space.word(text, scaled(add(from, to), 0.5), touching.size ? page.touching : page.ink);
   }
-  for (const { poses } of shown) toolFrame(poses.at(-1));
-  picture.keepClear(shown.flatMap(({ poses }) => alongArm(poses)), ARM * data.size);
-  picture.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
-  for (const { from, to, text } of marks) picture.word(text, scaled(add(from, to), 0.5), page.ink, page.halo);
   for (const [j, { status }] of failing()) {
-    picture.word(`J${j}`, moved(shown[0].poses[j], joints[j - 1].middle), status === "caution" ? page.doubtful : page.touching, page.halo);
+    space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
-  for (const { text, at } of data.signs) picture.word(text, at, page.ink, page.halo);
-  picture.names(surroundings, page.ink, page.halo, touching, page.touching);
+  for (const { text, at } of data.signs) space.word(text, at);
+  space.names(surroundings, touching);
+  space.end();
+}
+
+/** The axis of row `j`, whose frame is `T`, through the whole picture. */
+function singularAxis(j, T) {
+  const [middle, way] = [moved(T, data.rows[j - 1].middle), scaled(column(T, 2), 0.45 * data.size)];
+  space.line([subtract(middle, way), add(middle, way)], data.colours.caution, 2.5);
+  space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
 
 /** Names where a motion starts and where it ends. */
 function nameEnds(trail) {
-  const { page } = orbit;
   const [first, last] = [trail[0], trail.at(-1)];
   const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
   for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], [last, words.end]]) {
-    picture.line([at, add(at, [0, 0, 1e-3 * data.size])], page.ink, 6);
-    picture.word(text, at, page.ink, page.halo, false);
+    space.dot(at, space.page.ink, 4);
+    space.word(text, at, space.page.ink, false);
   }
 }
 
 function toolFrame(T) {
   const origin = column(T, 3);
-  for (const c of [0, 1, 2]) picture.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 2.5);
+  for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
 }
 
 /** Time bar, clock, events and the cursors of the plots. */
@@ -312,13 +319,14 @@ for (const link of document.querySelectorAll("[data-t]")) {
 addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
+goTo(data.opening.name, data.opening.t);
 choose(decodeURIComponent(location.hash.slice(1)));
 if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));
   dock();
   tell();
   listed();
-} else if (data.opened && location.hash.length < 2) goTo(...data.opened);
+}
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

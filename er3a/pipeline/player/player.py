@@ -6,46 +6,46 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
-import scipy
 from markupsafe import Markup
 
-from er3a.collision.meshes import simplified
-from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import arm_shapes, hull_faces, solid_pieces
-from er3a.geometry.vectors import fibonacci_sphere
-from er3a.numerics.arrays import Integers, Reals
+from er3a.collision.pairs import link_label
+from er3a.collision.scene import Scene
+from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
-from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK, VERDICTS, link_colour
-from er3a.robots.joint_limits import shown, size_of, theta_limits
+from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
+from er3a.pipeline.viewing.page import packed_text
+from er3a.pipeline.viewing.palette import DOUBTFUL, INK, TOUCHING
+from er3a.pipeline.viewing.still import scene_still
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
 TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
-TEACH = _HERE.with_name("teach")
+TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
-MAX_FACES, MIN_CORNERS = 2000, 12  # of an arm, and of a convex piece
-BALL = 24  # corners of each end of a capsule
-SCENE_COLOUR = "#b9a78f"
-COLOURS = {status: VERDICTS[status] for status in ("caution", "fail")}
+COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
+SEEN = 0.64  # of the arm's size: what the picture is filled by
+TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
     *("a", "alpha", "d", "beta", "direction", "offset", "sliding"),
     *("lower", "upper", "continuous", "base"),
 )
-DRAWING = ("algebra", "kinematics", "orbit", "scene", "solids")
-LEVEL = 1e-6  # by which a plane's normal may differ from the vertical to be drawn as the floor
+SPACE = [VIEWING / f"{name}.js" for name in ("orbit", "space", "three")]
+DRAWING = [*SPACE, TEACH / "algebra.js", TEACH / "kinematics.js", _HERE / "values.js"]
 LOOKS = {
     "visual": N_("meshes"),
     "checked": N_("the shapes checked"),
     "both": N_("both"),
 }
-"""What an arm with meshes can be shown by; see ``teach/solids.js``."""
+"""What an arm with meshes can be shown by; see ``viewing/drawn.py``."""
 WORDS = {
     "looks": N_("arm drawn as"),
     "player": N_("Motion playback"),
@@ -83,26 +83,30 @@ def player(
     scene: Scene | None = None,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
-    opened: tuple[str, float] | None = None,
+    opening: tuple[str, float] | None = None,
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
     Parameters
     ----------
-    opened : the motion and the time (s) that it opens at
     beside : further arms, which move at the same time; their bases say where they stand
     signs : what is written below the base of each arm, the first included; nothing if empty
+    opening : the motion and the moment (s) that are shown at first; None for the worst contact, or else the first start
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
+    data = _data(robot, shown, scene, words, beside, signs)
+    known = opening if opening and any(motion.name == opening[0] for motion in shown) else None
+    data["opening"] = dict(zip(("name", "t"), known or _worst(robot, shown)))
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
-            data=_data(robot, shown, scene, words, beside, signs) | {"opened": opened},
+            data=data,
+            still=_still((robot, *beside), next(m for m in shown if m.name == data["opening"]["name"]), data),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -118,11 +122,17 @@ def stretch(motion: str, t0: float, t1: float) -> Markup:
     return Markup('data-play="{}" data-from="{}" data-t="{}"').format(motion, t0, t1)
 
 
-def drawing_head() -> Markup:
-    """What the head of a page holds that has a player or a figure in space: their style sheet and their modules."""
+def drawing_head(modules: Sequence[Path] = DRAWING) -> Markup:
+    """What the head of a page holds that has a player or a figure in space: their style sheet and their modules.
+
+    Parameters
+    ----------
+    modules : ES modules, each of which the page's scripts import as ``er3a/NAME``
+    """
     style = (_HERE / "player.css").read_text(encoding="utf-8")
-    modules = import_map([*(TEACH / f"{name}.js" for name in DRAWING), _HERE / "values.js"])
-    return Markup("<style>{}</style>{}").format(Markup(style), modules)
+    library = packed_text((VIEWING / "vendor/three.mjs").read_text(encoding="utf-8"))
+    three = Markup('<script type="text/plain" id="three">{}</script>').format(library)
+    return Markup("<style>{}</style>{}{}").format(Markup(style), three, import_map(modules))
 
 
 def _data(
@@ -139,20 +149,56 @@ def _data(
     return {
         "table": table_data(robot),
         "size": size,
-        **drawn_shapes(robot),
-        "beside": [{"table": table_data(arm), **drawn_shapes(arm)} for arm in beside],
+        **drawn_arm(robot),
+        "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in beside],
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
-        "width": max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
+        "length": SEEN * max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
-        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK, "touching": VERDICTS["fail"], **COLOURS},
+        "colours": {"mark": INK, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
+        "turned": TURNED,
         "floor": floor_of(scene),
-        "scene": scene_data(scene.solids if scene else ()),
-        "carried": scene_data(scene.carried if scene else ()),
+        "scene": drawn_scene(scene.solids if scene else (), robot),
+        "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "motions": [_motion(motion, most) for motion in motions],
         "joints": _joints(robot),
         "words": words,
     }
+
+
+def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
+    """The first contact that a motion fails by, rather with what is around the arm than with itself; or else the first
+    motion's start."""
+    arm = {link_label(link) for link in range(robot.rows + 1)}
+    contacts = [
+        (set(event.bodies) <= arm, motion.name, event.t)
+        for motion in motions
+        for event in motion.events
+        if event.status == "fail" and event.bodies
+    ]
+    _, name, t = min(contacts, key=itemgetter(0), default=(True, motions[0].name, float(motions[0].t[0])))
+    return name, t
+
+
+def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
+    """The picture at that moment, which the page shows without WebGL."""
+    t = data["opening"]["t"]
+    now = [event for event in motion.events if event.t <= t <= event.until]
+    colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
+    values = (motion.q, *motion.beside)
+    at = [np.array([np.interp(t, motion.t, own) for own in q.T]) for q in values]
+    poses = [poses_at(robot, q) for robot, q in zip(robots, at)]
+    picture = scene_still(data, poses, colours, TURNED if len(robots) > 1 else 0.0)
+    for robot, q in zip(robots, values):
+        picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
+    for mark in motion.marks:
+        if mark.t0 <= t <= mark.t1:
+            picture.dot(np.array(mark.start), "fail", 5.0, rings=True)
+            picture.word(mark.text, np.array(mark.start), "fail")
+    for shape in data["scene"]:
+        if "pale" not in shape:
+            picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")
+    return picture.markup()
 
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
@@ -174,70 +220,6 @@ def table_data(robot: Robot) -> dict[str, Any]:
         "coupling": None if robot.coupling is None else robot.coupling.tolist(),
         "combined": [asdict(limit) for limit in robot.combined],
     }
-
-
-def drawn_size(robot: Robot) -> float:
-    """A length (m) to scale drawings with: of all links, of the tool, and of how far joints slide."""
-    ways = np.ptp(theta_limits(robot), axis=1)[robot.sliding].sum()
-    return size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]) + ways) or 1.0
-
-
-def drawn_shapes(robot: Robot) -> dict[str, list[dict[str, Any]]]:
-    """What an arm's links are drawn by: ``visuals``, how they look, and ``pieces``, the convex pieces and surfaces.
-
-    Beside visuals, the shapes that collisions are measured with are all among the pieces, capsules too.
-    """
-    visuals = [_drawn(each.link, each.points, each.faces) for each in robot.visuals]
-    shapes = [(each.link, np.array(each.points)) for each in robot.hulls]
-    for each in arm_shapes(robot).capsules if visuals else ():
-        ball = each.radius * fibonacci_sphere(BALL)
-        shapes.append((each.link, np.concatenate([ball + each.start, ball + each.end])))
-    corners = max(MIN_CORNERS, MAX_FACES // (2 * len(shapes) or 1))
-    meshes = robot.meshes
-    pieces = [_drawn(each.link, *simplified(each.points, each.faces, MAX_FACES // len(meshes))) for each in meshes]
-    for link, points in shapes:
-        if len(points) > corners:
-            points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
-        try:
-            pieces.append(_drawn(link, points, hull_faces(points)))
-        except scipy.spatial.QhullError:  # flat: nothing to be seen of it but from above
-            continue
-    return {"pieces": pieces, "visuals": visuals}
-
-
-def _drawn(link: int, points: Reals, faces: Integers) -> dict[str, Any]:
-    """A surface of a link, grey with something of its joint's colour."""
-    return {"link": link, "points": np.round(points, 5).tolist(), "faces": faces.tolist(), "colour": link_colour(link)}
-
-
-def floor_of(scene: Scene | None) -> float | None:
-    """The height (m) of the highest level floor of a scene, None where it has none."""
-    solids = scene.solids if scene else ()
-    return max((s.offset for s in solids if isinstance(s, Plane) and s.normal[2] > 1 - LEVEL), default=None)
-
-
-def scene_data(solids: Sequence[Solid]) -> list[dict[str, Any]]:
-    """Solids as the drawing code takes them; planes are left out."""
-    return [_solid(solid) for solid in solids if not isinstance(solid, Plane)]
-
-
-def _solid(solid: Solid) -> dict[str, Any]:
-    """An obstacle as the drawing code takes it; one that it has no shape for as the hulls of its pieces."""
-    common: dict[str, Any] = {"name": solid.name, "colour": SCENE_COLOUR}
-    if isinstance(solid, Box | Cylinder | Sphere):
-        common["T"] = np.asarray(solid.T).tolist()
-    match solid:
-        case Box():
-            return {**common, "kind": "box", "size": np.asarray(solid.size).tolist()}
-        case Cylinder():
-            return {**common, "kind": "cylinder", "radius": solid.radius, "length": solid.length}
-        case Sphere():
-            return {**common, "kind": "sphere", "radius": solid.radius}
-    pieces = solid_pieces(solid)
-    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    faces = np.concatenate([start + hull_faces(piece) for start, piece in zip(starts, pieces)])
-    points = np.concatenate(pieces)
-    return {**common, "kind": "mesh", "T": np.eye(4).tolist(), "points": points.tolist(), "faces": faces.tolist()}
 
 
 def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
@@ -265,7 +247,7 @@ def _shown(motion: PlayedMotion, most: int) -> np.ndarray:
 
 
 def import_map(files: Iterable[Path]) -> Markup:
-    """A page's import map: each ES module as ``er3a/NAME``. It stands before the page's first module.
+    """A page's import map: each ES module as ``er3a/NAME``. It is to precede the page's first module.
 
     The scripts are data addresses, because a page opened from a disk may not import other files.
     """

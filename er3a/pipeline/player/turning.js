@@ -1,75 +1,34 @@
 /**
- * A figure in space: layers of points, lines and surfaces in a box with ticks in mm, painted from the farthest part to
- * the nearest. A reader turns it, chooses the group of layers that is seen, and leaves layers out.
+ * A figure in space: layers of points, lines and surfaces in a box with ticks in mm, among solids. A reader turns it, cuts it
+ * open, chooses the group of layers that is seen, and leaves layers out.
  */
 
-import { add, cross, dot, scaled, subtract, unit } from "er3a/algebra";
-import { Orbit } from "er3a/orbit";
-import { eyeOf, Picture } from "er3a/scene";
+import { add, scaled, subtract } from "er3a/algebra";
+import { Space, surface } from "er3a/space";
+import three from "er3a/three";
 
 const STEPS = 65535; // that the box is divided into
-const LAMP = unit([0.35, -0.55, 0.9]);
-const AMBIENT = 0.6;
-const OPACITY = 0.6; // of surfaces
 const TICKS = 6; // at most, along an edge
-const PIECE = 40; // mm: longer parts of lines are cut, so that they sort well by distance
+const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide };
 
 const place = document.getElementById("turning");
 const data = JSON.parse(document.getElementById("turning-figure").textContent);
-const [canvas, chooser, key] = ["canvas", ".group", ".key"].map((name) => place.querySelector(name));
-const [low, high] = data.box;
+const [canvas, chooser, key, knife] = ["canvas", ".group", ".key", ".cut"].map((name) => place.querySelector(name));
+const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
-const groups = new Map(data.groups.map(({ name, layers }) => [name, layers.map(unpacked)]));
-const picture = new Picture(canvas);
+const middle = scaled(add(low, high), 0.5);
 const left = new Set(); // names of layers that are not shown
 let awaited = false;
 
-const middle = scaled(add(low, high), 0.5);
-const orbit = new Orbit(canvas, middle, 0.55 * Math.hypot(...size), refresh);
+const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
+const plane = new three.Plane(new three.Vector3(0, 1, 0));
+const solids = data.solids.map(({ name, shapes, poses, colour }) => ({ name, colour, poses, parts: space.add(shapes) }));
+const groups = new Map(data.groups.map(({ name, layers }) => [name, layers.map(made)]));
 chooser.value = data.first ?? chooser.value;
-orbit.azimuth = data.azimuth;
+Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-}
-
-function unpacked(layer) {
-  const steps = new Uint16Array(bytes(layer.points).buffer);
-  const points = [];
-  for (let i = 0; i < steps.length; i += 3) points.push([0, 1, 2].map((k) => low[k] + (size[k] * steps[i + k]) / STEPS));
-  const shades = layer.shades ? bytes(layer.shades) : null;
-  const made = { ...layer, points, colourOf: (i) => (shades ? data.palette[shades[i]] : layer.colour || null) };
-  return layer.kind === "surface" ? { ...made, parts: triangles(made) } : { ...made, parts: layer.kind === "line" ? pieces(made) : [] };
-}
-
-function triangles({ points, faces, colour }) {
-  const corners = new Uint32Array(bytes(faces).buffer);
-  const parts = [];
-  for (let i = 0; i < corners.length; i += 3) {
-    const [a, b, c] = [points[corners[i]], points[corners[i + 1]], points[corners[i + 2]]];
-    const normal = cross(subtract(b, a), subtract(c, a));
-    if (dot(normal, normal) === 0) continue;
-    const light = AMBIENT + (1 - AMBIENT) * Math.max(0, dot(unit(normal), LAMP));
-    parts.push({ points: [a, b, c], normal, fill: shaded(colour, light) });
-  }
-  return parts;
-}
-
-function pieces({ points, starts, colourOf, width }) {
-  const parts = [];
-  for (let i = 1; i < points.length; i++) {
-    if (starts.includes(i)) continue;
-    const way = subtract(points[i], points[i - 1]);
-    const count = Math.max(1, Math.ceil(Math.hypot(...way) / PIECE));
-    const at = (n) => add(points[i - 1], scaled(way, n / count));
-    for (let n = 1; n <= count; n++) parts.push({ points: [at(n - 1), at(n)], stroke: colourOf(i - 1), width });
-  }
-  return parts;
-}
-
-function shaded(colour, light) {
-  const value = Number.parseInt(colour.slice(1), 16);
-  return `rgb(${[16, 8, 0].map((shift) => Math.round(((value >> shift) & 255) * light)).join(",")})`;
 }
 
 function refresh() {
@@ -77,72 +36,92 @@ function refresh() {
   awaited = true;
 }
 
+/** A layer with its points (m) and what three.js draws of it; lines are drawn anew each time. */
+function made(layer) {
+  const steps = new Uint16Array(bytes(layer.points).buffer);
+  const points = [];
+  for (let i = 0; i < steps.length; i += 3) points.push([0, 1, 2].map((k) => low[k] + (size[k] * steps[i + k]) / STEPS));
+  const parts = { points: cloud, surface: body, line: () => [] }[layer.kind](layer, points);
+  for (const part of parts) space.scene.add(part);
+  return { ...layer, points, parts };
+}
+
+function cloud({ shades, colour, width, cut }, points) {
+  const shade = shades ? [...bytes(shades)].map((step) => data.palette[step]) : points.map(() => colour || space.page.ink);
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
+  geometry.setAttribute("color", new three.Float32BufferAttribute(shade.flatMap((css) => new three.Color(css).toArray()), 3));
+  const look = { size: width, sizeAttenuation: false, vertexColors: true, clippingPlanes: cut ? [plane] : [] };
+  return [new three.Points(geometry, new three.PointsMaterial(look))];
+}
+
+/** A closed surface; where it is cut, its sides count up and down in the stencil, and a sheet fills what is between them. */
+function body({ faces, colour, cut }, points) {
+  const corners = new Uint32Array(bytes(faces).buffer);
+  const geometry = surface(points, [...corners]);
+  geometry.computeVertexNormals();
+  const look = { color: colour, roughness: 0.7, ...THROUGH };
+  if (!cut) return [new three.Mesh(geometry, new three.MeshStandardMaterial({ ...look, opacity: 0.85, depthWrite: true }))];
+  const clippingPlanes = [plane];
+  const sides = [[three.BackSide, three.IncrementWrapStencilOp], [three.FrontSide, three.DecrementWrapStencilOp]].map(([side, stencilZPass]) => {
+    const counted = { side, clippingPlanes, colorWrite: false, depthWrite: false, depthTest: false, stencilWrite: true, stencilZPass };
+    return new three.Mesh(geometry, new three.MeshStandardMaterial(counted));
+  });
+  const filled = { stencilWrite: true, stencilFunc: three.NotEqualStencilFunc, stencilZPass: three.ReplaceStencilOp };
+  const sheet = new three.Mesh(new three.PlaneGeometry(2 * Math.max(...size), 2 * Math.max(...size)), new three.MeshStandardMaterial({ ...look, ...filled, opacity: 0.4 }));
+  sheet.geometry.rotateX(Math.PI / 2);
+  sheet.onBeforeRender = () => sheet.position.set(middle[0], -plane.constant, middle[2]);
+  const shell = new three.Mesh(geometry, new three.MeshStandardMaterial({ ...look, clippingPlanes, opacity: 0.3 }));
+  [...sides, shell, sheet].forEach((part, k) => (part.renderOrder = k + 1));
+  return [...sides, shell, sheet];
+}
+
 function draw() {
   awaited = false;
-  picture.fit();
-  const eye = eyeOf(orbit);
-  picture.begin(eye);
-  const { context, ratio } = picture;
-  box(eye);
-  const painted = [];
-  for (const layer of groups.get(chooser.value)) {
-    if (left.has(layer.name)) continue;
-    if (layer.kind === "points") layer.points.forEach((point, i) => dotAt(painted, layer, point, i));
-    for (const part of layer.parts) {
-      if (part.normal && dot(part.normal, subtract(eye.position, part.points[0])) <= 0) continue;
-      const corners = part.points.map((point) => picture.seen(point));
-      painted.push({ part, corners, depth: corners.reduce((sum, corner) => sum + corner[2], 0) / corners.length });
+  const at = low[1] + (Number(knife.value) / Number(knife.max)) * size[1];
+  plane.constant = -at;
+  space.begin();
+  box();
+  for (const layers of groups.values()) {
+    for (const { name, kind, points, starts, parts, colour, width, cut } of layers) {
+      const shown = layers === groups.get(chooser.value) && !left.has(name);
+      for (const part of parts) part.visible = shown;
+      if (shown && kind === "surface" && !cut) space.word(name, scaled(points.reduce(add), 1 / points.length), space.page.ink, false);
+      if (!shown || kind !== "line") continue;
+      const ends = points.slice(1).map((_, i) => i + 1).filter((i) => !starts.includes(i));
+      space.segments(ends.flatMap((i) => [...points[i - 1], ...points[i]]), colour || space.page.ink, width);
     }
   }
-  painted.sort((a, b) => b.depth - a.depth);
-  for (const { part, corners, x, y, side, colour } of painted) {
-    if (!part) {
-      context.fillStyle = colour;
-      context.fillRect(x, y, side, side);
-      continue;
-    }
-    context.beginPath();
-    corners.forEach(([u, v], i) => (i ? context.lineTo(u, v) : context.moveTo(u, v)));
-    if (part.fill) {
-      context.globalAlpha = OPACITY;
-      context.fillStyle = part.fill;
-      context.fill();
-      context.globalAlpha = 1;
-    } else {
-      context.strokeStyle = part.stroke ?? orbit.page.ink;
-      context.lineWidth = part.width * ratio;
-      context.stroke();
-    }
+  for (const { name, parts, poses } of solids) {
+    const hiding = poses.length === 1 ? space.hiding(parts, solids[0].poses) : new Set();
+    space.place(parts, poses, new Map(), (part) => hiding.has(part));
+    for (const part of parts) part.visible = !left.has(name);
   }
+  space.end();
   place.dataset.drawn = chooser.value;
 }
 
-function dotAt(painted, { width, colourOf }, point, i) {
-  const [x, y, depth] = picture.seen(point);
-  const side = width * picture.ratio;
-  painted.push({ x: x - side / 2, y: y - side / 2, side, depth, colour: colourOf(i) ?? orbit.page.ink });
-}
-
 /** The three far sides of the box, with lines at round numbers of mm, and the numbers along three edges. */
-function box(eye) {
-  const back = low.map((_, k) => (eye.position[k] > middle[k] ? low[k] : high[k]));
+function box() {
+  const eye = space.eye.position;
+  const back = low.map((_, k) => (eye[k] > middle[k] ? low[k] : high[k]));
   const front = low.map((_, k) => low[k] + high[k] - back[k]);
-  const { ink, grid, halo } = orbit.page;
-  const ticks = low.map((_, k) => ticksOf(low[k], high[k]));
+  const ticks = low.map((_, k) => ticksOf(1000 * low[k], 1000 * high[k]));
   const at = (k, value, others) => others.map((other, n) => (n === k ? value : other));
+  const pairs = [];
   for (const k of [0, 1, 2]) {
-    for (const value of [low[k], ...ticks[k], high[k]]) {
+    for (const value of [low[k], ...ticks[k].map((tick) => tick / 1000), high[k]]) {
       for (const other of [0, 1, 2].filter((n) => n !== k)) {
-        const ends = [low, high].map((end) => at(k, value, back.map((side, n) => (n === other ? end[n] : side))));
-        picture.line(ends, grid, 1);
+        pairs.push(...[low, high].flatMap((end) => at(k, value, back.map((side, n) => (n === other ? end[n] : side)))));
       }
     }
   }
+  space.segments(pairs, space.page.grid, 1, false);
   const edges = [at(1, front[1], back), at(0, front[0], back), at(0, front[0], back)];
   edges.forEach((edge, k) => {
     const away = scaled(subtract(edge, at(k, edge[k], middle)), 0.06);
-    for (const value of ticks[k]) picture.word(String(value), add(at(k, value, edge), at(k, 0, away)), ink, halo, false);
-    picture.word(`${"xyz"[k]} (mm)`, add(at(k, middle[k], edge), at(k, 0, scaled(away, 3))), ink, halo);
+    for (const value of ticks[k]) space.word(String(value), add(at(k, value / 1000, edge), at(k, 0, away)), space.page.ink, false);
+    space.word(`${"xyz"[k]} (mm)`, add(at(k, middle[k], edge), at(k, 0, scaled(away, 3))));
   });
 }
 
@@ -155,9 +134,9 @@ function ticksOf(from, to) {
   return ticks;
 }
 
-/** The names of the layers that are seen, each with its colour and a box to leave it out. */
+/** The names of the layers and solids that are seen, each with its colour and a box to leave it out. */
 function list() {
-  const entries = groups.get(chooser.value).map(({ name, colourOf }) => {
+  const entries = [...groups.get(chooser.value), ...solids].map(({ name, shades, colour }) => {
     const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
     Object.assign(check, { type: "checkbox", checked: !left.has(name) });
     check.addEventListener("change", () => {
@@ -165,7 +144,7 @@ function list() {
       else left.add(name);
       refresh();
     });
-    swatch.style.background = colourOf(0) ?? "var(--ink)";
+    swatch.style.background = (shades ? data.palette.at(-1) : colour) || "var(--ink)";
     label.append(check, swatch, ` ${name}`);
     return label;
   });
@@ -178,6 +157,7 @@ const choose = (name) => {
   list();
   refresh();
 };
+knife.addEventListener("input", refresh);
 chooser.addEventListener("change", () => choose(chooser.value));
 addEventListener("chosen", ({ detail }) => choose(detail));
 const colours = place.querySelector(".colours");

@@ -1,7 +1,4 @@
-"""3-D figures that can be rotated: clouds, lines and surfaces in layers, drawn by the page itself.
-
-They are drawn like the player's arm, on a plain canvas, so that a page carries no 3-D library.
-"""
+"""3-D figures that can be turned and cut open: clouds, lines and surfaces in layers among solids, drawn by the page."""
 
 from __future__ import annotations
 
@@ -16,13 +13,11 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
-from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Cylinder, Scene, Sphere
-from er3a.collision.shapes import ROUND, solid_pieces
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.viewing.palette import MUTED
+from er3a.pipeline.language import N_, tr
+from er3a.pipeline.viewing.palette import INK, rgb
+from er3a.pipeline.viewing.still import Still
 
 _HERE = Path(__file__).parent
 TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
@@ -32,6 +27,7 @@ DARKEST = 0.33  # of a scale of colours, which is still seen on a dark page
 WORDS = {
     "picture": N_("Drag or use the arrow keys to turn the picture, + and − to zoom."),
     "shown": N_("shown"),
+    "cut": N_("cut"),
     "no_script": N_("This picture needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
 }
 
@@ -49,6 +45,7 @@ class Layer:
     width : of a line or a square, px
     shade : (N,) in 0..1, a place in the scale of colours, instead of ``colour``; none for surfaces
     faces : (M, 3), points of each triangle of a surface, counter-clockwise from outside
+    cut : whether the plane that a reader moves cuts it open
     """
 
     name: str
@@ -58,6 +55,7 @@ class Layer:
     width: float = 2.0
     shade: Reals | None = None
     faces: Integers | None = None
+    cut: bool = False
 
 
 @dataclass(frozen=True)
@@ -69,53 +67,29 @@ class ColourScale:
     ticks: Sequence[tuple[float, str]]
 
 
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
-_SHARP = np.cos(np.radians(20.0))  # of the angle between two faces whose edge is drawn
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Shapes of ``viewing/drawn.py`` under one name, which can be left out: an arm in one pose, or a scene.
+
+    ``poses`` : (k, 4, 4), of the frames that the shapes are in, m
+    """
+
+    name: str
+    shapes: Sequence[dict[str, Any]]
+    poses: Reals
+    colour: str
 
 
-def scene_layers(scene: Scene | None) -> list[Layer]:
-    """The edges of what stands in a scene, but for planes; none without a scene."""
-    lines: list[Reals] = []
-    for solid in scene.solids if scene else ():
-        if isinstance(solid, Sphere):
-            flat = np.column_stack([solid.radius * CIRCLE, np.zeros(len(CIRCLE))])
-            lines += [np.roll(flat, k, axis=1) + solid.T[:3, 3] for k in range(3)]
-            continue
-        pieces = solid_pieces(solid)
-        lines += [line for piece in pieces for line in _edges(piece) or _contours(piece)]
-        if isinstance(solid, Cylinder):  # four lines along a wall that turns evenly
-            lines += list(pieces[0].reshape(2, -1, 3)[:, :: ROUND // 4].swapaxes(0, 1))
-    if not lines or scene is None:
-        return []
-    gap = np.full((1, 3), np.nan)
-    points = np.concatenate([part for line in lines for part in (line, gap)])
-    return [Layer(own_title(scene.title), "line", 1000 * points, MUTED, 1.5)]
-
-
-def _edges(points: Reals) -> list[Reals]:
-    """The edges (2, 3) of a convex hull at which its faces turn."""
-    hull = ConvexHull(points)
-    normals = hull.equations[:, :3]
-    return [
-        points[np.delete(hull.simplices[face], corner)]
-        for face, neighbours in enumerate(hull.neighbors)
-        for corner, other in enumerate(neighbours)
-        if face < other and normals[face] @ normals[other] < _SHARP
-    ]
-
-
-def _contours(points: Reals) -> list[Reals]:
-    """Where a convex hull without edges ends as seen along each axis of the world: closed lines (k, 3)."""
-    seen = [ConvexHull(np.delete(points, axis, axis=1)).vertices for axis in range(3)]
-    return [points[[*corners, corners[0]]] for corners in seen]
-
-
-AZIMUTH_DEG = -65.0  # about z, from where a figure is seen at first
+AZIMUTH_DEG, ELEVATION_DEG = -65.0, 15.0  # from where a figure is seen at first
+FILLED = 0.45  # of the distance that holds the box's diagonal
 
 
 def turning_figure(
-    groups: Mapping[str, Sequence[Layer]], scale: ColourScale | None = None, first: str | None = None
+    groups: Mapping[str, Sequence[Layer]],
+    scale: ColourScale | None = None,
+    first: str | None = None,
+    solids: Sequence[Solids] = (),
+    cut_m: float | None = None,
 ) -> Markup:
     """The figure as HTML, one a page, whose head holds ``drawing_head``.
 
@@ -123,6 +97,8 @@ def turning_figure(
     ----------
     groups : layers that are seen together, by name; a reader chooses one
     first : the group that is seen at first, the first of all if None
+    solids : seen with every group
+    cut_m : y of the plane that cuts layers open at first, m; None for the middle
     """
     points = np.concatenate([layer.points_mm for layers in groups.values() for layer in layers])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
@@ -133,8 +109,14 @@ def turning_figure(
     data = {
         "box": [low.tolist(), high.tolist()],
         "azimuth": float(np.radians(AZIMUTH_DEG)),
+        "elevation": float(np.radians(ELEVATION_DEG)),
+        "filled": FILLED,
         "palette": [to_hex(colour) for colour in shades],
         "first": first,
+        "cut": 0.5 if cut_m is None else float((1000 * cut_m - low[1]) / (high[1] - low[1])),
+        "solids": [
+            {"name": s.name, "shapes": list(s.shapes), "poses": s.poses.tolist(), "colour": s.colour} for s in solids
+        ],
         "groups": [
             {"name": name, "layers": [_layer(layer, low, high) for layer in layers]} for name, layers in groups.items()
         ],
@@ -144,10 +126,43 @@ def turning_figure(
             words={key: tr(text) for key, text in WORDS.items()},
             groups=list(groups),
             scale=scale,
+            cut=data["cut"],
             data=data,
+            still=_still(groups[first or next(iter(groups))], solids, data),
             script=(_HERE / "turning.js").read_text(encoding="utf-8"),
         )
     )
+
+
+def _still(layers: Sequence[Layer], solids: Sequence[Solids], data: dict[str, Any]) -> Markup:
+    """The figure as it opens, for a page without WebGL; a body that is cut is its half behind the plane."""
+    low, high = np.array(data["box"]) / 1000
+    plane = low[1] + data["cut"] * (high[1] - low[1])
+    length = FILLED * float(np.linalg.norm(high - low))
+    picture = Still((low + high) / 2, length, data["azimuth"], data["elevation"])
+    for each in solids:
+        picture.solids(each.shapes, each.poses, {})
+    for layer in sorted(layers, key=lambda layer: layer.cut):
+        points = layer.points_mm / 1000
+        behind = ~(points[:, 1] < plane) | (not layer.cut)
+        if layer.faces is not None:
+            picture.surface(
+                points, layer.faces[behind[layer.faces].all(axis=1)], layer.colour, 0.3 if layer.cut else 1.0
+            )
+        elif layer.kind == "points":
+            shades = (
+                np.zeros(len(points), int)
+                if layer.shade is None
+                else np.rint((SHADES - 1) * layer.shade).clip(0, SHADES - 1)
+            )
+            colours = (
+                np.array([rgb(each) for each in data["palette"] or (layer.colour or INK,)])[shades.astype(int)] / 255
+            )
+            picture.points(points[behind], colours[behind], layer.width)
+        else:
+            for line in np.split(points, np.flatnonzero(np.isnan(points[:, 0]))):
+                picture.line(line[np.isfinite(line[:, 0])], layer.colour or INK, layer.width)
+    return picture.markup()
 
 
 def _layer(layer: Layer, low: Reals, high: Reals) -> dict[str, Any]:
@@ -159,6 +174,7 @@ def _layer(layer: Layer, low: Reals, high: Reals) -> dict[str, Any]:
         "points": _packed(places, "<u2"),
         "colour": layer.colour,
         "width": layer.width,
+        "cut": layer.cut,
     }
     if layer.shade is not None:
         packed["shades"] = _packed(np.clip(layer.shade[there], 0, 1) * (SHADES - 1), "u1")

@@ -14,6 +14,7 @@ from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.finding import fact
+from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
@@ -23,14 +24,16 @@ from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.pages import Caveat, caveat
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.player import LOOKS, drawn_shapes, drawn_size, floor_of, import_map, scene_data, table_data
+from er3a.pipeline.player.player import AXES, LOOKS, SPACE, drawing_head, table_data
 from er3a.pipeline.results import Provenance, input_records, is_computed, read_foundation
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import program_head
+from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
 from er3a.pipeline.viewing.page import render, run_command
-from er3a.pipeline.viewing.palette import BODY, INK, JOINTS, LINK
+from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
+from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
 from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
@@ -323,8 +326,8 @@ def write_panel(
     own = panel_data(robot, near)
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
-        "scene": scene_data(scene.solids if scene else ()),
-        "carried": scene_data(scene.carried if scene else ()),
+        "scene": drawn_scene(scene.solids if scene else (), robot),
+        "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
         "head": [ascii_text(line) for line in (program_head(None) if head is None else head)],
@@ -340,7 +343,10 @@ def write_panel(
         words=panel["words"],
         first_caveat=first_caveat,
         panel=panel,
-        modules=import_map(sorted(_HERE.glob("*.js"))),
+        drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),
+        still=scene_still(
+            panel, [poses_at(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))], {}
+        ).markup(),
         command=command,
         provenance=provenance,
     )
@@ -360,7 +366,7 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "name": robot.name,
         "table": table_data(robot),
         "size": drawn_size(robot),
-        **drawn_shapes(robot),
+        **drawn_arm(robot),
         "characteristic_length": characteristic_length(robot),
         "length_is": "links" if wrist_partition_missing(robot) else "wrist",
         "singular_sets": singular_sets(robot),
@@ -369,9 +375,20 @@ def panel_data(robot: Robot, near: NearSingular) -> dict[str, Any]:
         "near": {**thresholds, "value": near.smallest, "limit": NEAR_LIMIT, "slide": NEAR_END},
         "programs": robot.joints == robot.rows == SIX and not robot.sliding.any() and robot.coupling is None,
         "joint_names": joint_names(robot),
-        "colours": {"joints": JOINTS, "link": LINK, "body": BODY, "mark": INK},
+        "colours": {"joints": JOINTS, "touching": TOUCHING},
+        "axes": AXES,
+        **dict(zip(("target", "length"), _looked_at(robot))),
         "words": _translated(WORDS),
     }
+
+
+def _looked_at(robot: Robot) -> tuple[list[float], float]:
+    """Where the picture's eye looks, (3,), m, and about how long the arm is from there, m."""
+    if robot.sliding.any() or robot.rows < 3:
+        tool = frames(robot, (robot.lower + robot.upper) / 2)[-1, :3, 3]
+        return ((robot.base[:3, 3] + tool) / 2).tolist(), 0.75 * drawn_size(robot)
+    origins = frames(robot, np.zeros(robot.joints))[1:, :3, 3]
+    return origins[0].tolist(), float(np.linalg.norm(np.diff(origins, axis=0), axis=1).sum())
 
 
 def singular_sets(robot: Robot) -> dict[str, Any] | None:

@@ -1,62 +1,45 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, norm, scaled, subtract, turned } from "er3a/algebra";
+import { add, column, moved, scaled, translation, turned } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
-import { Orbit } from "er3a/orbit";
-import { alongArm, ARM, eyeOf, Picture } from "er3a/scene";
-import { armLooks, drums, recoloured, sceneSolids } from "er3a/solids";
+import { alongArm, Arm, ARM, Space } from "er3a/space";
 
-const TOUCHING = "#d1242f";
-const FRAME_COLOURS = ["#d62728", "#2ca02c", "#1f77b4"]; // of x, y, z
+const WORLD = translation(0, 0, 0);
 
-/** Where to look, and about how long the arm is from there (m). */
-function lookedAt(table, links, size) {
-  if (table.sliding.some(Boolean) || table.a.length < 3) {
-    const middle = table.lower.map((low, j) => (low + table.upper[j]) / 2);
-    return [scaled(add(column(table.base, 3), column(frames(table, links, middle).at(-1), 3)), 0.5), 0.75 * size];
-  }
-  const origins = frames(table, links, table.lower.map(() => 0)).map((T) => column(T, 3));
-  return [origins[1], origins.slice(2).reduce((sum, origin, k) => sum + norm(subtract(origin, origins[k + 1])), 0)];
-}
-
-export class ArmView extends Orbit {
+export class ArmView extends Space {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */
-  constructor(canvas, { table, size, colours, joint_names: names, pieces, visuals, scene, carried, floor }, links, draw) {
-    super(canvas, ...lookedAt(table, links, size), () => draw());
-    Object.assign(this, { table, links, size, rows: table.coupling ? table.a.map((_, k) => String(k + 1)) : names });
-    this.surroundings = sceneSolids(scene ?? []);
-    this.looks = armLooks(table, size, colours, { pieces, visuals }, sceneSolids(carried ?? [], table.a.length + 1));
-    this.drums = drums(table, size);
-    this.jointColours = colours.joints;
-    this.picture = new Picture(canvas);
-    this.base = column(table.base, 3);
-    this.floor = floor ?? this.base[2];
+  constructor(canvas, data, links, draw) {
+    const { table, size } = data;
+    super(canvas, data.target, data.length, () => draw());
+    const names = table.coupling ? table.a.map((_, k) => String(k + 1)) : data.joint_names;
+    Object.assign(this, { data, table, links, reach: size, rows: names, base: column(table.base, 3) });
+    this.surroundings = this.add(data.scene ?? []);
+    [this.arm, this.other] = [data.carried ?? [], []].map((carried) => new Arm(this, data, carried));
   }
 
   /**
-   * Draws the arm at joint values `q` by a look of `armLooks`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
+   * Draws the arm at joint values `q` by a look of `Arm`, a pale one at `ghost` (null for none), the table's frames with these numbers, and
    * the nearest pair, `{from, to, text, touching}`: a line, and bodies of those names in red.
    */
   show(q, ghost, numbers = [], nearest = null, look = "visual") {
-    const { picture, page, size, base, floor } = this;
-    picture.fit();
-    picture.begin(eyeOf(this));
+    const { data, base, reach } = this;
     const poses = this.#poses(q);
-    const groups = this.looks(look);
-    const [{ solids }] = groups;
-    picture.floor(base, size / 10, floor, page.grid);
-    picture.shadow(solids, poses, floor, page.grid);
     const touching = new Set(nearest?.touching ?? []);
-    const seen = (things) => recoloured(things, touching, TOUCHING);
-    const arm = groups.map((group) => ({ ...group, solids: seen(group.solids), poses }));
-    if (ghost) arm.push({ solids, poses: this.#poses(ghost), ghost: true });
-    picture.solids([...picture.around(seen(this.surroundings), poses), ...arm]);
+    const colours = new Map([...touching].map((name) => [name, data.colours.touching]));
+    this.begin();
+    this.floor(base, reach / 10, data.floor ?? base[2]);
+    this.arm.show(poses, colours, look);
+    if (ghost) this.other.show(this.#poses(ghost), new Map(), look, true);
+    else this.other.hide();
+    const hiding = this.hiding(this.surroundings, poses);
+    this.place(this.surroundings, [WORLD], colours, (mesh) => hiding.has(mesh));
+    this.keepClear(alongArm(poses), ARM * reach);
     if (numbers.length) this.#tableFrames(tableFrames(this.table, poses.slice(1)), numbers);
     else this.#axes(poses);
-    this.#toolFrame(poses.at(-1));
-    picture.keepClear(alongArm(poses), ARM * size);
+    this.#frame(poses.at(-1), 0.11, ["x", "y", "z"]);
     if (nearest?.text) this.#nearest(nearest);
-    picture.names(this.surroundings, page.ink, page.halo, touching, page.touching);
+    this.names(this.surroundings, touching);
+    this.end();
   }
 
   /** Poses of base, the frames that the joints turn, and tool. */
@@ -65,40 +48,40 @@ export class ArmView extends Orbit {
   }
 
   #nearest({ from, to, text, touching }) {
-    const { picture, page } = this;
-    picture.line([from, to], touching.length ? TOUCHING : page.ink, 3);
-    picture.word(text, scaled(add(from, to), 0.5), touching.length ? page.touching : page.ink, page.halo);
+    const { data, page } = this;
+    this.line([from, to], touching.length ? data.colours.touching : page.ink, 3);
+    for (const end of [from, to]) this.dot(end, touching.length ? page.touching : page.ink, 4, touching.length > 0);
+    this.word(text, scaled(add(from, to), 0.5), touching.length ? page.touching : page.ink);
   }
 
   #tableFrames(found, numbers) {
     const at = new Map(); // frames in one place share a label
     for (const k of numbers) {
       const origin = column(found[k], 3);
-      FRAME_COLOURS.forEach((colour, c) => {
-        this.picture.line([origin, add(origin, scaled(column(found[k], c), 0.12 * this.size))], colour, 3);
-      });
+      this.#frame(found[k], 0.12);
       const place = origin.map((value) => value.toFixed(4)).join();
       at.set(place, { origin, texts: [...(at.get(place)?.texts ?? []), k] });
     }
-    for (const { origin, texts } of at.values()) this.picture.word(texts.join(", "), origin, this.page.ink, this.page.halo);
+    for (const { origin, texts } of at.values()) this.word(texts.join(", "), origin);
   }
 
+  /** The joints' axes, each from the arm outwards in its own colour. */
   #axes(poses) {
-    for (const [k, { middle, half }] of this.drums.entries()) {
-      const axis = scaled(column(poses[k + 1], 2), this.table.direction[k]);
-      const start = add(moved(poses[k + 1], middle), scaled(axis, half));
-      const tip = add(start, scaled(axis, half));
-      this.picture.line([start, tip], this.jointColours[k], 3);
-      this.picture.word(this.rows[k], add(tip, scaled(axis, 0.6 * half)), this.page.ink, this.page.halo);
+    for (const [k, { middle, half }] of this.data.rows.entries()) {
+      const axis = scaled(column(poses[k + 1], 2), this.table.direction[k] * half);
+      const tip = add(moved(poses[k + 1], middle), scaled(axis, 2));
+      this.line([moved(poses[k + 1], middle), tip], this.data.colours.joints[k], 3);
+      this.word(this.rows[k], add(tip, scaled(axis, 0.5)));
     }
   }
 
-  #toolFrame(T) {
-    ["x", "y", "z"].forEach((name, c) => {
-      const arrow = [0, 1, 2].map((i) => (i === c ? 0.11 * this.size : 0));
+  /** A frame's axes, `part` of the arm's size long. */
+  #frame(T, part, names = []) {
+    this.data.axes.forEach((colour, c) => {
+      const arrow = [0, 1, 2].map((i) => (i === c ? part * this.reach : 0));
       const tip = add(column(T, 3), turned(T, arrow));
-      this.picture.line([column(T, 3), tip], this.page.ink);
-      this.picture.word(name, add(tip, turned(T, scaled(arrow, 0.2))), this.page.ink, this.page.halo);
+      this.line([column(T, 3), tip], colour, 3);
+      if (names[c]) this.word(names[c], add(tip, turned(T, scaled(arrow, 0.2))));
     });
   }
 }

@@ -105,7 +105,7 @@ function partsOf(cell) {
 }
 
 function nameFor(element) {
-  const heading = document.querySelector("h1").innerText;
+  const heading = document.title.replace(/ · er3a$/, "");
   const title = element.querySelector("caption, img")?.innerText || element.querySelector("img")?.alt || "table";
   return `${heading} ${title}`.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "_").slice(0, 80);
 }

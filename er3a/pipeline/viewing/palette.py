@@ -21,7 +21,11 @@ MODEL = "#0072b2"
 REFERENCE = "#d55e00"
 HIGHLIGHT = "#c2185b"
 LINK = "#c9d1d9"
+SHELL = "#eef2f6"
 BODY = "#9aa5b1"
+PLATE = "#4a5868"
+
+TOUCHING, DOUBTFUL = "#e0392d", "#dd9a1a"  # of solids, which light darkens
 
 VERDICTS = {
     "pass": "#18794e",

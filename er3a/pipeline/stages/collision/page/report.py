@@ -138,7 +138,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         tried=TRIED,
         by_pair=by_pair(results.pairs),
         workspace=workspace(results),
-        player=player(robot, motions(robot, results), scene, opened=worst),
+        player=player(robot, motions(robot, results), scene, opening=worst),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MAX_ROWS]],
         rows_left_out=len(closest) - MAX_ROWS,
@@ -151,7 +151,7 @@ def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest]) -
     found = {figure.name: figure.value for figure in summary.figures}
     free, places = found.get("free_of_collisions"), summary.places
     share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
-    headline = tr("{share} of the joint space is free.", share=share) if share else tr("Collisions checked.")
+    headline = tr("{share} of joint space is free.", share=share) if share else tr("Collisions checked.")
     touch = sum(each.clearance_mm < 0 for each in closest)
     rest = tr("{count} of {all} motions collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]

@@ -46,6 +46,7 @@ from er3a.robots.robot import Robot
 SLOWER = 0.97  # of the programmed pace, below which a motion counts as slower
 LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
+SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
 
 
@@ -307,11 +308,14 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
 
 def _pass(event: model.Singularity) -> PlayedEvent:
     """A singular pose, or a pass by one."""
-    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution")
+    axes = event.axes or SINGULAR_AXES.get(event.type, ())
+    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution", axes=axes)
 
 
 def _few_words(part: model.Stretch[Any]) -> str:
-    """Why a stretch is an event."""
+    """Why a stretch is an event; of bodies that overlap the first two."""
+    if is_one(part.cause, "bodies_overlap"):
+        return say(part.cause.touches[0].pair)
     return rate_needed(part.cause) if is_one(part.cause, *RATES) else cause_text(part)
 
 

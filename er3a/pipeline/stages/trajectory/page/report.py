@@ -94,7 +94,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
-        player=player(robot, played, scene, opened=opened(wrong.values())),
+        player=player(robot, played, scene, opening=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
 
@@ -148,7 +148,7 @@ def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault]) ->
     if not wrong:
         return ""
     return tr(
-        "Of the others {mended} can be repaired, {early} end early, {rest} can't run.",
+        "{mended} can be repaired, {early} end early, {rest} can't run.",
         mended=mended,
         early=early,
         rest=len(wrong) - mended - early,

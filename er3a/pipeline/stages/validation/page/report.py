@@ -274,7 +274,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected_address=text_address(text),
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
-        more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
+        all_failed=len(failed),
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],

@@ -155,7 +155,7 @@ def _answer(summary: model.VisionSummary) -> Answer:
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} objects can be grasped.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} objects are graspable.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""

@@ -31,7 +31,6 @@ from er3a.pipeline.messages.workspace import (
     stand_text,
 )
 from er3a.pipeline.player.motions import address_of
-from er3a.pipeline.player.turning import CIRCLE
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
 from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, slide_names
@@ -42,6 +41,8 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
+_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
 def tray_rows(

@@ -17,16 +17,21 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import LogLocator
 
 from er3a.collision.scene import Scene
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.player.turning import ColourScale, Layer, scene_layers, turning_figure
+from er3a.pipeline.player.turning import ColourScale, Layer, Solids, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
+from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.palette import BODY, HIGHLIGHT, INK, JOINTS, MODEL, MUTED, REFERENCE, VERDICTS
 from er3a.robots.robot import Robot
+from er3a.workspace.cell_frame import cell_frame
+from er3a.workspace.voids import Blocks
+from er3a.workspace.voids import mesh as surface_of
 
 DENSITY = "YlGnBu"
 
@@ -247,25 +252,59 @@ _COLOURS = {"enclosed": (HIGHLIGHT, JOINTS[6]), "open": (REFERENCE, JOINTS[8])} 
 _NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
+BODY_BLOCKS = (36, 56, 60)  # of the reached body, along radius, height and around
+SMOOTHED = 8  # times that its corners go to the mean of their neighbours
+
+
 def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> Markup:
-    """The cloud's far half, the voids, the scene and the arm at zero in a figure that turns."""
+    """What is proven reachable, the cloud and the voids, the scene and the arm at zero in a figure that turns."""
     cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
-    far = np.flatnonzero(cloud.point_m[:, 1] >= results.summary.axis.point_m[1])[:CLOUD_POINTS]
-    value = cloud.manipulability_m3[far]
+    value = cloud.manipulability_m3[:CLOUD_POINTS]
     most = float(np.quantile(value, 0.99)) or 1.0
-    layers = [Layer(tr("cloud, far half"), "points", 1000 * cloud.point_m[far], width=1.6, shade=value / most)]
+    points, shade = 1000 * cloud.point_m[:CLOUD_POINTS], value / most
+    body, faces = _reached_body(robot, results)
+    layers = [
+        Layer(tr("reachable"), "surface", 1000 * body, PROOF["reachable"], faces=faces, cut=True),
+        Layer(tr("cloud"), "points", points, width=1.6, shade=shade, cut=True),
+    ]
     drawn: Counter[str] = Counter()
     for i, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == i]
         if len(faces):
-            name, corners = tr(_NAMES[void.kind], number=i), 1000 * vertices.point_m[vertices.void == i]
+            name = tr(_NAMES[void.kind], number=i)
+            corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             colour = _COLOURS[void.kind][drawn[void.kind] % 2]
             layers.append(Layer(name, "surface", corners, colour, faces=faces))
             drawn[void.kind] += 1
-    layers.append(Layer(tr("arm at 0"), "line", 1000 * skeleton(robot, np.zeros(robot.joints)), width=5.0))
-    layers += scene_layers(scene)
+    at_zero = poses_at(robot, np.zeros(robot.joints))
+    solids = [Solids(tr("arm at 0"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY)]
+    if scene:
+        solids.append(Solids(own_title(scene.title), drawn_scene(scene.solids, robot), np.eye(4)[None], SCENE_COLOUR))
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
-    return turning_figure({"": layers}, scale)
+    return turning_figure({"": layers}, scale, solids=solids, cut_m=results.summary.axis.point_m[1])
+
+
+def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
+    """The closed surface (V, 3), m, base frame, and triangles (F, 3) of what is proven reachable, smoothed."""
+    proof, frame = results.proof, cell_frame(robot)
+    across, upwards, around = BODY_BLOCKS
+    rho = np.linspace(0.0, proof.rho_m[:, 1].max(), across + 1)
+    z = np.linspace(proof.z_m[:, 0].min(), proof.z_m[:, 1].max(), upwards + 1)
+    azimuth = np.linspace(0.0, TURN, around + 1)
+    middle_rho, middle_z, middle_azimuth = ((edge[1:] + edge[:-1]) / 2 for edge in (rho, z, azimuth))
+    at_rho, at_azimuth = np.meshgrid(middle_rho, np.degrees(middle_azimuth), indexing="ij")
+    filled = np.stack([_slice(proof, at_rho, at_azimuth, height) == FILLED for height in middle_z], axis=1)
+    points, faces = surface_of(Blocks(rho, z, azimuth, 1.0 - filled, 1.0 - filled, frame.bar), filled)
+    return _smoothed(points, faces) @ frame.R + frame.origin, faces
+
+
+def _smoothed(points: Reals, faces: Integers) -> Reals:
+    """Corners (V, 3) of a closed surface of blocks, moved to where it has no steps."""
+    ends = np.concatenate([faces, faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]])
+    for _ in range(SMOOTHED):
+        near = [np.bincount(ends[:, 0], points[ends[:, 1], k], len(points)) for k in range(3)]
+        points = np.stack(near, axis=1) / np.bincount(ends[:, 0])[:, None]
+    return points
 
 
 LABEL_GAP = 0.07  # of the figure's height, between two labels
