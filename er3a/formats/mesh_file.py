@@ -201,8 +201,8 @@ MAX_BYTES = 1_000_000
 TOO_LARGE = "Write long lists of targets or points as CSV tables"
 
 
-def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> str:
-    """Read a text file that a user gave.
+def read_raw(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> bytes:
+    """Read a file that a user gave.
 
     Parameters
     ----------
@@ -211,12 +211,12 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
 
     Returns
     -------
-    text : without the byte order mark, if it has one
+    raw : its bytes
 
     Raises
     ------
     InputError
-        if it is missing, not a plain file, unreadable, too large, or not UTF-8 (with the number of the byte)
+        if it is missing, not a plain file, unreadable, or too large
     """
     try:
         status = path.stat()
@@ -230,6 +230,36 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
         raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
     if raw is None:
         raise InputError(path, None, f"larger than {most} bytes", too_large)
+    return raw
+
+
+def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> str:
+    """Read a text file that a user gave, as :func:`read_raw`.
+
+    Returns
+    -------
+    text : without the byte order mark, if it has one
+
+    Raises
+    ------
+    InputError
+        as of :func:`read_raw`, or if it is not UTF-8 (with the number of the byte)
+    """
+    return text_of(path, read_raw(path, most, too_large))
+
+
+def text_of(path: Path, raw: bytes) -> str:
+    """The text that a file's bytes are.
+
+    Returns
+    -------
+    text : without the byte order mark, if it has one
+
+    Raises
+    ------
+    InputError
+        if they are not UTF-8 (with the number of the byte)
+    """
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

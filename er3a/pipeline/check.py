@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from er3a.errors import InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
-from er3a.files.dh_table import is_printed_table, read_dh_table
+from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
 from er3a.files.path_file import (
     TRAJECTORIES,
@@ -22,6 +22,7 @@ from er3a.files.path_file import (
     load_paths,
     read_path_table,
 )
+from er3a.files.printed_table import is_printed_table
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_sets import FILE as DOCUMENTS
 from er3a.files.reference_sets import (
