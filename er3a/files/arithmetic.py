@@ -216,7 +216,7 @@ class _Reader:
             values.append(self.sum())
         if self.take() not in (")", "]") or any(each.variables for each in values):
             raise ValueError(f"has no number in {name}(...)")
-        (value, *rest) = values
+        (value, *_rest) = values
         if name in _RADIANS | _DEGREES:
             turn = math.radians(value.number) if name in _RADIANS else math.degrees(value.number)
             return Amount(turn, "rad" if name in _RADIANS else "deg")
@@ -234,7 +234,7 @@ def _two_units(a: str, b: str) -> str:
 
 
 def _product(a: Amount, b: Amount) -> Amount:
-    if a.variables and b.variables or a.unit and b.unit:
+    if (a.variables and b.variables) or (a.unit and b.unit):
         raise ValueError(_two_units(a.unit, b.unit) or "multiplies two variables")
     scaled = {name: times * b.number for name, times in a.variables.items()}
     scaled |= {name: times * a.number for name, times in b.variables.items()}

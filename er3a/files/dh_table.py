@@ -25,7 +25,7 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_lines
-from er3a.files.printed_table import FIXED, PrintedTable, printed_table, table_text
+from er3a.files.printed_table import FIXED, MAX_BYTES, PrintedTable, check_size, printed_table, table_text
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
@@ -65,7 +65,6 @@ LONGEST_ARM_IN = 200.0  # inches; a length of five metres
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
-MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
 
 def read_dh_table(
@@ -77,6 +76,7 @@ def read_dh_table(
     angle_unit: AngleUnit | None = None,
     as_printed: bool = False,
     columns: Sequence[str] = (),
+    text: str | None = None,
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """Make a robot file from a D-H table.
 
@@ -89,6 +89,7 @@ def read_dh_table(
         :class:`er3a.errors.DoubtfulUnit`. Otherwise they are refused. Columns that say no unit are taken for what their
         values look like, with a doubt too
     columns : what the columns mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    text : of the file, if it has been read
 
     Returns
     -------
@@ -101,7 +102,7 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
-    printed = _printed(path, columns)
+    printed = _printed(path, columns, text)
     names = {_usual_unit(column)[0]: column for column in (printed.lines[0][1] if printed.lines else ())}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
     rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
@@ -145,7 +146,7 @@ def read_dh_table(
     return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
 
 
-def _printed(path: Path, columns: Sequence[str] = ()) -> PrintedTable:
+def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -> PrintedTable:
     """The table that a file holds, under er3a's headings.
 
     Raises
@@ -153,16 +154,16 @@ def _printed(path: Path, columns: Sequence[str] = ()) -> PrintedTable:
     InputError
         for a file without one, and for one with more rows than any arm
     """
-    text = table_text(path)
-    found = printed_table(path, text, columns)
+    if text is None and (path.suffix != ".csv" or (path.is_file() and path.stat().st_size < MAX_BYTES)):
+        text = table_text(path)
+    found = None if text is None else printed_table(path, text, columns)
     if found is None and path.suffix != ".csv":
         problem = "no row of headings with a, alpha and d was found"
         raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
-    lines = read_lines(path) if found is None else found.lines
-    if len(lines) > MOST_LINES:
-        problem = f"{len(lines) - 1:,} rows are no arm's table"
-        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
-    return found or PrintedTable(lines, ())
+    if found is None:
+        found = PrintedTable(read_lines(path), ())
+    check_size(path, found.lines)
+    return found
 
 
 def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
@@ -306,35 +307,23 @@ def _in_own_units(
 ) -> Iterator[str]:
     """Take all values to mm and degrees, and doubt or refuse those that are another unit's.
 
-    Lengths are refused, with ``as_printed`` doubted, and taken for what they are only if no heading says their unit.
-    Twists that can only be radians stay degrees, with a note, unless ``as_printed`` and no heading says their unit.
+    Lengths and twists are taken for what they can only be if no heading says their unit. Otherwise such lengths are
+    refused, with ``as_printed`` doubted, and such twists stay degrees, with a note.
     ``own``: columns that said their unit; ``without_unit``: those whose headings say none.
     """
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
-    unit = length_unit or "mm"
     unsaid = {"a_mm", "d_mm"} - own <= without_unit
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
-    likely = "mm" if slides or not lengths else _likely_unit(lengths)
-    if length_unit is None and unsaid and lengths and LONGEST_LINK_M <= max(lengths) < SHORTEST_LINK_MM:
-        if likely != "in" or max(lengths) < SHORTEST_ARM_MM:
-            problem = f"the lengths, {max(lengths):g} at most, say no unit: mm, cm or inches?"
-            raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
-    if length_unit is None and likely != "mm":
-        word = {"m": "metres", "in": "inches"}[likely]
-        if not (as_printed or unsaid):
-            problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
-            remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
-            remedy += " (or mm)" if max(lengths) > SHORTEST_PLAIN_LENGTH_MM else ""
-            raise InputError(path, "columns a_mm, d_mm", problem, remedy)
-        doubt(None, "columns a, d", f"{max(lengths):g} mm at most", word, file=path)
-        if unsaid:
-            unit = likely
-            yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
+    if unit != (length_unit or "mm"):
+        word = {"m": "metres", "in": "inches"}[unit]
+        yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
         if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
             doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
-        turned = {column for column in turned if _in_radians(rows, column)} if _twists_in_radians(rows, own) else set()
+        found = _twists_in_radians(rows, own, "alpha_deg" in without_unit)
+        turned = {column for column in turned if _in_radians(rows, column)} if found else set()
         if turned and "alpha_deg" in without_unit:
             doubt(None, ", ".join(sorted(turned)), f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
             yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
@@ -350,6 +339,27 @@ def _in_own_units(
                 row[column] = _converted(column, value, scale)
 
 
+def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool) -> LengthUnit:
+    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted."""
+    likely = _likely_unit(lengths) if lengths else "mm"
+    longest = max(lengths, default=0.0)
+    # A small arm in mm, or a large one in cm, and no other for sure.
+    small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
+    if unsaid and small and (likely == "mm" or all(length == round(length) for length in lengths)):
+        problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
+        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
+    if likely == "mm":
+        return "mm"
+    word = {"m": "metres", "in": "inches"}[likely]
+    if not (as_printed or unsaid):
+        problem = f"the lengths, {longest:g} mm at most, are those of an arm in {word}"
+        remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
+        remedy += " (or mm)" if longest > SHORTEST_PLAIN_LENGTH_MM else ""
+        raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+    doubt(None, "columns a, d", f"{longest:g} mm at most", word, file=path)
+    return likely if unsaid else "mm"
+
+
 def _converted(column: str, value: float, scale: float) -> float:
     """A value in mm or degrees; one in radians as :func:`er3a.numerics.si_units.limit_in_degrees` if it is a limit."""
     if scale == DEGREES["rad"] and column in ("lower_deg", "upper_deg"):
@@ -362,18 +372,20 @@ def headed_units(
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
     columns: Sequence[str] = (),
+    text: str | None = None,
 ) -> dict[str, str]:
     """The unit of each column of a D-H table, as its heading says it.
 
     Parameters
     ----------
-    length_unit, angle_unit : as of :func:`read_dh_table`, of headings that say mm and deg, or nothing
+    length_unit, angle_unit, columns, text : as of :func:`read_dh_table`; the units are those of headings that say mm and
+        deg, or nothing
 
     Returns
     -------
     units : such as ``{"a": "in", "alpha": "rad", "lower": "deg"}``
     """
-    lines = _printed(path, columns).lines
+    lines = _printed(path, columns, text).lines
     meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
     units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
     return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*MILLIMETRES, *DEGREES)}
@@ -389,12 +401,12 @@ def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:
     return bool(values) and max(values) < RADIANS_BELOW_DEG
 
 
-def _twists_in_radians(rows: list[dict[str, Any]], own: set[str]) -> bool:
-    """Whether all twists are right angles in radians, as printed with two decimals or more, and two at least."""
+def _twists_in_radians(rows: list[dict[str, Any]], own: set[str], unsaid: bool) -> bool:
+    """Whether all twists are right angles in radians, as printed with two decimals or more; two at least, or one where
+    no heading says degrees (``unsaid``)."""
     twists = [row["alpha_deg"] for row in rows if row["alpha_deg"]]
-    return (
-        "alpha_deg" not in own and look_like_radians(twists) and all(look_like_radians([each, each]) for each in twists)
-    )
+    enough = look_like_radians(twists) or (unsaid and twists)
+    return bool("alpha_deg" not in own and enough and all(look_like_radians([each, each]) for each in twists))
 
 
 def _likely_unit(lengths: list[float]) -> LengthUnit:

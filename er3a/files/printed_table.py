@@ -1,8 +1,8 @@
 """A D-H table in any text, as columns with er3a's headings.
 
 The text is cut into cells (:mod:`er3a.files.table_cells`, :mod:`er3a.files.table_code`), headings say what the columns
-mean (:mod:`er3a.files.table_headings`), cells are parsed (:mod:`er3a.files.arithmetic`). What can be read in two ways is
-refused, with both.
+mean (:mod:`er3a.files.table_headings`), and cells are parsed (:mod:`er3a.files.arithmetic`). What can be read in two
+ways is refused, with both.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import difflib
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import NoReturn
 
 from er3a.errors import InputError
 from er3a.files.arithmetic import UNITS, Amount, amount_of, name_of, plain
@@ -23,24 +25,35 @@ from er3a.files.table_code import LIBRARIES, code_grids, elements
 from er3a.files.table_headings import Heading, heading_of
 from er3a.formats.mesh_file import read_raw, text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
-from er3a.robots.robot import Convention
+from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 
 FIXED = "fixed", "tool"
 NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-OWN = "type", "theta_deg", "beta_deg", "calibrated", "direction", "convention", "lower_deg", "upper_deg", "lower_mm"
-OWN += "upper_mm", "speed_deg_s", "speed_mm_s"
+OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
-_VARIES = re.compile(r"\*|var(?:iable|\.)?|变量")
+_CELL = (
+    (r"\(t\)", ""),
+    (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
+    (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
+    (r"\*+(?=$|\s*[-+])", ""),
+    (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
+)
+"""Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
 _STARRED = re.compile(r"^\*$|\w\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"[^\W\d]+\.?\s*\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
-_MODIFIED = re.compile(r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig'?s\b", re.I)
-_STANDARD = re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I)
+SIGNS = {
+    "modified": re.compile(
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig'?s\b", re.I
+    ),
+    "standard": re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I),
+}
+"""What a text around a table says of its convention."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n(])+?)"
     r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b)?"
@@ -49,15 +62,33 @@ _GIVEN = re.compile(
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither heading
-    nor cells say the unit."""
+    """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither the
+    heading nor cells say the unit."""
 
     lines: Lines
     notes: tuple[str, ...]
     without_unit: frozenset[str] = frozenset()
 
 
-MAX_BYTES = 2_000_000
+MAX_BYTES = 200_000
+MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
+
+
+def check_size(path: Path, lines: Lines) -> None:
+    """Refuse more rows than any arm has.
+
+    Parameters
+    ----------
+    lines : the header and the rows
+
+    Raises
+    ------
+    InputError
+        with the number of rows
+    """
+    if len(lines) > MOST_LINES:
+        problem = f"{len(lines) - 1:,} rows are no arm's table"
+        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
 
 
 def table_text(path: Path) -> str:
@@ -68,13 +99,13 @@ def table_text(path: Path) -> str:
     InputError
         if it is missing, too large or no text
     """
-    if str(path) == "-":
-        raw = sys.stdin.buffer.read(MAX_BYTES)
-    else:
-        raw = read_raw(path, MAX_BYTES)
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return raw.decode("utf-16", errors="replace")
-    return text_of(path, raw)
+    return text_of(path, _pasted() if str(path) == "-" else read_raw(path, MAX_BYTES))
+
+
+@cache
+def _pasted() -> bytes:
+    """Standard input, which can be read once."""
+    return sys.stdin.buffer.read(MAX_BYTES)
 
 
 def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> PrintedTable | None:
@@ -99,13 +130,26 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         found, from_code = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
-    tables = [table for n, table in enumerate(found) if [row for _, row in table] not in _rows_of(found[:n])]
+    tables = [table for n, table in enumerate(found[:9]) if [row for _, row in table] not in _rows_of(found[:n])]
     if not tables:
         return None
     if len(tables) > 1:
         lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
         raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
+    check_size(path, tables[0])
     return _Table(path, text, tables[0], from_code).converted()
+
+
+def table_in(path: Path) -> bool:
+    """Whether a file, or standard input for ``-``, holds a D-H table.
+
+    Raises
+    ------
+    InputError
+        for a table that can't be read
+    """
+    small = str(path) == "-" or (path.is_file() and path.stat().st_size < MAX_BYTES)
+    return small and printed_table(path, table_text(path)) is not None
 
 
 def is_printed_table(header: Iterable[str]) -> bool:
@@ -119,7 +163,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
     -------
     found : whether a, alpha and d are all among them
     """
-    return NEEDED <= {found.quantity for name in header if (found := heading_of(name.strip()))}
+    return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
 
 
 def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
@@ -130,15 +174,15 @@ def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
 
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
-    """All tables that the first reader finds which finds one, their headings first; and whether they are a program's."""
+    """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
     page = html_grids(text) or latex_grids(text)
     if tables := [table for grid in page for table in _headed(grid, columns)]:
         return tables, False
     if tables := [table for grid in code_grids(text) for table in _headed(grid, columns)]:
         return tables, True
-    for grid in line_grids(text):
+    for mark, grid in line_grids(text):
         if tables := _headed(grid, columns):
-            return tables, False
+            return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
     if bare := code_grids(text, headed=False):
         if columns:
             return [table for grid in bare for table in _headed([(0, list(columns)), *grid], columns)], True
@@ -153,9 +197,13 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     tables: list[Grid] = []
     open_one, broken = False, 0
     for line, cells in grid:
-        if is_printed_table(cells) or columns and len(cells) == len(columns) and not tables:
-            tables.append([(line, list(columns) if len(cells) == len(columns) else cells)])
-            if not is_printed_table(cells):
+        titled = is_printed_table(cells)
+        if titled and columns and len(cells) != len(columns):
+            problem = f"--column names {len(columns)} columns, and the table has {len(cells)}"
+            raise InputError(None, f"line {line}", problem, "Name each, - for one that is not read")
+        if titled or (columns and len(cells) == len(columns) and not tables):
+            tables.append([(line, list(columns) or cells)])
+            if not titled:
                 tables[-1].append((line, cells))
             open_one, broken = True, 0
         elif open_one:
@@ -165,16 +213,13 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
                 tables[-1][0] = line, _with_units(header, cells)
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
-            elif len(cells) != len(header) and not _numeric(filled):
-                open_one = False
-            elif broken and not _numeric(filled):
+            elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
                 open_one = False
             elif broken and len(tables[-1]) > 1 and _numeric(filled):
                 raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
             else:
                 tables[-1].append((line, cells))
-    tables = [_trimmed(table) for table in tables if len(table) > 1]
-    return tables or _turned(grid)
+    return [table for table in tables if len(table) > 1] or _turned(grid)
 
 
 def _numeric(cells: list[str]) -> bool:
@@ -220,58 +265,61 @@ class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
-        self.path, self.notes = path, list[str]()
+        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
-        self.headings = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
-        self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
-        self.given = self._given(from_code)
-        self.convention = self._stated(text)
-        self._check_headings()
+        check_widths(path, [(0, self.header), *self.rows])
+        found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
+        if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
+            found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
+        labels = [k for k, own in found.items() if own.quantity == "joint"]
+        self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
         self.column = {own.quantity: k for k, own in self.headings.items()}
+        self._check_headings()
+        self.convention = self._stated(text)
+        self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.given = (elements(self.text) if from_code else {}) | self._given()
+        self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
+        self.kinds = self._kinds()
+        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+
+    def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
+        place = f"column {self.header[k]}"
+        raise InputError(self.path, place if row is None else f"row {self.rows[row][0]}, {place}", problem, remedy)
 
     def _check_headings(self) -> None:
-        names: dict[str, int] = {}
-        if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
-            self.headings[self.header.index("theta_deg")] = Heading("theta", "deg", False)
-        if {"d", "r"} <= {own.sign for own in self.headings.values()}:
-            order = [own.sign if own.sign in "dr" else own.quantity for own in self.headings.values()]
-            if [each for each in order if each in ("alpha", "d", "theta", "r")] == ["alpha", "d", "theta", "r"]:
-                remedy = "--column says them: a for d and d for r (Khalil), or d and a (r is the link's length)"
-                raise InputError(self.path, "columns d, r", "either can be the link's length", remedy)
-        labels = [k for k, own in self.headings.items() if own.quantity == "joint"]
-        for k in labels[:-1]:
-            del self.headings[k]
+        """Refuse two columns of one quantity, and d beside r, of which either can be the link's length."""
         for k, own in self.headings.items():
-            if own.quantity in names:
-                problem = f"columns '{self.header[names[own.quantity]]}' and '{self.header[k]}' both mean {own.quantity}"
+            if k != self.column[own.quantity]:
+                other = self.header[self.column[own.quantity]]
                 remedy = "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha"
-                raise InputError(self.path, f"line {self.rows[0][0]}", problem, remedy)
-            names[own.quantity] = k
+                self._refuse(None, k, f"it and column '{other}' both mean {own.quantity}", remedy)
+        signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
+        if [each for each in signs if each in ("alpha", "d", "theta", "r")] == ["alpha", "d", "theta", "r"]:
+            remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
+            self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
     def _stated(self, text: str) -> Convention | None:
         """The convention that headings, the library, or the text around the table says."""
-        before = {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")}
         if "convention" in self.header:
             return None
-        if before == {True}:
+        if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
         said = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        said |= {"modified"} if _MODIFIED.search(text) else set()
-        said |= {"standard"} if _STANDARD.search(text) else set()
-        if len(said) != 1:
-            return None
-        self.notes.append(f"the text says {min(said)} D-H, and was read so")
-        return "modified" if "modified" in said else "standard"
+        said |= {name for name, sign in SIGNS.items() if sign.search(text)}
+        for one in CONVENTIONS if len(said) == 1 else ():
+            if one in said:
+                self.notes.append(f"the text says {one} D-H, and was read so")
+                return one
+        return None
 
-    def _given(self, from_code: bool) -> dict[str, str]:
+    def _given(self) -> dict[str, str]:
         """Values of symbols, as expressions; a symbol with two values has none."""
-        found: dict[str, str] = elements(self.text) if from_code else {}
+        found: dict[str, str] = {}
         for name, value, unit in _GIVEN.findall(self.text):
-            if re.search(r"[\[\"']|\(\)$", value):
-                continue
-            symbol, value = name_of(name), f"({value}) {unit}" if unit else value.strip()
-            found[symbol] = value if found.get(symbol, value) == value else "two values"
+            if not re.search(r"[\[\"']|\(\)$", value):
+                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.strip()
+                found[symbol] = value if found.get(symbol, value) == value else "two values"
         for names, values in re.findall(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$", self.text):
             if names.count(",") == values.count(","):
                 found |= dict(zip(map(name_of, names.split(",")), map(str.strip, values.strip(" ;").split(","))))
@@ -285,54 +333,49 @@ class _Table:
         table : its lines as those of a file, the header first. Offsets and directions come from cells such as
             ``q2-90``. The convention is modified if a and alpha belong to link i-1, and no column names another one.
         """
-        check_widths(self.path, [(0, self.header), *self.rows])
-        amounts = {k: self._amounts(k) for k, own in self.headings.items() if own.quantity not in ("joint", "type")}
-        kinds = self._kinds(amounts)
-        columns: dict[str, list[str]] = {"joint": self._joints(kinds, amounts)}
         unused = []
         for k, name in enumerate(self.header):
             own = self.headings.get(k)
-            cells = [cells[k] for _, cells in self.rows]
-            if own is None and name not in OWN and re.sub(r"_(m|in|cm|rad)(_s)?$", "", name) not in _STEMS:
-                if difflib.get_close_matches(name.lower(), OWN, n=1, cutoff=0.8):
-                    columns[name] = cells
-                elif name:
-                    unused.append(name)
-            elif own is None:
-                columns[name] = cells
-            elif own.quantity == "theta":
-                self._theta(k, kinds, amounts, columns)
-            elif own.quantity not in ("joint", "type"):
-                self._plain(k, own, kinds, amounts, columns)
-        if set(kinds) - {"revolute"} or "type" in columns:
-            columns["type"] = kinds
+            stem = re.sub(r"_(m|in|cm|rad|mm|deg)(_s)?$", "", name)
+            if own and own.quantity == "theta":
+                self._theta(k)
+            elif own and own.quantity not in ("joint", "type"):
+                self._constants(k, own.quantity)
+            elif own is None and (stem in OWN or difflib.get_close_matches(stem.lower(), OWN, n=1, cutoff=0.8)):
+                self.columns[name] = [cells[k] for _, cells in self.rows]
+            elif own is None and name:
+                unused.append(name)
+        signs = [self._variable(row)[1] for row in range(len(self.rows))]
+        if min(signs) < 0:
+            if "direction" in self.header:
+                self._refuse(None, self.header.index("direction"), "signs of variables are directions too", "Keep one")
+            self.columns["direction"] = ["-1" if sign < 0 else "1" for sign in signs]
+        if set(self.kinds) - {"revolute"} or "type" in self.columns:
+            self.columns["type"] = self.kinds
         if self.convention:
-            columns["convention"] = [self.convention] * len(kinds)
+            self.columns["convention"] = [self.convention] * len(self.kinds)
         if unused:
             self.notes.append(f"not used: {', '.join(unused)}")
-        numbers = [number for number, _ in self.rows]
-        made = [(number, list(cells)) for number, cells in zip(numbers, zip(*columns.values()))]
-        return PrintedTable([(0, list(columns)), *made], tuple(self.notes), frozenset(self.unsaid))
-
-    def _where(self, row: int, k: int) -> str:
-        return f"row {self.rows[row][0]}, column {self.header[k]}"
+        made = [(line, list(cells)) for (line, _), cells in zip(self.rows, zip(*self.columns.values()))]
+        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid))
 
     def _amounts(self, k: int) -> list[Amount | None]:
         """The amounts of a column's cells; None for an empty one."""
         cells = [cells[k] for _, cells in self.rows]
+        if self.headings[k].quantity == "type":
+            return []
         commas = [found for cell in cells if (found := _COMMA.fullmatch(cell.strip()))]
         thousands = [found[0] for found in commas if len(found[2]) == 3 and found[1].strip("+-") != "0"]
         if thousands and len(thousands) == len(commas):
             remedy = "Write a number with a point before decimals and nothing between thousands"
-            raise InputError(self.path, f"column {self.header[k]}", f"'{thousands[0]}' is not a number", remedy)
-        return [self._amount(row, k, _COMMA.sub(r"\1.\2\3", cell) if commas else cell) for row, cell in enumerate(cells)]
+            self._refuse(None, k, f"'{thousands[0]}' is not a number", remedy)
+        cells = [_COMMA.sub(r"\1.\2\3", cell) for cell in cells] if commas else cells
+        return [self._amount(row, k, cell) for row, cell in enumerate(cells)]
 
     def _amount(self, row: int, k: int, cell: str) -> Amount | None:
-        text = re.sub(r"\(t\)", "", plain(without_latex(cell)).strip()).rpartition("=")[2]
-        text = re.sub(r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1", text, flags=re.IGNORECASE)
-        text = re.sub(r"\*+(?=$|\s*[-+])", "", text).strip() or ("q" if text.strip() else "")
-        text = "q" if _VARIES.fullmatch(text.lower()) else text
-        text = re.sub(r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)", text)
+        text = plain(without_latex(cell)).strip().rpartition("=")[2]
+        for pattern, plainly in _CELL:
+            text = re.sub(pattern, plainly, text, flags=re.IGNORECASE)
         if not text:
             return None
         given = self.given
@@ -342,52 +385,57 @@ class _Table:
             found = amount_of(text, given)
         except ValueError as error:
             remedy = "Write a number without a unit, or arithmetic with pi and names whose values are given"
-            raise InputError(self.path, self._where(row, k), f"'{cell}' {error}", remedy) from None
+            self._refuse(row, k, f"'{cell}' {error}", remedy)
         names = {name: times for name, times in found.variables.items() if times}
         if len(names) > 1:
-            remedy = f"Write one variable and a number, or values as {next(iter(names))} = ... below the table"
-            raise InputError(self.path, self._where(row, k), f"'{cell}' holds two variables", remedy)
-        if names and abs(next(iter(names.values()))) != 1.0:
-            raise InputError(self.path, self._where(row, k), f"'{cell}' is not a number", "Write a number")
+            self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
+        if {*map(abs, names.values())} - {1.0}:
+            self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)
 
-    def _kinds(self, amounts: dict[int, list[Amount | None]]) -> list[str]:
+    def _kinds(self) -> list[str]:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
-        variable although others have one, or no number although others have one."""
+        variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
             return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
-        turns, slides = ([self._variable(amounts, name, row) != "" for row in range(len(self.rows))] for name in ("theta", "d"))
-        names = [cells[self.column["joint"]] if "joint" in self.column else "" for _, cells in self.rows]
+        turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
+        starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
+        moving = any(turns) or any(starred)
+        names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
         ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name.lower()}
         ends = ends if ends <= {0, len(names) - 1} and len(ends) < len(names) else set()
-        starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         found = []
-        for row, (turned, slid, star, name) in enumerate(zip(turns, slides, starred, names)):
-            still = any(turns) or any(starred) or row in ends and name.strip()
-            fixed = "tool" if _TOOL.search(name.lower()) else "fixed"
-            sliding = slid and (star or any(turns))
-            found.append("revolute" if turned else "prismatic" if sliding else fixed if still else "revolute")
-            said = _BY_NAME.search(name.strip())
-            if said and (_KINDS[said[1].lower()] == "prismatic") != (found[-1] == "prismatic"):
-                problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {found[-1]} by its variable"
-                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Write the variable into theta or d")
+        for row, name in enumerate(names):
+            kind = "tool" if _TOOL.search(name.lower()) else "fixed"
+            if turns[row] or not (moving or (row in ends and name)):
+                kind = "revolute"
+            elif slides[row] and (starred[row] or any(turns)):
+                kind = "prismatic"
+            said = _BY_NAME.search(name)
+            if said and (_KINDS[said[1].lower()] == "prismatic") != (kind == "prismatic"):
+                problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {kind} by its variable"
+                self._refuse(row, self.column["joint"], problem, "Write the variable into theta or d")
+            found.append(kind)
         return found
 
-    def _variable(self, amounts: dict[int, list[Amount | None]], quantity: str, row: int) -> str:
-        """The name of a cell's variable, "" if it has none."""
-        found = amounts[self.column[quantity]][row] if quantity in self.column else None
-        return next(iter(found.variables), "") if found else ""
+    def _of(self, quantity: str) -> list[Amount | None]:
+        return self.amounts.get(quantity) or [None] * len(self.rows)
 
-    def _joints(self, kinds: list[str], amounts: dict[int, list[Amount | None]]) -> list[str]:
+    def _variable(self, row: int) -> tuple[str, float]:
+        """Name and sign of the variable of a row's joint."""
+        found = self._of("d" if self.kinds[row] == "prismatic" else "theta")[row]
+        return next(iter(found.variables.items()), ("", 1.0)) if found else ("", 1.0)
+
+    def _joints(self) -> list[str]:
         """The number of each row's joint, "" where nothing moves.
 
         The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the
         table's numbers may be those of its rows; they become those of its joints.
         """
-        moving = [row for row, kind in enumerate(kinds) if kind not in FIXED]
-        names = [self._variable(amounts, "d" if kinds[row] == "prismatic" else "theta", row) for row in moving]
-        variables = [int(found[0]) if (found := re.search(r"\d+$", name)) else None for name in names]
+        moving = [row for row, kind in enumerate(self.kinds) if kind not in FIXED]
+        numbers = [re.search(r"\d+$", self._variable(row)[0]) for row in moving]
+        variables = [int(number[0]) if number else None for number in numbers]
         start = 0 if variables[:1] == [0] else 1
         for joint, (row, number) in enumerate(zip(moving, variables), start):
             if number not in (None, joint):
@@ -396,80 +444,65 @@ class _Table:
         order = [str(joint) for joint in range(1, len(moving) + 1)]
         labels = order
         if (k := self.column.get("joint")) is not None:
-            texts = [plain(self.rows[row][1][k]) for row in moving]
-            labels = [_label(text) for text in texts]
-            numbers = {int(label) - row for row, label in enumerate(labels) if label.isdecimal()}
-            by_row = {int(label) - row for label, row in zip(labels, moving) if label.isdecimal()}
-            all_numbered = all(map(str.isdecimal, labels))
-            if all_numbered and len(moving) < len(kinds) and len(by_row) == 1:
-                labels = order
-            elif all_numbered and numbers == {0}:
+            labels = [_label(plain(self.rows[row][1][k])) for row in moving]
+            numbered = [int(label) for label in labels if label.isdecimal()]
+            from_zero = numbered == list(range(len(labels)))
+            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
+            if from_zero:
                 self.notes.append("joints are numbered from 0")
-                labels = order
-            elif not any(map(_NUMBERED.search, texts)):
+            if from_zero or not numbered or (by_row and len(numbered) == len(labels)):
                 labels = order
         found = dict(zip(moving, labels))
-        return [found.get(row, "") for row in range(len(kinds))]
+        return [found.get(row, "") for row in range(len(self.kinds))]
 
-    def _plain(self, k: int, own: Heading, kinds: list[str], amounts: dict[int, list[Amount | None]], columns: dict[str, list[str]]) -> None:
+    def _constants(self, k: int, quantity: str) -> None:
         """A column of constants; a sliding joint's d keeps the constant beside its variable."""
-        for row, (found, kind) in enumerate(zip(amounts[k], kinds)):
-            if found and found.variables and not (own.quantity == "d" and kind == "prismatic"):
-                name = next(iter(found.variables))
-                known = "two" if self.given.get(name) else "no"
-                raise InputError(self.path, self._where(row, k), f"'{name}' has no value", f"Write {name} = ... below the table")
-        self._add(k, own.quantity, amounts[k], columns)
+        for row, (found, kind) in enumerate(zip(self.amounts[quantity], self.kinds)):
+            if found and found.variables and not (quantity == "d" and kind == "prismatic"):
+                name = min(found.variables)
+                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
+        self._add(k, quantity, self.amounts[quantity])
 
-    def _theta(self, k: int, kinds: list[str], amounts: dict[int, list[Amount | None]], columns: dict[str, list[str]]) -> None:
-        """Directions and offsets of joints that turn, and theta of those that slide."""
-        sliding = [kind == "prismatic" for kind in kinds]
-        found = [each or Amount(0.0) for each in amounts[k]]
+    def _theta(self, k: int) -> None:
+        """Offsets of joints that turn, and theta of those that slide."""
+        sliding = [kind == "prismatic" for kind in self.kinds]
+        found = [each or Amount(0.0) for each in self.amounts["theta"]]
         turning = [None if slides else each for slides, each in zip(sliding, found)]
-        offsets = [f"joint {joint} {self.rows[row][1][k].strip()}" for row, (joint, each) in enumerate(zip(columns["joint"], turning)) if joint and each and each.number]
+        rows = zip(self.columns["joint"], turning, self.rows)
+        offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
         if "offset" not in self.column:
-            self._add(k, "offset", turning, columns)
+            self._add(k, "offset", turning)
             if offsets:
                 self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
         elif offsets:
-            raise InputError(self.path, f"column {self.header[k]}", f"{offsets[0]}: another column holds offsets too", "Keep one")
+            self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
         if any(sliding):
-            self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)], columns)
-        signs = [next(iter(each.variables.values()), 1.0) for each in found]
-        if min(signs) < 0:
-            if "direction" in self.header:
-                problem = "another column holds directions too"
-                raise InputError(self.path, f"column {self.header[k]}", problem, "Keep one")
-            columns["direction"] = ["-1" if sign < 0 else "1" for sign in signs]
+            self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 
-    unsaid: frozenset[str] = frozenset()
-
-    def _add(self, k: int, name: str, found: list[Amount | None], columns: dict[str, list[str]]) -> None:
+    def _add(self, k: int, name: str, found: list[Amount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
         length = name in ("a", "d")
-        units = {each.unit for each in found if each and each.unit and each.number}
         for row, each in enumerate(found):
             if each and each.unit and (each.unit in PER_MM) != length:
-                raise InputError(self.path, self._where(row, k), f"'{self.rows[row][1][k]}' is in {each.unit}", f"That is no unit of {name}")
-        said = self.headings[k].unit or (min(units) if len(units) == 1 else "")
-        if not said and len(units) > 1:
-            said = "mm" if length else "deg"
-        bare = [abs(each.number) for each in found if each and not each.unit and each.number]
-        unit = said or ("mm" if length else self._angle_unit(bare))
-        if unit == "rad" and not self.headings[k].unit and max(bare, default=0.0) > 2 * math.pi:
-            problem = f"{max(bare):g} among fractions of pi: degrees, or radians?"
-            raise InputError(self.path, f"column {self.header[k]}", problem, "Write all its angles in one unit")
-        if not said and not (unit == "rad"):
-            self.unsaid |= {f"{name}_{unit}"}
-        columns[f"{name}_{unit}"] = ["" if each is None else repr(_in(each, unit)) for each in found]
+                self._refuse(row, k, f"'{self.rows[row][1][k]}' is in {each.unit}", f"That is no unit of {name}")
+        units = sorted({each.unit for each in found if each and each.unit and each.number})
+        bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
+        unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
+        if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
+            unit = "rad"
+        if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
+            problem = f"{bare:g} among values in {' and '.join(units)}: which unit?"
+            self._refuse(None, k, problem, "Write all its values in one unit")
+        column = f"{name}_{unit or ('mm' if length else 'deg')}"
+        if not unit and not units:
+            self.unsaid.add(column)
+        unit = column.rpartition("_")[2]
+        self.columns[column] = ["" if each is None else repr(_in(each, unit)) for each in found]
 
-    def _angle_unit(self, numbers: list[float]) -> str:
-        """Radians for small angles of a table that has others in radians; else degrees."""
-        texts = [cell for _, cells in self.rows for cell in cells]
-        radians = any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in map(str.lower, texts))
-        return "rad" if radians and max(numbers, default=0.0) < RADIANS_BELOW_DEG else "deg"
-
-
-_STEMS = {re.sub(r"_(mm|deg)(_s)?$", "", each) for each in OWN if each.endswith(("_mm", "_deg", "_s"))}
+    def _has_radians(self) -> bool:
+        """Whether other columns are in radians, whose small angles are radians then."""
+        texts = [cell.lower() for _, cells in self.rows for cell in cells]
+        return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
 
 
 def _in(amount: Amount, unit: str) -> float:

@@ -14,6 +14,7 @@ Row = tuple[int, list[str]]
 """The number of a line in the text, and its cells."""
 Grid = list[Row]
 
+LONGEST_LINE = 2000
 MARKS = "|", "│", "┃", "║", "\t", ";", ",", "  ", " "
 """What separates cells, tried in this order; two blanks, then one, last."""
 _BOX = re.compile(r"[─━═│┃║┌┐└┘├┤┬┴┼╔╗╚╝╠╣╦╩╬╒╕╘╛╞╡╤╧╪╭╮╰╯+|:=\s_-]*")
@@ -96,14 +97,18 @@ def html_grids(text: str) -> list[Grid]:
         return []
     page = _Html()
     page.feed(text)
-    return [[(line, [re.sub(r"\s+", " ", cell).strip().replace("^o", "°") for cell in row]) for line, row in grid]
-            for grid in page.grids]
+    return [
+        [(line, [re.sub(r"\s+", " ", cell).strip().replace("^o", "°") for cell in row]) for line, row in grid]
+        for grid in page.grids
+    ]
 
 
 def latex_grids(text: str) -> list[Grid]:
     """The tables and arrays of a LaTeX text."""
     found = []
-    for body in re.finditer(r"\\begin\s*\{(tabular[xy*]?|array|longtable|tabu|tblr)\}(.*?)\\end\s*\{\1\}", text, re.S):
+    for body in re.finditer(
+        r"\\begin\s*\{(tabular[xy*]?|array|longtable|tabu|tblr)\}(.{0,20000}?)\\end\s*\{\1\}", text, re.S
+    ):
         start = text.count("\n", 0, body.start()) + 1
         grid: Grid = []
         given = 2 if body[1] in ("tabularx", "tabular*") else 1
@@ -116,24 +121,27 @@ def latex_grids(text: str) -> list[Grid]:
     return found
 
 
-def line_grids(text: str) -> Iterator[Grid]:
+def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     """A text's lines cut into cells, by each separator that is in it.
 
     Yields
     ------
-    grid : a grid for each separator; lines without it have one cell
+    mark, grid : a separator, and the lines cut by it; lines without it have one cell
     """
     text = plain(text)
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
-    lines = [(number, line) for number, line in enumerate(broken.splitlines(), 1) if line.strip(" \t|;,")]
+    lines = [
+        (number, line)
+        for number, line in enumerate(broken.splitlines(), 1)
+        if line.strip(" \t|;,") and len(line) < LONGEST_LINE
+    ]
     for mark in MARKS:
-        if mark in "|│┃║":
-            kept = [(number, line) for number, line in lines if not _BOX.fullmatch(line)]
-            yield [(number, _edged(line, mark)) for number, line in kept] if any(mark in x for _, x in kept) else []
-        elif mark in ";,\t":
-            yield _delimited(text, mark) if mark in text else []
-        else:
-            yield [(number, _spaced(without_latex(line), mark)) for number, line in lines]
+        if mark in ";,\t":
+            yield mark, _delimited(text, mark)
+        elif mark.isspace():
+            yield mark, [(number, _spaced(without_latex(line), mark)) for number, line in lines]
+        elif mark in text:
+            yield mark, [(number, _edged(line, mark)) for number, line in lines if not _BOX.fullmatch(line)]
 
 
 def _edged(line: str, mark: str) -> list[str]:

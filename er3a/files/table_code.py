@@ -13,7 +13,9 @@ from er3a.files.table_headings import heading_of
 _COMMENT = re.compile(
     r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
 )
-_BLOCK = re.compile(r"(?ms)^[ \t]*%\{[ \t]*$.*?^[ \t]*%\}|\"\"\".*?\"\"\"|\'\'\'.*?\'\'\'|/\*.*?\*/")
+_BLOCK = re.compile(
+    r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
+)
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
 _ORDERS = {
@@ -34,6 +36,7 @@ LIBRARIES = {
 }
 """Columns of a matrix, and the convention, by a name of the library that takes it."""
 _INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
+LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
@@ -82,6 +85,8 @@ def groups_of(text: str) -> list[Group]:
             open_ones.append(place)
         elif open_ones and _CLOSING[text[open_ones[-1]]] == bracket[0]:
             start = open_ones.pop()
+            if place - start > LONGEST_GROUP:
+                continue
             before = text[max(0, start - 80) : start]
             found.append(Group(start, place, text[start], text[start + 1 : place], before))
     return found
@@ -120,7 +125,7 @@ def _rows(group: Group) -> list[list[str]]:
     if len(inner) > 1 and all(each[0] in "[(" and each[-1] in "])" for each in inner):
         return [row_cells(each[1:-1]) for each in inner]
     lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-    if group.bracket != "[" or len(lines) < 2 or ";" not in group.inside and any(map(_goes_on, lines[:-1])):
+    if group.bracket != "[" or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
         return []
     return [row_cells(each.strip().strip("[],")) for each in lines]
 
@@ -158,15 +163,15 @@ def _calls(code: Code, groups: list[Group]) -> list[Grid]:
     for each in sorted(groups, key=lambda group: group.start):
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket == "(" and named and (cells := _arguments(named[2], each.inside)) is not None:
-            target = "" if named[1] is None or named[1].isidentifier() and cells.get("type") is None else named[1]
+            target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
     _assigned(code, rows)
-    cells = [cell for row in rows for cell in row.cells.values()]
-    if any(re.fullmatch(r"\w+\[\d\]", cell) for cell in cells):  # of a matrix, by rows
+    texts = [cell for row in rows for cell in row.cells.values()]
+    if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
         return []
-    if any(map(_INDEXED.search, (*cells, *(row.name for row in rows)))):
+    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
         return [_looped(code, rows)]
-    if rows and (".extend(" in code.text or len(rows) == 1 and re.search(r"\bfor\b", code.text)):
+    if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
         problem = "links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
@@ -186,7 +191,7 @@ def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
     """Links by the arms that they belong to: a name that is used again begins another arm."""
     arms: list[list[_Link]] = []
     for row in rows:
-        if not arms or row.name and any(row.name == other.name for other in arms[-1]):
+        if not arms or (row.name and any(row.name == other.name for other in arms[-1])):
             arms.append([])
         arms[-1].append(row)
     return arms
@@ -221,7 +226,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
         cells |= dict(zip(_ORDERS[low], given))
-    elif given or low == "link" and not cells:
+    elif given or (low == "link" and not cells):
         return None
     return _of_toolbox(low, words, cells)
 
@@ -266,7 +271,7 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
     columns = {key: lists[each[1]] for key, each in found.items() if each and each[1] in lists}
     lengths = {len(values) for values in columns.values()}
     counts = {int(each) for each in re.findall(r"(?:range\(|(?:=|in)\s*1\s*:\s*)(\d+)", code.text)}
-    if len(rows) > 1 or len(lengths) != 1 or counts and not counts & lengths:
+    if len(rows) > 1 or len(lengths) != 1 or (counts and not counts & lengths):
         problem = f"links are made in a loop, of lists with {', '.join(map(str, sorted(lengths)))} numbers"
         raise InputError(None, f"line {line}", f"{problem}, and otherwise", "Write a row for each joint")
     return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
@@ -307,7 +312,11 @@ def _blocks(code: Code) -> list[Grid]:
             rows.append((number, label))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [(line, cells) for line, cells in rows if {"alpha", "d"} <= {each.quantity for key in cells if (each := heading_of(key))}]
+    full = [
+        (line, cells)
+        for line, cells in rows
+        if {"alpha", "d"} <= {each.quantity for key in cells if (each := heading_of(key))}
+    ]
     return [_grid(full)] if len(full) > 1 else []
 
 
@@ -330,17 +339,19 @@ def _matrix(code: Code, group: Group) -> Grid:
     """A matrix with the names of its columns, as a comment or the library that takes it says them."""
     rows = _rows(group)
     widths = {len(row) for row in rows}
-    if len(rows) < 2 or len(widths) > 1 or not 3 <= max(widths) <= 8 or any(re.match(r"[\[{(]|.*:", x) for x in rows[0]):
+    if len(rows) < 2 or len(widths) > 1 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0]):
+        return []
+    (width,) = widths
+    if not 3 <= width <= 8:
         return []
     first, last = code.line(group.start), code.line(group.end)
-    width = max(widths)
     header = _order(code, first, last, width)
     lines = _row_lines(code, first, last, len(rows))
     labels = [code.comments.get(line, "") for line in lines]
-    if header and len({*lines}) == len(rows) and all(re.search(r"[^\W\d_]", each) for each in labels):
-        if "joint" not in header and not any(heading_of(each) for each in labels):
-            header = ["joint", *header]
-            rows = [[label, *row] for label, row in zip(labels, rows)]
+    named = header and "joint" not in header and len({*lines}) == len(rows)
+    if named and all(re.search(r"[^\W\d_]", each) and not heading_of(each) for each in labels):
+        header = ["joint", *header]
+        rows = [[label, *row] for label, row in zip(labels, rows)]
     return [(0, header), *zip(lines, rows)]
 
 
@@ -351,7 +362,11 @@ def _listed(code: Code, groups: list[Group]) -> list[Grid]:
         label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:)\s*$", group.before)
         if group.bracket == "[" and label and "[" not in group.inside:
             cells = row_cells(group.inside)
-            if 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells) and (not rows or len(cells) == len(rows[0][1]) - 1):
+            if (
+                4 <= len(cells) <= 8
+                and all(re.search(r"\d|pi|π", cell) for cell in cells)
+                and (not rows or len(cells) == len(rows[0][1]) - 1)
+            ):
                 rows.append((code.line(group.start), [label[1] or "", *cells]))
     if len(rows) < 2:
         return []
@@ -376,7 +391,7 @@ def _order(code: Code, first: int, last: int, width: int) -> list[str]:
             quantities = [found.quantity for word in window if (found := heading_of(word))]
             if len({*quantities}) == width and {"a", "alpha", "d"} <= {*quantities}:
                 return window
-    for library, (order, convention) in LIBRARIES.items():
+    for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
         if library in code.text and len(names) >= width and width >= 4:
             return names[:width]
@@ -384,7 +399,7 @@ def _order(code: Code, first: int, last: int, width: int) -> list[str]:
 
 
 def elements(text: str) -> dict[str, str]:
-    """The elements of a program's lists by their names: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1``, ``d0``."""
+    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``."""
     return {
         f"{name}{number}": cell
         for name, cells in _lists(code_of(text)).items()

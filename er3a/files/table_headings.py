@@ -4,13 +4,28 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from er3a.files.arithmetic import UNITS, plain
 
 QUANTITIES = ("joint", "theta", "d", "a", "alpha", "offset", "beta", "type")
 _JOINT = {"joint", "joints", "link", "links", "axis", "i", "j", "n", "no", "no.", "#", "frame", "gelenk", "achse"}
 _JOINT |= {"jointi", "linki", "jointno", "jointno.", "linkno", "linkno.", "linknumber", "jointnumber", "kinematics"}
-_JOINT |= {"关节", "连杆", "轴", "序号", "关节序号", "关节号", "连杆序号", "关节i", "连杆i", "杆件", "joint#", "link#", "articulation"}
+_JOINT |= {
+    "关节",
+    "连杆",
+    "轴",
+    "序号",
+    "关节序号",
+    "关节号",
+    "连杆序号",
+    "关节i",
+    "连杆i",
+    "杆件",
+    "joint#",
+    "link#",
+    "articulation",
+}
 _NAMES = {"a": "a", "r": "a", "l": "a", "d": "d", "q": "theta", "th": "theta", "t": "", "offset": "offset"}
 _NAMES |= {"type": "type", "jointtype": "type", "sigma": "type", "σ": "type", "类型": "type", "theta0": "offset"}
 _NAMES |= {"θ0": "offset", "offsets": "offset", "relativeoffset": "offset"}
@@ -45,6 +60,7 @@ _WORDS = (
 """Each marks a heading that holds it; the first that is found counts."""
 _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
 _PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|speed)_\w+|(?:beta|theta)_(?:deg|rad)")
+_LETTER = re.compile(r"[^\W\d_]|#")
 _BEFORE = re.compile(r"[ijn]-1")
 
 
@@ -59,6 +75,7 @@ class Heading:
     sign: str = ""
 
 
+@lru_cache(maxsize=4096)
 def heading_of(text: str) -> Heading | None:
     """What a column heading of a D-H table means.
 
@@ -72,7 +89,7 @@ def heading_of(text: str) -> Heading | None:
     """
     if own := _OURS.fullmatch(text):
         return Heading(own[1] or own[2], own[3] or "", False)
-    if _PRIVATE.fullmatch(text) or len(text) > 60:
+    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text):
         return None
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
     said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]

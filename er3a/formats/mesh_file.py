@@ -245,11 +245,15 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
     InputError
         as of :func:`read_raw`, or if it is not UTF-8 (with the number of the byte)
     """
-    return text_of(path, read_raw(path, most, too_large))
+    return text_of(path, read_raw(path, most, too_large), "utf-8-sig")
 
 
-def text_of(path: Path, raw: bytes) -> str:
+def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
     """The text that a file's bytes are.
+
+    Parameters
+    ----------
+    encoding : by default UTF-8, or UTF-16 where a byte order mark says so, as spreadsheets write it
 
     Returns
     -------
@@ -258,9 +262,9 @@ def text_of(path: Path, raw: bytes) -> str:
     Raises
     ------
     InputError
-        if they are not UTF-8 (with the number of the byte)
+        if they are in another encoding (with the number of the byte)
     """
     try:
-        return raw.decode("utf-8-sig")
+        return raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None

@@ -16,10 +16,12 @@ from er3a.pipeline.commands.options import (
     Angles,
     AsJson,
     Base,
+    Columns,
     Lengths,
     Tip,
     Xacro,
     app,
+    columns_of,
     print_json,
     print_note,
 )
@@ -33,7 +35,7 @@ MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
 TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
-_ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
+_ARM = "a D-H table in any form (- is standard input), a robot's name or file, a URDF or xacro"
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
@@ -44,6 +46,7 @@ def compare(
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Lengths = None,
     angle_unit: Angles = None,
+    column: Columns = None,
     base: Base = None,
     tip: Tip = None,
     xacro: Xacro = None,
@@ -59,9 +62,11 @@ def compare(
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
+    if a == b == "-":
+        raise Er3aError("standard input holds one table; give A or B as a file")
     _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip, "as_printed": True}
+    options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
     folder = Path(b)
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
