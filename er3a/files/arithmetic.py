@@ -153,7 +153,8 @@ class _Reader:
             self.take()
             if self.peek() == "°":  # ^° of LaTeX
                 return self.with_unit(found)
-            exponent = self.signed()
+            sign = -1 if self.peek() == "-" and self.take() else 1
+            exponent = _product(Amount(sign), self.atom())
             if found.variables or exponent.variables or found.unit or exponent.unit:
                 raise ValueError("raises what is no plain number")
             try:

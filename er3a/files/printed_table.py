@@ -175,6 +175,9 @@ def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
+    bare = code_grids(text, headed=False) if columns else []
+    if tables := [table for grid in bare for table in _headed(grid, columns)]:
+        return tables, True
     page = html_grids(text) or latex_grids(text)
     if tables := [table for grid in page for table in _headed(grid, columns)]:
         return tables, False
@@ -184,8 +187,6 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
         if tables := _headed(grid, columns):
             return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
     if bare := code_grids(text, headed=False):
-        if columns:
-            return [table for grid in bare for table in _headed([(0, list(columns)), *grid], columns)], True
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
@@ -450,7 +451,7 @@ class _Table:
             by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
             if from_zero:
                 self.notes.append("joints are numbered from 0")
-            if from_zero or not numbered or (by_row and len(numbered) == len(labels)):
+            if from_zero or by_row or len(numbered) < len(labels):  # names such as Elbow, Wrist 1 say no order
                 labels = order
         found = dict(zip(moving, labels))
         return [found.get(row, "") for row in range(len(self.kinds))]
