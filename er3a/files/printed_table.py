@@ -186,6 +186,8 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     for mark, grid in line_grids(text):
         if tables := _headed(grid, columns):
             return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
+    if tables := [table for grid in _stacked(text) for table in _headed(grid, columns)]:
+        return tables, False
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -238,8 +240,10 @@ def _with_units(header: list[str], cells: list[str]) -> list[str]:
 def _trimmed(table: Grid) -> Grid:
     """A table without what follows its last known column, where headings or cells hold blanks."""
     header = table[0][1]
-    if all(len(cells) == len(header) + 1 and _NAMED.fullmatch(cells[0]) for _, cells in table[1:]):
-        header = ["joint", *header]  # a column of names that has no heading
+    firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
+    counted = firsts in ([str(n + start) for n in range(len(table) - 1)] for start in (0, 1))
+    if counted or (len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts))):
+        header = ["joint", *header]  # a column of names or numbers that has no heading
         table = [(table[0][0], header), *table[1:]]
     widths = {len(cells) for _, cells in table}
     known = [bool(heading_of(name)) for name in header]
@@ -247,6 +251,22 @@ def _trimmed(table: Grid) -> Grid:
     if len(widths) > 1 and all(known[1:last]) and min(widths) >= last < len(header):
         return [(line, cells[:last]) for line, cells in table]
     return table
+
+
+def _stacked(text: str) -> list[Grid]:
+    """A table that was copied with each cell on a line of its own."""
+    lines = [(n, line) for n, line in enumerate(without_latex(plain(text)).split("\n"), 1) if line.strip()]
+    known = [heading_of(line.strip()) is not None for _, line in lines]
+    for start, width in ((k, w) for k in range(len(lines)) if all(known[k : k + 4]) for w in (6, 5, 4)):
+        cells = [line.strip() for _, line in lines[start:]]
+        if not is_printed_table(cells[:width]) or not all(known[start : start + width]):
+            continue
+        rows = [cells[place : place + width] for place in range(width, len(cells), width)]
+        good = next((n for n, row in enumerate(rows) if len(row) < width or not _numeric(row)), len(rows))
+        if good < len(rows) and re.fullmatch(r"[-\d.]+", rows[good][0]):
+            raise InputError(None, f"line {lines[start][0]}", "cells are missing in the last row", "Add them")
+        return [[(lines[start + n * width][0], row) for n, row in enumerate([cells[:width], *rows[:good]])]]
+    return []
 
 
 def _turned(grid: Grid) -> list[Grid]:

@@ -17,7 +17,7 @@ Grid = list[Row]
 LONGEST_LINE = 2000
 MARKS = "|", "│", "┃", "║", "\t", ";", ",", "  ", " "
 """What separates cells, tried in this order; two blanks, then one, last."""
-_BOX = re.compile(r"[─━═│┃║┌┐└┘├┤┬┴┼╔╗╚╝╠╣╦╩╬╒╕╘╛╞╡╤╧╪╭╮╰╯+|:=\s_-]*")
+_BOX = re.compile(r"[─━═│┃║┌┐└┘├┤┬┴┼╔╗╚╝╠╣╦╩╬╒╕╘╛╞╡╤╧╪╭╮╰╯┏┓┗┛┣┫┳┻╋━+|:=\s_-]*")
 _UNIT = r"(?:mm|cm|m|in|inch|deg\w*|rad\w*|°|毫米|米|度)"
 _LATEX = (
     (r"(?<!\\)%.*", ""),
@@ -133,7 +133,7 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     lines = [
         (number, line)
         for number, line in enumerate(broken.splitlines(), 1)
-        if line.strip(" \t|;,") and len(line) < LONGEST_LINE
+        if len(line) < LONGEST_LINE and not _BOX.fullmatch(line)
     ]
     for mark in MARKS:
         if mark in ";,\t":
@@ -141,7 +141,7 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
         elif mark.isspace():
             yield mark, [(number, _spaced(without_latex(line), mark)) for number, line in lines]
         elif mark in text:
-            yield mark, [(number, _edged(line, mark)) for number, line in lines if not _BOX.fullmatch(line)]
+            yield mark, [(number, _edged(line, mark)) for number, line in lines]
 
 
 def _edged(line: str, mark: str) -> list[str]:

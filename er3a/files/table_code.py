@@ -122,7 +122,7 @@ def row_cells(text: str) -> list[str]:
 def _rows(group: Group) -> list[list[str]]:
     """The rows of a matrix; [] if the group is none."""
     inner = [each for each in parts(group.inside) if each]
-    if len(inner) > 1 and all(each[0] in "[(" and each[-1] in "])" for each in inner):
+    if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
         return [row_cells(each[1:-1]) for each in inner]
     lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
     if group.bracket != "[" or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
@@ -411,8 +411,8 @@ def _lists(code: Code) -> dict[str, list[str]]:
     """The lists of a program by their names, each multiplied by what is written after it."""
     found: dict[str, list[str]] = {}
     for group in groups_of(code.text):
-        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?$", group.before)
-        if group.bracket != "[" or name is None or "[" in group.inside:
+        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?$", group.before)
+        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
