@@ -1,4 +1,4 @@
-"""D-H tables as CSV: one row per joint, mm and degrees.
+"""D-H tables: one row per joint, under er3a's headings in mm and degrees, or in any form that people write.
 
 Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, ``offset_deg`` and ``direction`` (theta
 = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. For a prismatic joint, ``type`` is "prismatic"
@@ -6,11 +6,10 @@ Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, 
 ``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's rotation about y, and ``calibrated`` (true), which
 allows lengths below 2 mm. Leave a cell empty if it does not apply to a joint. A column ``convention`` (standard or
 modified, the same in all rows) takes precedence over the reader's argument. Columns may be in metres, inches or radians
-instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. Headings and cells may also be as
-books, articles and spreadsheets print them: headings as symbols with or without units and subscripts (``α(i-1)``,
-``a [mm]``, ``d_i``, ``关节角θ(°)``), cells with degree signs, fractions of pi, and variables (``q2-90``, ``θ5*``,
-``d3*``, ``*``). A row in which nothing moves is a fixed transform: its ``type`` is "fixed" (or "tool", after the
-flange), or it has no variable although others have one, or a name without a number (``Flange``).
+instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. A row in which nothing moves is a fixed
+transform: its ``type`` is "fixed" (or "tool", after the flange), or it has no variable although others have one, or it
+alone, first or last, has no number in its name (``Flange``). All other forms become such a table first
+(:mod:`er3a.files.printed_table`).
 """
 
 from __future__ import annotations
@@ -378,8 +377,8 @@ def headed_units(
 
     Parameters
     ----------
-    length_unit, angle_unit, columns, text : as of :func:`read_dh_table`; the units are those of headings that say mm and
-        deg, or nothing
+    length_unit, angle_unit, columns, text : as of :func:`read_dh_table`; the units are of headings that say mm and deg,
+        or nothing
 
     Returns
     -------

@@ -59,6 +59,7 @@ def compare(
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm
+    from er3a.files.robot_library import holds_table
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
@@ -70,7 +71,8 @@ def compare(
     folder = Path(b)
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
-        others = _others(b, xacro or (), options)
+        # Names of columns are those of A, or of B if A is no table.
+        others = _others(b, xacro or (), options | ({"columns": ()} if holds_table(a) else {}))
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)

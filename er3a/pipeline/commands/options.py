@@ -102,7 +102,7 @@ Lengths = Annotated[
 Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in a D-H table (default: that of its columns)")]
 Columns = Annotated[
     str | None,
-    typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (- is not read)"),
+    typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (-: not read)"),
 ]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
