@@ -17,13 +17,13 @@ from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
-from er3a.errors import InputError
+from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import UNITS, Amount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, code_grids, elements
 from er3a.files.table_headings import Heading, heading_of
-from er3a.formats.mesh_file import read_raw, text_of
+from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
 
@@ -99,7 +99,8 @@ def table_text(path: Path) -> str:
     InputError
         if it is missing, too large or no text
     """
-    return text_of(path, _pasted() if str(path) == "-" else read_raw(path, MAX_BYTES))
+    pasted = str(path) == "-"
+    return text_of(path, _pasted() if pasted else given_bytes(path, MAX_BYTES, "Give the table without the rest"))
 
 
 @cache
@@ -297,6 +298,8 @@ class _Table:
         self.column = {own.quantity: k for k, own in self.headings.items()}
         self._check_headings()
         self.convention = self._stated(text)
+        if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
+            self.notes.append("base and tool of the program are not read")
         self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
@@ -326,8 +329,9 @@ class _Table:
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
+        near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
         said = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        said |= {name for name, sign in SIGNS.items() if sign.search(text)}
+        said |= {name for name, sign in SIGNS.items() if sign.search(near)}
         for one in CONVENTIONS if len(said) == 1 else ():
             if one in said:
                 self.notes.append(f"the text says {one} D-H, and was read so")

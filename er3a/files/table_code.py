@@ -54,7 +54,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Group:
-    """What stands between two brackets, what is written before them, and whether it is in no other group."""
+    """A pair of brackets: where they are, what is in them and what is written before them."""
 
     start: int
     end: int
@@ -98,7 +98,7 @@ def parts(text: str, mark: str = ",") -> list[str]:
     for place, sign in enumerate(text):
         if quote:
             quote = "" if sign == quote else quote
-        elif sign in "\"'" and not re.search(r"[\w\])}.]$", text[:place][-1:]):
+        elif sign in "\"'" and not re.match(r"[\w\])}.]", text[max(place - 1, 0) : place]):
             quote = sign
         else:
             depth += (sign in "([{") - (sign in ")]}")
@@ -159,12 +159,21 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 def _calls(code: Code, groups: list[Group]) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows = list[_Link]()
+    rows, unread = list[_Link](), list[int]()
     for each in sorted(groups, key=lambda group: group.start):
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
-        if each.bracket == "(" and named and (cells := _arguments(named[2], each.inside)) is not None:
+        if each.bracket != "(" or named is None:
+            continue
+        cells = _arguments(named[2], each.inside)
+        if cells is None and _TOOLBOX.fullmatch(named[2]) and each.inside.strip():
+            unread.append(code.line(each.start))
+        elif cells is not None:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
+    if rows and unread:
+        raise InputError(
+            None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
+        )
     _assigned(code, rows)
     texts = [cell for row in rows for cell in row.cells.values()]
     if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
@@ -174,6 +183,11 @@ def _calls(code: Code, groups: list[Group]) -> list[Grid]:
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
         problem = "links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
+    names = {row.name: row for row in rows}
+    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
+    for links in chosen:
+        if len(links) > 1 and None not in links:  # the arm's list of named links
+            rows = [link for link in links if link]
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
     lists = [each for each in lists if len(each) > 1]
     return [_grid([(row.line, row.cells) for row in each]) for each in lists or _begun_again(rows)]

@@ -174,7 +174,8 @@ def test_a_table_is_read_as_it_is_meant_in_every_form(tmp_path, form):
     np.testing.assert_allclose(numbers(content), IRB120, atol=1e-9)
 
 
-LENGTHS = st.one_of(st.just(0), st.integers(-900, 900), st.integers(-9000, 9000).map(lambda tenths: tenths / 10))
+# No longest link of an arm is shorter: a table without units would be in metres.
+LENGTHS = st.one_of(st.just(0), st.integers(3, 900), st.integers(-900, -3), st.integers(30, 9000).map(lambda n: n / 10))
 ROWS = st.tuples(LENGTHS, st.sampled_from([0, 90, -90, 180, 60]), LENGTHS, st.sampled_from([0, 0, 90, -90, 180, 30]))
 
 
@@ -204,6 +205,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
         ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
         ("L = [Link([0 0.3 0 pi/2])];\nL(2).offset = 1;\nL(3).offset = 2;", "call"),
+        ("L(1) = Link([0 0.1 0 pi/2]);\nL(2) = Link(dh(2,:));", "line 2"),
         ("for i in range(3):\n  links.append(RevoluteDH(d=0.1, a=0.2))", "row for each"),
         (
             "i,a,alpha,d,theta\n1,0,90,300,0\n2,270,0,0,0\n\ni,a,alpha,d,theta\n1,0,90,301,0\n2,270,0,0,0\n",
@@ -262,6 +264,18 @@ def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_the
     assert [row.direction for row in content.zero.rows] == [1, -1]
     assert content.base.rpy_deg[0] == pytest.approx(180)
     assert (content.flange or content.tool).xyz_mm[2] == pytest.approx(60)
+
+
+def test_links_are_in_the_order_of_their_arm(tmp_path):
+    made = [f"K{j} = Link('d', 0, 'a', {j / 10}, 'alpha', 0);" for j in (3, 1, 9, 2)]
+    content, _ = read(tmp_path, "\n".join([*made, "r = SerialLink([K1 K2 K3], 'name', 'x');"]))
+    assert [row.a_mm for row in content.dh.rows] == pytest.approx([100, 200, 300])
+
+
+@pytest.mark.parametrize("said", ["modified", "standard"])
+def test_the_convention_is_what_the_text_at_the_table_says(tmp_path, said):
+    content, _ = read(tmp_path, f"{said.title()} D-H parameters:\n\n" + tabs(IRB120, list(NAMES), "q{}"))
+    assert content.dh.convention == said
 
 
 def test_joints_named_without_numbers_all_move(tmp_path):
