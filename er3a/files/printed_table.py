@@ -34,6 +34,7 @@ OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower"
 _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
+    (r"[{}$]", ""),
     (r"\(t\)", ""),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -343,7 +344,7 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in _GIVEN.findall(self.text):
             if not re.search(r"[\[\"']|\(\)$", value):
-                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.strip()
+                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[symbol] = value if found.get(symbol, value) == value else "two values"
         for names, values in re.findall(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$", self.text):
             if names.count(",") == values.count(","):
@@ -469,7 +470,9 @@ class _Table:
         order = [str(joint) for joint in range(1, len(moving) + 1)]
         labels = order
         if (k := self.column.get("joint")) is not None:
-            labels = [_label(plain(self.rows[row][1][k])) for row in moving]
+            texts = [plain(self.rows[row][1][k]).strip() for row in moving]
+            firsts = [_label(text, 0) for text in texts]
+            labels = firsts if firsts == order else [_label(text, -1) for text in texts]
             numbered = [int(label) for label in labels if label.isdecimal()]
             from_zero = numbered == list(range(len(labels)))
             by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
@@ -539,7 +542,8 @@ def _in(amount: Amount, unit: str) -> float:
     return math.degrees(amount.number) if unit == "deg" else math.radians(amount.number)
 
 
-def _label(cell: str) -> str:
-    """The number of a joint in its name; of two, as in 0-1, the second."""
-    found = re.search(r"\d+\s*(?:[-→>/]|to)+\s*(\d+)", cell) or re.search(r"(\d+)", cell)
-    return found[1] if found else cell.strip()
+def _label(cell: str, place: int) -> str:
+    """The number of a joint in its name; of two, as in 0-1, that at a place."""
+    pair = re.search(r"(\d+)\s*(?:[-→>/]|to)+\s*(\d+)", cell)
+    found = pair.groups() if pair else re.findall(r"\d+", cell)[:1]
+    return found[place] if found else cell

@@ -165,7 +165,8 @@ def _calls(code: Code, groups: list[Group]) -> list[Grid]:
         if each.bracket != "(" or named is None:
             continue
         cells = _arguments(named[2], each.inside)
-        if cells is None and _TOOLBOX.fullmatch(named[2]) and each.inside.strip():
+        index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
+        if cells is None and _TOOLBOX.fullmatch(named[2]) and not index:
             unread.append(code.line(each.start))
         elif cells is not None:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
@@ -359,7 +360,7 @@ def _matrix(code: Code, group: Group) -> Grid:
     if not 3 <= width <= 8:
         return []
     first, last = code.line(group.start), code.line(group.end)
-    header = _order(code, first, last, width)
+    header = _order(code, first, last, width) or _symbols(rows[0])
     lines = _row_lines(code, first, last, len(rows))
     labels = [code.comments.get(line, "") for line in lines]
     named = header and "joint" not in header and len({*lines}) == len(rows)
@@ -393,6 +394,13 @@ def _row_lines(code: Code, first: int, last: int, rows: int) -> list[int]:
     texts = code.text.split("\n")
     filled = [line for line in range(first, last + 1) if re.search(r"[\d\w]", re.sub(r"^.*=", "", texts[line - 1]))]
     return filled[-rows:] if len(filled) >= rows else [first] * rows
+
+
+def _symbols(row: list[str]) -> list[str]:
+    """The names of columns as a row of symbols has them: ``theta1 d1 a1 alpha1``."""
+    names = [re.sub(r"\d+$", "", cell) for cell in row]
+    quantities = {found.quantity for name in names if (found := heading_of(name))}
+    return names if len(quantities) == len(row) and {"a", "alpha", "d"} <= quantities else []
 
 
 def _order(code: Code, first: int, last: int, width: int) -> list[str]:
@@ -469,7 +477,8 @@ def _pairs(code: Code) -> list[Grid]:
         names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
         row = {name: cell[0] for name, cell in zip(names, cells) if cell}
         rows.append((code.line(cells[2][1] if cells[2] else 0), {"joint": str(joint)} | row | {"theta": angle[0]}))
-    return [_grid(rows)] if len(rows) > 1 else []
+    angles = {name for name, _ in entries} & {"q", "theta"}  # else they may be in a matrix of these symbols
+    return [_grid(rows)] if len(rows) > 1 and angles else []
 
 
 def _found(pattern: str, text: str) -> Iterator[tuple[str, str, str, int]]:

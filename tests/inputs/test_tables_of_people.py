@@ -266,6 +266,12 @@ def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_the
     assert (content.flange or content.tool).xyz_mm[2] == pytest.approx(60)
 
 
+def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
+    values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
+    content, _ = read(tmp_path, values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
+    np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
+
+
 def test_links_are_in_the_order_of_their_arm(tmp_path):
     made = [f"K{j} = Link('d', 0, 'a', {j / 10}, 'alpha', 0);" for j in (3, 1, 9, 2)]
     content, _ = read(tmp_path, "\n".join([*made, "r = SerialLink([K1 K2 K3], 'name', 'x');"]))
