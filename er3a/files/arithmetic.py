@@ -34,7 +34,7 @@ _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 
 
 @dataclass(frozen=True)
-class Reckoned:
+class CellAmount:
     """A number, the unit that it is said to be in ("" if none), and how often each variable is added to it."""
 
     number: float
@@ -57,7 +57,7 @@ def plain(text: str) -> str:
     return unicodedata.normalize("NFKC", text).translate(_SIGNS).replace("\u200b", "").replace("⁄", "/")
 
 
-def amount_of(text: str, given: Mapping[str, str] | None = None) -> Reckoned:
+def amount_of(text: str, given: Mapping[str, str] | None = None) -> CellAmount:
     """What an expression amounts to.
 
     Parameters
@@ -100,7 +100,7 @@ class _Reader:
             place = found.end()
         self.place = 0
 
-    def all(self) -> Reckoned:
+    def all(self) -> CellAmount:
         """The amount of the whole text."""
         found = self.sum()
         if self.place < len(self.tokens):
@@ -120,7 +120,7 @@ class _Reader:
         self.place += 1
         return token
 
-    def sum(self) -> Reckoned:
+    def sum(self) -> CellAmount:
         found = self.product()
         while self.peek() in ("+", "-"):
             sign = 1 if self.take() == "+" else -1
@@ -129,10 +129,10 @@ class _Reader:
                 raise ValueError(_two_units(found.unit, other.unit))
             names = {*found.variables, *other.variables}
             both = {each: found.variables.get(each, 0) + sign * other.variables.get(each, 0) for each in names}
-            found = Reckoned(found.number + sign * other.number, found.unit or other.unit, both)
+            found = CellAmount(found.number + sign * other.number, found.unit or other.unit, both)
         return found
 
-    def product(self) -> Reckoned:
+    def product(self) -> CellAmount:
         found = self.signed()
         while self.peek() in ("*", "/") or self.kind() in ("number", "name") or self.peek() == "(":
             divides = self.peek() == "/"
@@ -141,41 +141,41 @@ class _Reader:
             found = _quotient(found, self.signed()) if divides else _product(found, self.signed())
         return found
 
-    def signed(self) -> Reckoned:
+    def signed(self) -> CellAmount:
         sign = 1
         while self.peek() in ("+", "-"):
             sign *= 1 if self.take() == "+" else -1
-        return _product(Reckoned(sign), self.power())
+        return _product(CellAmount(sign), self.power())
 
-    def power(self) -> Reckoned:
+    def power(self) -> CellAmount:
         found = self.atom()
         if self.peek() == "^":
             self.take()
             if self.peek() == "°":  # ^° of LaTeX
                 return self.with_unit(found)
             sign = -1 if self.peek() == "-" and self.take() else 1
-            exponent = _product(Reckoned(sign), self.atom())
+            exponent = _product(CellAmount(sign), self.atom())
             if found.variables or exponent.variables or found.unit or exponent.unit:
                 raise ValueError("raises what is no plain number")
             try:
-                found = Reckoned(math.pow(found.number, exponent.number))
+                found = CellAmount(math.pow(found.number, exponent.number))
             except (OverflowError, ValueError):
                 raise ValueError("is no finite number") from None
         return self.with_unit(found)
 
-    def with_unit(self, found: Reckoned) -> Reckoned:
+    def with_unit(self, found: CellAmount) -> CellAmount:
         """An amount with the unit that is written after it."""
         if self.kind() == "name" and self.peek().lower() in UNITS and self.peek() not in self.given:
             unit = UNITS[self.take().lower()]
             if found.unit or found.variables:
                 raise ValueError(_two_units(found.unit, unit) or f"is a variable in {unit}")
-            return Reckoned(found.number, unit)
+            return CellAmount(found.number, unit)
         return found
 
-    def atom(self) -> Reckoned:
+    def atom(self) -> CellAmount:
         kind, token = self.kind(), self.take()
         if kind == "number":
-            return Reckoned(float(token))
+            return CellAmount(float(token))
         if token == "(":
             found = self.sum()
             if self.take() != ")":
@@ -185,7 +185,7 @@ class _Reader:
             return self.named(token)
         raise ValueError("is not a number or an expression")
 
-    def named(self, token: str) -> Reckoned:
+    def named(self, token: str) -> CellAmount:
         """The amount of a function's value, of pi, of a given name, or of a variable."""
         word = token.rpartition(".")[2]
         low = word.lower()
@@ -198,17 +198,17 @@ class _Reader:
                 self.place += 3
                 name = f"{token}{index[0][1]}"
         if low in ("pi", "π", "m_pi"):
-            return Reckoned(math.pi, "rad")
+            return CellAmount(math.pi, "rad")
         for each in (name, name_of(name)):
             if each in self.given:
                 return _Reader(plain(self.given[each]), self.given, self.depth + 1).all()
         if low in _RADIANS:
-            return Reckoned(math.radians(1.0), "rad")
+            return CellAmount(math.radians(1.0), "rad")
         if low in UNITS and UNITS[low] == "deg":
-            return Reckoned(math.radians(1.0), "rad")
-        return Reckoned(0.0, "", {name_of(name): 1.0})
+            return CellAmount(math.radians(1.0), "rad")
+        return CellAmount(0.0, "", {name_of(name): 1.0})
 
-    def called(self, name: str) -> Reckoned:
+    def called(self, name: str) -> CellAmount:
         """The value of a function."""
         self.take()
         values = [self.sum()]
@@ -220,10 +220,10 @@ class _Reader:
         (value, *_rest) = values
         if name in _RADIANS | _DEGREES:
             turn = math.radians(value.number) if name in _RADIANS else math.degrees(value.number)
-            return Reckoned(turn, "rad" if name in _RADIANS else "deg")
+            return CellAmount(turn, "rad" if name in _RADIANS else "deg")
         numbers = [math.radians(each.number) if each.unit == "deg" else each.number for each in values]
         try:
-            return Reckoned(_FUNCTIONS[name](*numbers), "rad" if name[0] == "a" else "")
+            return CellAmount(_FUNCTIONS[name](*numbers), "rad" if name[0] == "a" else "")
         except (TypeError, ValueError, OverflowError):
             raise ValueError(f"has no value of {name}(...)") from None
 
@@ -234,17 +234,17 @@ def _two_units(a: str, b: str) -> str:
     return f"is in {a} and in {b}" if a and b else ""
 
 
-def _product(a: Reckoned, b: Reckoned) -> Reckoned:
+def _product(a: CellAmount, b: CellAmount) -> CellAmount:
     if (a.variables and b.variables) or (a.unit and b.unit):
         raise ValueError(_two_units(a.unit, b.unit) or "multiplies two variables")
     scaled = {name: times * b.number for name, times in a.variables.items()}
     scaled |= {name: times * a.number for name, times in b.variables.items()}
-    return Reckoned(a.number * b.number, a.unit or b.unit, scaled)
+    return CellAmount(a.number * b.number, a.unit or b.unit, scaled)
 
 
-def _quotient(a: Reckoned, b: Reckoned) -> Reckoned:
+def _quotient(a: CellAmount, b: CellAmount) -> CellAmount:
     if b.variables or not b.number:
         raise ValueError("divides by a variable or by zero")
     if b.unit and (b.unit != "rad" or a.unit):  # 180/pi is a number
         raise ValueError(_two_units(a.unit, b.unit) or f"divides by {b.unit}")
-    return Reckoned(a.number / b.number, a.unit, {name: times / b.number for name, times in a.variables.items()})
+    return CellAmount(a.number / b.number, a.unit, {name: times / b.number for name, times in a.variables.items()})

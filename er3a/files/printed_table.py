@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import UNITS, Reckoned, amount_of, name_of, plain
+from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, code_grids, elements
@@ -385,7 +385,7 @@ class _Table:
         made = [(line, list(cells)) for (line, _), cells in zip(self.rows, zip(*self.columns.values()))]
         return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid))
 
-    def _amounts(self, k: int) -> list[Reckoned | None]:
+    def _amounts(self, k: int) -> list[CellAmount | None]:
         """The amounts of a column's cells; None for an empty one."""
         cells = [cells[k] for _, cells in self.rows]
         if self.headings[k].quantity == "type":
@@ -398,7 +398,7 @@ class _Table:
         cells = [_COMMA.sub(r"\1.\2\3", cell) for cell in cells] if commas else cells
         return [self._amount(row, k, cell) for row, cell in enumerate(cells)]
 
-    def _amount(self, row: int, k: int, cell: str) -> Reckoned | None:
+    def _amount(self, row: int, k: int, cell: str) -> CellAmount | None:
         text = plain(without_latex(cell)).strip().rpartition("=")[2]
         for pattern, plainly in _CELL:
             text = re.sub(pattern, plainly, text, flags=re.IGNORECASE)
@@ -445,7 +445,7 @@ class _Table:
             found.append(kind)
         return found
 
-    def _of(self, quantity: str) -> list[Reckoned | None]:
+    def _of(self, quantity: str) -> list[CellAmount | None]:
         return self.amounts.get(quantity) or [None] * len(self.rows)
 
     def _variable(self, row: int) -> tuple[str, float]:
@@ -494,7 +494,7 @@ class _Table:
     def _theta(self, k: int) -> None:
         """Offsets of joints that turn, and theta of those that slide."""
         sliding = [kind == "prismatic" for kind in self.kinds]
-        found = [each or Reckoned(0.0) for each in self.amounts["theta"]]
+        found = [each or CellAmount(0.0) for each in self.amounts["theta"]]
         turning = [None if slides else each for slides, each in zip(sliding, found)]
         rows = zip(self.columns["joint"], turning, self.rows)
         offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
@@ -507,7 +507,7 @@ class _Table:
         if any(sliding):
             self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
 
-    def _add(self, k: int, name: str, found: list[Reckoned | None]) -> None:
+    def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
         """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
         length = name in ("a", "d")
         for row, each in enumerate(found):
@@ -533,7 +533,7 @@ class _Table:
         return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
 
 
-def _in(amount: Reckoned, unit: str) -> float:
+def _in(amount: CellAmount, unit: str) -> float:
     """An amount's number in a unit, which is its own if it has none."""
     if amount.unit in ("", unit):
         return amount.number
