@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
     from er3a.files.reference_sets import load_references as load_references
     from er3a.files.robot_library import load_robot as load_robot
+    from er3a.files.robot_library import read_table as read_table
     from er3a.files.scene_file import load_scene as load_scene
     from er3a.files.target_file import load_targets as load_targets
     from er3a.formats.urdf import export_urdf as export_urdf
@@ -64,6 +65,7 @@ from er3a.version import __version__ as __version__
 
 _PUBLIC = {
     "load_robot": "er3a.files.robot_library",
+    "read_table": "er3a.files.robot_library",
     "Robot": "er3a.robots.robot",
     "forward": "er3a.kinematics.forward",
     "jacobian": "er3a.kinematics.forward",

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
-from er3a.files.robot_library import load_robot, robot_of
+from er3a.files.printed_table import table_text
+from er3a.files.robot_library import holds_table, load_robot, robot_of
 from er3a.formats.urdf import urdf_groups, urdf_table
 from er3a.formats.urdf_tree import plain_urdf
 from er3a.robots.robot import Convention, Robot, robot_name
@@ -39,15 +41,18 @@ def read_arm(
     tip: str | None = None,
     xacro: Sequence[str] = (),
     as_printed: bool = False,
+    columns: Sequence[str] = (),
 ) -> ReadArm:
     """Read an arm's table, limits and speeds.
 
     Parameters
     ----------
-    source : a robot's name, or a path that ends in .csv, .yaml, .urdf or .xacro
+    source : a robot's name, or a path: of a robot file (.yaml), a URDF (.urdf, .xacro), or any other file with a D-H
+        table; ``-`` is standard input
     convention : of a D-H table; a column ``convention`` in the table takes precedence
     length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
     as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
+    columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
 
     Raises
@@ -56,25 +61,19 @@ def read_arm(
         naming file, field and remedy
     """
     path = Path(source)
-    if path.suffix == ".csv":
-        content, notes = read_dh_table(
-            path, robot_name(path), convention, length_unit=length_unit, angle_unit=angle_unit, as_printed=as_printed
-        )
+    if holds_table(source):
+        form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns, "text": table_text(path)}
+        content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
         robot = robot_of(content)
-        units = headed_units(path, length_unit, angle_unit)
-        return ReadArm(robot, True, notes, beside_the_table(robot), units)
+        return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in (".urdf", ".xacro", ".xml"):
         with plain_urdf(path, xacro) as plain:
             robot, assumed = urdf_table(plain, base=base, tip=tip)
             beside = urdf_groups(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
         return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
-    if path.suffix in (".yaml", ".yml") or (not path.suffix and not path.exists()):
-        robot = load_robot(source)
-        return ReadArm(robot, True, beside=beside_the_table(robot))
-    raise InputError(
-        path, None, "is not a kind of file that describes an arm", f"Give one that ends in {', '.join(READ)}"
-    )
+    robot = load_robot(source)
+    return ReadArm(robot, True, beside=beside_the_table(robot))
 
 
 def read_arms(folder: Path, **options: str | bool | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:

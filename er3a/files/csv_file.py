@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from er3a.errors import InputError
+from er3a.errors import InputError, given_bytes
 from er3a.files.yaml_file import vanished
-from er3a.formats.mesh_file import read_text
+from er3a.formats.mesh_file import TOO_LARGE, read_text, text_of
 
 LARGEST_DIGITS = 9
 
@@ -143,7 +143,7 @@ def read_lines(path: Path) -> Lines:
     Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points. The head
     of a table of motion that er3a has written is left out.
     """
-    text = OWN_HEAD.sub("", read_text(path, MAX_BYTES))
+    text = OWN_HEAD.sub("", text_of(path, given_bytes(path, MAX_BYTES, TOO_LARGE)))
     header = text.lstrip().partition("\n")[0]
     mark = next((each for each in ";\t" if each in header and "," not in header), ",")
     reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)

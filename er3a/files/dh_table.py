@@ -1,4 +1,4 @@
-"""D-H tables as CSV: one row per joint, mm and degrees.
+"""D-H tables: one row per joint, under er3a's headings in mm and degrees, or in any form that people write.
 
 Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, ``offset_deg`` and ``direction`` (theta
 = direction * q + offset), ``lower_deg``, ``upper_deg``, ``speed_deg_s``. For a prismatic joint, ``type`` is "prismatic"
@@ -6,26 +6,25 @@ Columns: ``joint`` (1 to 10), ``a_mm``, ``alpha_deg``, ``d_mm``; and, if known, 
 ``speed_mm_s``. Calibrated tables may have ``beta_deg``, Hayati's rotation about y, and ``calibrated`` (true), which
 allows lengths below 2 mm. Leave a cell empty if it does not apply to a joint. A column ``convention`` (standard or
 modified, the same in all rows) takes precedence over the reader's argument. Columns may be in metres, inches or radians
-instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. Headings and cells may also be as
-books, articles and spreadsheets print them: headings as symbols with or without units and subscripts (``α(i-1)``,
-``a [mm]``, ``d_i``, ``关节角θ(°)``), cells with degree signs, fractions of pi, and variables (``q2-90``, ``θ5*``,
-``d3*``, ``*``). A row in which nothing moves is a fixed transform: its ``type`` is "fixed" (or "tool", after the
-flange), or it has no variable although others have one, or a name without a number (``Flange``).
+instead, and are then named ``d_m``, ``a_in``, ``alpha_rad``, ``speed_rad_s``. A row in which nothing moves is a fixed
+transform: its ``type`` is "fixed" (or "tool", after the flange), or it has no variable although others have one, or it
+alone, first or last, has no number in its name (``Flange``). All other forms become such a table first
+(:mod:`er3a.files.printed_table`).
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, Lines, check_widths, read_csv, read_lines
+from er3a.files.csv_file import CsvColumn, read_csv, read_lines
+from er3a.files.printed_table import FIXED, MAX_BYTES, PrintedTable, check_size, printed_table, table_text
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
@@ -60,11 +59,11 @@ OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale
 OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
 LONGEST_LINK_M = 2.5  # of robots; the same number of inches is a link of 64 mm, below those of most
+SHORTEST_LINK_MM = 80.0  # longest link of an arm in mm; the same number of cm is one, too
 LONGEST_ARM_IN = 200.0  # inches; a length of five metres
 ROUND_MM = (0.1, 2e-3, 2), (0.01, 5e-4, 3), (0.5, 0.0135, 3)
 """What lengths in mm are multiples of, how nearly if they were in another unit, and how many it takes to say so."""
 ASSUMED_SLIDE_MM = 1000.0
-MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
 
 
 def read_dh_table(
@@ -75,6 +74,8 @@ def read_dh_table(
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
     as_printed: bool = False,
+    columns: Sequence[str] = (),
+    text: str | None = None,
 ) -> tuple[RobotFile, tuple[str, ...]]:
     """Make a robot file from a D-H table.
 
@@ -86,6 +87,8 @@ def read_dh_table(
     as_printed : keep values in the unit that their column says although they look like another; each gives a
         :class:`er3a.errors.DoubtfulUnit`. Otherwise they are refused. Columns that say no unit are taken for what their
         values look like, with a doubt too
+    columns : what the columns mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    text : of the file, if it has been read
 
     Returns
     -------
@@ -98,11 +101,7 @@ def read_dh_table(
         naming row and column, or the field of the robot file that the values do not fit
     """
     path = Path(path)
-    lines = read_lines(path)
-    if len(lines) > MOST_LINES:
-        problem = f"{len(lines) - 1:,} rows are no arm's table"
-        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
-    printed = as_columns(path, lines)
+    printed = _printed(path, columns, text)
     names = {_usual_unit(column)[0]: column for column in (printed.lines[0][1] if printed.lines else ())}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
     rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
@@ -114,7 +113,6 @@ def read_dh_table(
             for column, scale in converted.items()
             if row[column] is not None
         }
-    convention = printed.convention or convention
     notes = [*printed.notes]
     notes += _in_own_units(
         path, rows, length_unit, angle_unit, as_printed, own={*converted}, without_unit=printed.without_unit
@@ -147,6 +145,26 @@ def read_dh_table(
     return parse(RobotFile, content, path, AS_PRINTED if as_printed else None), tuple(notes)
 
 
+def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -> PrintedTable:
+    """The table that a file holds, under er3a's headings.
+
+    Raises
+    ------
+    InputError
+        for a file without one, and for one with more rows than any arm
+    """
+    if text is None and (path.suffix != ".csv" or (path.is_file() and path.stat().st_size < MAX_BYTES)):
+        text = table_text(path)
+    found = None if text is None else printed_table(path, text, columns)
+    if found is None and path.suffix != ".csv":
+        problem = "no row of headings with a, alpha and d was found"
+        raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
+    if found is None:
+        found = PrintedTable(read_lines(path), ())
+    check_size(path, found.lines)
+    return found
+
+
 def _check_pairs_of_limits(path: Path, given: set[str]) -> None:
     """Reject a column of limits without that of the other ends."""
     for unit in ("deg", "mm"):
@@ -174,7 +192,6 @@ def _short_lengths(path: Path, rows: list[dict[str, Any]], own: set[str], as_pri
 
 # Rows in which nothing moves ------------------------------------------------------------------------------------------
 
-FIXED = "fixed", "tool"
 PARALLEL = 1e-9  # sine of an angle between axes below which a common normal has no digits left
 DIGITS = 9  # of mm and deg, that products of matrices leave
 
@@ -289,30 +306,24 @@ def _in_own_units(
 ) -> Iterator[str]:
     """Take all values to mm and degrees, and doubt or refuse those that are another unit's.
 
-    Lengths are refused, with ``as_printed`` doubted, and taken for what they are only if no heading says their unit.
-    Twists that can only be radians stay degrees, with a note, unless ``as_printed`` and no heading says their unit.
+    Lengths and twists are taken for what they can only be if no heading says their unit. Otherwise such lengths are
+    refused, with ``as_printed`` doubted, and such twists stay degrees, with a note.
     ``own``: columns that said their unit; ``without_unit``: those whose headings say none.
     """
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
-    unit = length_unit or "mm"
-    likely = "mm" if any(_unit(row) == "mm" for row in rows) or not lengths else _likely_unit(lengths)
-    if length_unit is None and likely != "mm":
-        word = {"m": "metres", "in": "inches"}[likely]
-        if not as_printed:
-            problem = f"the lengths, {max(lengths):g} mm at most, are those of an arm in {word}"
-            remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
-            remedy += " (or mm)" if max(lengths) > SHORTEST_PLAIN_LENGTH_MM else ""
-            raise InputError(path, "columns a_mm, d_mm", problem, remedy)
-        doubt(None, "columns a, d", f"{max(lengths):g} mm at most", word, file=path)
-        if {"a_mm", "d_mm"} - own <= without_unit:
-            unit = likely
-            yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+    unsaid = {"a_mm", "d_mm"} - own <= without_unit
+    slides = any(_unit(row) == "mm" for row in rows) and not unsaid
+    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
+    if unit != (length_unit or "mm"):
+        word = {"m": "metres", "in": "inches"}[unit]
+        yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
         if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
             doubt(None, "angles", f"{wide[0]:g} deg", "degrees that were converted twice", file=path)
-        turned = {column for column in turned if _in_radians(rows, column)} if _twists_in_radians(rows, own) else set()
-        if turned and as_printed and "alpha_deg" in without_unit:
+        found = _twists_in_radians(rows, own, "alpha_deg" in without_unit)
+        turned = {column for column in turned if _in_radians(rows, column)} if found else set()
+        if turned and "alpha_deg" in without_unit:
             doubt(None, ", ".join(sorted(turned)), f"{rows[0]['alpha_deg']:g} deg", "radians", file=path)
             yield f"{', '.join(sorted(turned))} were read as radians; --angle-unit deg if they are degrees"
         elif turned:
@@ -327,6 +338,27 @@ def _in_own_units(
                 row[column] = _converted(column, value, scale)
 
 
+def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool) -> LengthUnit:
+    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted."""
+    likely = _likely_unit(lengths) if lengths else "mm"
+    longest = max(lengths, default=0.0)
+    # A small arm in mm, or a large one in cm, and no other for sure.
+    small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
+    if unsaid and small and (likely == "mm" or all(length == round(length) for length in lengths)):
+        problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
+        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
+    if likely == "mm":
+        return "mm"
+    word = {"m": "metres", "in": "inches"}[likely]
+    if not (as_printed or unsaid):
+        problem = f"the lengths, {longest:g} mm at most, are those of an arm in {word}"
+        remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
+        remedy += " (or mm)" if longest > SHORTEST_PLAIN_LENGTH_MM else ""
+        raise InputError(path, "columns a_mm, d_mm", problem, remedy)
+    doubt(None, "columns a, d", f"{longest:g} mm at most", word, file=path)
+    return likely if unsaid else "mm"
+
+
 def _converted(column: str, value: float, scale: float) -> float:
     """A value in mm or degrees; one in radians as :func:`er3a.numerics.si_units.limit_in_degrees` if it is a limit."""
     if scale == DEGREES["rad"] and column in ("lower_deg", "upper_deg"):
@@ -335,19 +367,24 @@ def _converted(column: str, value: float, scale: float) -> float:
 
 
 def headed_units(
-    path: Path, length_unit: LengthUnit | None = None, angle_unit: AngleUnit | None = None
+    path: Path,
+    length_unit: LengthUnit | None = None,
+    angle_unit: AngleUnit | None = None,
+    columns: Sequence[str] = (),
+    text: str | None = None,
 ) -> dict[str, str]:
     """The unit of each column of a D-H table, as its heading says it.
 
     Parameters
     ----------
-    length_unit, angle_unit : as of :func:`read_dh_table`, of headings that say mm and deg, or nothing
+    length_unit, angle_unit, columns, text : as of :func:`read_dh_table`; the units are of headings that say mm and deg,
+        or nothing
 
     Returns
     -------
     units : such as ``{"a": "in", "alpha": "rad", "lower": "deg"}``
     """
-    lines = as_columns(path, read_lines(path)).lines
+    lines = _printed(path, columns, text).lines
     meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
     units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
     return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*MILLIMETRES, *DEGREES)}
@@ -363,12 +400,12 @@ def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:
     return bool(values) and max(values) < RADIANS_BELOW_DEG
 
 
-def _twists_in_radians(rows: list[dict[str, Any]], own: set[str]) -> bool:
-    """Whether all twists are right angles in radians, as printed with two decimals or more, and two at least."""
+def _twists_in_radians(rows: list[dict[str, Any]], own: set[str], unsaid: bool) -> bool:
+    """Whether all twists are right angles in radians, as printed with two decimals or more; two at least, or one where
+    no heading says degrees (``unsaid``)."""
     twists = [row["alpha_deg"] for row in rows if row["alpha_deg"]]
-    return (
-        "alpha_deg" not in own and look_like_radians(twists) and all(look_like_radians([each, each]) for each in twists)
-    )
+    enough = look_like_radians(twists) or (unsaid and twists)
+    return bool("alpha_deg" not in own and enough and all(look_like_radians([each, each]) for each in twists))
 
 
 def _likely_unit(lengths: list[float]) -> LengthUnit:
@@ -459,294 +496,3 @@ def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention:
     if all(f"speed_{unit}_s" in given for unit in units):
         content["speeds"] = group(speed, known=True)
     return content
-
-
-_JOINT = {"joint", "link", "axis", "i", "j", "n", "no", "#", "gelenk", "achse", "关节", "连杆", "轴", "序号"}
-_LENGTHS = {
-    "a": "a",
-    "r": "a",
-    "linklength": "a",
-    "连杆长度": "a",
-    "杆长": "a",
-    "d": "d",
-    "linkoffset": "d",
-    "偏距": "d",
-}
-_LENGTHS |= {"连杆偏距": "d", "连杆偏移": "d", "offset": "offset"}
-_OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
-_ANGLES = {
-    "α": "alpha",
-    "alpha": "alpha",
-    "twist": "alpha",
-    "扭": "alpha",
-    "θ": "theta",
-    "theta": "theta",
-    "关节角": "theta",
-}
-"""Each marks a heading that holds it."""
-_UNITS = {"mm": "mm", "毫米": "mm", "m": "m", "米": "m", "in": "in", "inch": "in", "cm": "cm"}
-_UNITS |= {"°": "deg", "deg": "deg", "degree": "deg", "degrees": "deg", "度": "deg", "grad": "deg", "rad": "rad"}
-_BEFORE = re.compile(r"i-1|ᵢ₋₁|j-1")
-_PLAIN = str.maketrans({"−": "-", "–": "-", "ϑ": "θ", "⍺": "α", "∗": "*", "＊": "*", "（": "(", "）": ")"})
-_PLAIN |= str.maketrans(dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789")))
-_VARIABLE = re.compile(r"(?<![\w.])([+-]?)(?:(?:q|θ|theta|th|d)_?\d*\*?|\*|var(?:iable|\.)?|变量)(?:\(t\))?(?=[-+(]|$)")
-_NUMBERED = re.compile(r"\d")
-_TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
-_PI = re.compile(r"([+-]?)(\d+(?:\.\d*)?)?\*?(?:π|pi)(?:/(\d+(?:\.\d*)?))?")
-
-
-@dataclass(frozen=True)
-class PrintedTable:
-    """Lines as a file's lines, under er3a's headings; what the headings say of the convention; what was read into
-    them, in words; columns of which neither heading nor cells say the unit."""
-
-    lines: Lines
-    convention: Convention | None
-    notes: tuple[str, ...]
-    without_unit: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class _Heading:
-    quantity: str  # joint, a, alpha, d, theta, offset
-    unit: str  # "" where the heading has none
-    before: bool  # whether it belongs to the link before the joint, as in Craig's tables
-
-
-def heading_of(text: str) -> _Heading | None:
-    """What a column heading of a D-H table means, as books, articles and spreadsheets print it.
-
-    Parameters
-    ----------
-    text : such as ``a_mm``, ``α(i-1)``, ``d_i [m]``, ``Link length`` or ``关节角θ(°)``
-
-    Returns
-    -------
-    heading : quantity, unit ("" where none is printed), and whether it belongs to the link before the joint (i-1), as
-        in Craig's tables; None for any other text
-    """
-    if own := _OURS.fullmatch(text):
-        return _Heading(own[1] or own[2], own[3] or "", False)
-    plain = re.sub(r"[\s{}\\]", "", text.lower().translate(_PLAIN))
-    unit = next((_UNITS[each] for each in re.findall(r"[(\[/]([^()\[\]/]+)", plain) if each in _UNITS), "")
-    name = re.sub(r"[(\[].*?[)\]]|/.*", "", plain)
-    # Without the index, which says only whether the entry belongs to the joint or to the link before it.
-    name = re.sub(r"_?[ij]-1$|ᵢ₋₁$|[ᵢⱼ]$|(?<=.)_?[ij]$", "", name)
-    if name in _JOINT:
-        return _Heading("joint", "", False)
-    marked = {quantity for mark, quantity in _ANGLES.items() if mark in name and "_" not in name}
-    quantity = marked.pop() if marked else _LENGTHS.get(name) or _LENGTHS.get(re.sub(r"[^a-z]", "", name))
-    return _Heading(quantity, unit, bool(_BEFORE.search(plain))) if quantity and "_" not in name else None
-
-
-def is_printed_table(header: list[str]) -> bool:
-    """Whether a table's headings are those of a D-H table, printed or er3a's own.
-
-    Parameters
-    ----------
-    header : column names in any order; further columns are allowed
-
-    Returns
-    -------
-    found : whether a, alpha and d are all among them
-    """
-    return {"a", "alpha", "d"} <= {found.quantity for name in header if (found := heading_of(name.strip()))}
-
-
-def as_columns(path: Path, lines: Lines) -> PrintedTable:
-    """A table under er3a's headings, its cells as numbers.
-
-    Raises
-    ------
-    InputError
-        for a row with another number of fields than the header, and for a cell with two variables
-    """
-    header = [name.strip() for name in lines[0][1]] if lines else []
-    found = {k: own for k, name in enumerate(header) if (own := heading_of(name))}
-    if "theta_deg" in header and not {"type", "offset_deg"} & set(header):
-        found[header.index("theta_deg")] = _Heading("theta", "deg", False)
-    if len({own.quantity for own in found.values()}) < len(found) or not found:
-        return PrintedTable(lines, None, ())
-    check_widths(path, lines)
-    return _Table(path, header, lines[1:], found).converted()
-
-
-class _Table:
-    def __init__(self, path: Path, header: list[str], rows: Lines, headings: dict[int, _Heading]):
-        self.path, self.header, self.headings = path, header, headings
-        self.rows = rows
-        self.column = {own.quantity: k for k, own in headings.items()}
-        self.units = {k: own.unit or self._said(k) for k, own in headings.items() if own.quantity != "joint"}
-
-    def converted(self) -> PrintedTable:
-        """The table under er3a's headings, with variables taken out of the cells of theta and d.
-
-        Returns
-        -------
-        table : its lines as those of a file, the header first. Offsets and directions come from cells such as
-            ``q2-90``. The convention is modified if a and alpha belong to link i-1, and no column names another one.
-        """
-        kinds = self._kinds()
-        columns: dict[str, list[str]] = {"joint": self._joints(kinds)}
-        offsets: list[str] = []
-        for k, name in enumerate(self.header):
-            cells = [cells[k] for _, cells in self.rows]
-            own = self.headings.get(k)
-            if own is None:
-                columns[name] = cells
-            elif own.quantity == "theta":
-                offsets = self._theta(k, kinds, columns)
-            elif own.quantity != "joint":
-                self._plain(k, own, kinds, columns)
-        if set(kinds) - {"revolute"} and "type" not in self.header:
-            columns["type"] = kinds
-        before = {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")}
-        convention: Convention | None = "modified" if before == {True} and "convention" not in self.header else None
-        notes = ["a and alpha of the link before the joint (i-1): read as modified D-H (Craig)"] if convention else []
-        if offsets:
-            notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
-        numbers = [number for number, _ in self.rows]
-        made = [(number, list(cells)) for number, cells in zip(numbers, zip(*columns.values()))]
-        silent = {own.quantity for k, own in self.headings.items() if k in self.units and not self.units[k]}
-        unsaid = frozenset(name for name in columns if name.rpartition("_")[0] in silent)
-        return PrintedTable([(0, list(columns)), *made], convention, tuple(notes), unsaid)
-
-    def _joints(self, kinds: list[str]) -> list[str]:
-        """The number of each row's joint, "" where nothing moves.
-
-        The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the
-        table's numbers may be those of its rows; they become those of its joints.
-        """
-        moving = [row for row, kind in enumerate(kinds) if kind not in FIXED]
-        variables = [self._variable_number(row, kinds[row]) for row in moving]
-        start = 0 if variables[:1] == [0] else 1
-        for joint, (row, number) in enumerate(zip(moving, variables), start):
-            if number not in (None, joint):
-                problem = f"the variable is number {number} where that of joint {joint} belongs"
-                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Order the rows, or correct it")
-        order = [str(joint) for joint in range(1, len(moving) + 1)]
-        labels = order
-        if (k := self.column.get("joint")) is not None:
-            labels = [_label(self.rows[row][1][k]) for row in moving]
-            numbers = [int(label) - row for label, row in zip(labels, moving) if label.isdecimal()]
-            if len(moving) < len(kinds) and len(numbers) == len(moving) and len(set(numbers)) == 1:
-                labels = order
-        found = dict(zip(moving, labels))
-        return [found.get(row, "") for row in range(len(kinds))]
-
-    def _variable_number(self, row: int, kind: str) -> int | None:
-        """The number in a row's variable; None if it has none."""
-        k = self.column.get("d" if kind == "prismatic" else "theta")
-        found = None if k is None else _variable(self.rows[row][1][k])
-        digits = re.search(r"\d+", found[0]) if found else None
-        return int(digits[0]) if digits else None
-
-    def _said(self, k: int) -> str:
-        """The unit that a column's cells say; "" if none."""
-        cells = [cells[k].lower() for _, cells in self.rows]
-        if any("°" in cell for cell in cells):
-            return "deg"
-        return "rad" if any("π" in cell or "pi" in cell for cell in cells) else ""
-
-    def _unit(self, k: int, quantity: str, cells: list[str]) -> str:
-        """A column's unit: that of its heading or cells, of small angles beside radians theirs, else mm or degrees."""
-        if self.units[k] or quantity in ("a", "d"):
-            return self.units[k] or "mm"
-        numbers = [abs(float(cell)) for cell in cells if re.fullmatch(r"[+-]?\d+(\.\d*)?", cell)]
-        return "rad" if "rad" in self.units.values() and max(numbers, default=0) < RADIANS_BELOW_DEG else "deg"
-
-    def _kinds(self) -> list[str]:
-        """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
-        variable although others have one, or no number although others have one."""
-        if "type" in self.header:
-            return [cells[self.header.index("type")].strip() for _, cells in self.rows]
-        turns, slides = ([self._varies(name, cells) for _, cells in self.rows] for name in ("theta", "d"))
-        k = self.column.get("joint")
-        names = ["" if k is None else cells[k] for _, cells in self.rows]
-        numbered = any(map(_NUMBERED.search, names))
-        any_varies = any(turns) or any(slides)
-        found = []
-        for turned, slid, name in zip(turns, slides, names):
-            still = any_varies or (numbered and name.strip() and not _NUMBERED.search(name))
-            fixed = "tool" if _TOOL.search(name.lower()) else "fixed"
-            found.append("revolute" if turned else "prismatic" if slid else fixed if still else "revolute")
-        return found
-
-    def _varies(self, name: str, cells: list[str]) -> bool:
-        k = self.column.get(name)
-        return k is not None and _variable(cells[k]) is not None
-
-    def _plain(self, k: int, own: _Heading, kinds: list[str], columns: dict[str, list[str]]) -> None:
-        """A column of a, alpha or d; a sliding joint's d keeps the constant beside its variable."""
-        texts = []
-        for (number, cells), kind in zip(self.rows, kinds):
-            text = cells[k]
-            if own.quantity == "d" and kind == "prismatic":
-                text = self._beside(number, k, text)[1]
-            texts.append(text)
-        self._add(k, own.quantity, texts, columns)
-
-    def _theta(self, k: int, kinds: list[str], columns: dict[str, list[str]]) -> list[str]:
-        """Directions and offsets of joints that turn, and theta of those that slide."""
-        sliding = [kind == "prismatic" for kind in kinds]
-        parts = [
-            (0, cells[k]) if slides else self._beside(number, k, cells[k])
-            for (number, cells), slides in zip(self.rows, sliding)
-        ]
-        turning = ["" if slides else text for slides, (_, text) in zip(sliding, parts)]
-        offsets = [
-            f"joint {joint} {text}" for joint, text in zip(columns["joint"], turning) if joint and text.strip("0.°+- ")
-        ]
-        if "offset" not in self.column:
-            self._add(k, "offset", turning, columns)
-        elif offsets:
-            raise InputError(self.path, f"column {self.header[k]}", "another column holds offsets too", "Keep one")
-        if any(sliding):
-            self._add(k, "theta", [text if slides else "" for slides, (_, text) in zip(sliding, parts)], columns)
-        if any(sign < 0 for sign, _ in parts):
-            if "direction" in self.header:
-                problem = "another column holds directions too"
-                raise InputError(self.path, f"column {self.header[k]}", problem, "Keep one")
-            columns["direction"] = ["-1" if sign < 0 else "1" for sign, _ in parts]
-        return offsets
-
-    def _beside(self, number: int, k: int, cell: str) -> tuple[int, str]:
-        """The sign of a cell's variable, 1 if it has none, and what is added to it."""
-        found = _variable(cell)
-        if found is None:
-            return 1, cell.strip() or "0"
-        plain = _compact(cell)
-        beside = (plain[: found.start()] + plain[found.end() :]).strip("+()").replace(",", ".") or "0"
-        if _variable(beside) is not None:
-            where = f"row {number}, column {self.header[k]}"
-            raise InputError(self.path, where, f"'{cell}' holds two variables", "Write one variable and a number")
-        return (-1 if found[1] == "-" else 1), beside
-
-    def _add(self, k: int, name: str, cells: list[str], columns: dict[str, list[str]]) -> None:
-        """The column of a quantity, its cells without units and its fractions of pi as numbers."""
-        plain = [_compact(cell) for cell in cells]
-        unit = self._unit(k, name, plain)
-        plain = [re.sub(rf"(?<=\d)({unit}|°)$" if unit != "rad" else r"(?<=[\dπi])rad$", "", cell) for cell in plain]
-        in_pi = [_PI.fullmatch(cell) for cell in plain]
-        if unit != "rad" and any(in_pi):
-            problem = "fractions of pi in a column of degrees"
-            raise InputError(self.path, f"column {self.header[k]}", problem, "Write all its angles in one unit")
-        columns[f"{name}_{unit}"] = [_of_pi(found) if found else cell for found, cell in zip(in_pi, plain)]
-
-
-def _label(cell: str) -> str:
-    return re.sub(r"^\D*(\d+)\D*$", r"\1", cell.translate(_PLAIN)).strip()
-
-
-def _compact(cell: str) -> str:
-    return re.sub(r"\s", "", cell.lower().translate(_PLAIN))
-
-
-def _variable(cell: str) -> re.Match[str] | None:
-    """The variable in a cell that is not a plain number."""
-    return _VARIABLE.search(_compact(cell))
-
-
-def _of_pi(found: re.Match[str]) -> str:
-    sign, factor, divisor = found.groups()
-    return repr((-1 if sign == "-" else 1) * float(factor or 1) * math.pi / float(divisor or 1))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,12 +14,12 @@ from pydantic import Field, model_validator
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
-from er3a.files.dh_table import read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
-from er3a.formats.mesh_file import read_stl
+from er3a.formats.mesh_file import read_stl, read_text
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Reals
@@ -39,39 +41,79 @@ MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
-    """Load a robot by the name of a file in data/robots, or by a path that ends in .yaml or .csv.
+    """Load a robot by the name of a file in data/robots, or by the path of a robot file or a D-H table.
 
-    A name is looked up below the working folder first, then among the robots that come with er3a. A .csv holds a D-H
-    table (:mod:`er3a.files.dh_table`), mm and degrees, in the given convention unless the file names one. Assumptions
-    give a warning (``er3a.InputWarning``).
+    A name is looked up below the working folder first, then among the robots that come with er3a. Other files than
+    robot files (.yaml) hold a D-H table, as :func:`read_table` takes it. Assumptions give a warning
+    (``er3a.InputWarning``).
 
     Raises
     ------
     InputError
         naming file, field and remedy
     """
-    if str(name_or_path).endswith(".csv"):
-        return robot_of(read_table(Path(name_or_path), convention))
-    return robot_of(read_robot(robot_path(name_or_path)))
+    return (
+        read_table(name_or_path, convention)
+        if holds_table(name_or_path)
+        else robot_of(read_robot(robot_path(name_or_path)))
+    )
 
 
-def read_table(path: Path, convention: Convention = "standard") -> robot_file.RobotFile:
-    """A robot file made from a D-H table; assumptions give a warning (``er3a.InputWarning``).
+def holds_table(source: str | Path) -> bool:
+    """Whether a path is that of a D-H table, not a robot's name or file, nor a URDF.
 
     Parameters
     ----------
-    path : CSV; the robot is named after it
+    source : ``-`` is a table on standard input; a text of several lines is a table itself
+
+    Returns
+    -------
+    found : of .yaml whether it lacks the key ``kind``, of other endings whether they are none of a URDF; without an
+        ending whether there is such a file
+    """
+    text = str(source)
+    if text == "-" or "\n" in text:
+        return True
+    path = Path(text)
+    if path.suffix in (".yaml", ".yml"):
+        return path.is_file() and re.search(r"(?m)^[\"']?kind[\"']?\s*:", read_text(path)) is None
+    return path.suffix not in ("", ".urdf", ".xacro", ".xml") or (not path.suffix and path.is_file())
+
+
+def read_table(
+    source: str | Path,
+    convention: Convention = "standard",
+    *,
+    length_unit: LengthUnit | None = None,
+    angle_unit: AngleUnit | None = None,
+    columns: Sequence[str] = (),
+) -> Robot:
+    """The arm of a D-H table in any form that people write; assumptions give a warning (``er3a.InputWarning``).
+
+    Parameters
+    ----------
+    source : a file (CSV, Markdown, LaTeX, HTML, MATLAB, Python, JSON, YAML, text), or the table itself as a text
     convention : standard or modified D-H, unless the table itself says which
+    length_unit, angle_unit : ``mm``, ``cm``, ``m``, ``in``; ``deg``, ``rad``, where the table says none
+    columns : what the columns mean, in their order, where their headings don't say it, such as
+        ``["theta", "d", "a", "alpha"]``; ``-`` is not read
+
+    Returns
+    -------
+    robot : named after the file, in m and rad
 
     Raises
     ------
     InputError
-        naming row and column that can't be used
+        naming the row, column or cell that can't be read, or that can be read in two ways, with both
     """
-    content, notes = read_dh_table(path, robot_name(path), convention)
+    text = str(source) if "\n" in str(source) else None
+    path = Path("table" if text else source)
+    units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
+    content, notes = read_dh_table(path, robot_name(path), convention, text=text, **units)
     if notes:
-        warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=4)
-    return content
+        warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=3)
+    return robot_of(content)
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:

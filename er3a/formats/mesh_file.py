@@ -217,8 +217,26 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
     InputError
         if it is missing, not a plain file, unreadable, too large, or not UTF-8 (with the number of the byte)
     """
-    raw = given_bytes(path, most, too_large)
+    return text_of(path, given_bytes(path, most, too_large), "utf-8-sig")
+
+
+def text_of(path: Path, raw: bytes, encoding: str = "") -> str:
+    """The text that a file's bytes are.
+
+    Parameters
+    ----------
+    encoding : by default UTF-8, or UTF-16 where a byte order mark says so, as spreadsheets write it
+
+    Returns
+    -------
+    text : without the byte order mark, if it has one
+
+    Raises
+    ------
+    InputError
+        if they are in another encoding (with the number of the byte)
+    """
     try:
-        return raw.decode("utf-8-sig")
+        return raw.decode(encoding or ("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "not UTF-8 text", "Save the file as UTF-8") from None

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from er3a.errors import InputError
 from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
-from er3a.files.dh_table import is_printed_table, read_dh_table
+from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
 from er3a.files.path_file import (
     TRAJECTORIES,
@@ -22,6 +22,7 @@ from er3a.files.path_file import (
     load_paths,
     read_path_table,
 )
+from er3a.files.printed_table import table_in
 from er3a.files.program_file import ProgramsFile, load_programs
 from er3a.files.reference_sets import FILE as DOCUMENTS
 from er3a.files.reference_sets import (
@@ -32,7 +33,7 @@ from er3a.files.reference_sets import (
     load_references,
 )
 from er3a.files.robot_file import RobotFile
-from er3a.files.robot_library import load_of, load_robot
+from er3a.files.robot_library import holds_table, load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
@@ -147,15 +148,15 @@ def check_file(path: Path) -> str:
     if path.suffix in TRAJECTORIES and is_ros_trajectory(path):
         read_path_table(path)
         return "a path"
+    if holds_table(path) and table_in(path):
+        read_dh_table(path, "arm")
+        return "a D-H table"
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():
             raise InputError(path, None, "there is no such file", "Check the path")
         ending = f"'{path.suffix}' files" if path.suffix else "files without an ending"
         raise InputError(
-            path,
-            None,
-            f"{ending} are none of er3a's inputs",
-            "Give a .yaml or .csv file, or a trajectory of ROS (.json)",
+            path, None, f"{ending} are none of er3a's inputs", "Give a .yaml file, a table or a trajectory"
         )
     kind = read_yaml(path).get("kind")
     if not isinstance(kind, str) or kind not in _CHECKS:
@@ -202,7 +203,7 @@ def _check_table(path: Path) -> str:
     if {"q1_deg", "q1_mm"} & set(header) and "point" in header:
         load_measurements(path)
         return "measured positions"
-    if is_printed_table(header):
+    if path.stem not in FORMATS and table_in(path):
         read_dh_table(path, "arm")
         return "a D-H table"
     if {"name", *POSITION} <= set(header):

@@ -16,10 +16,12 @@ from er3a.pipeline.commands.options import (
     Angles,
     AsJson,
     Base,
+    Columns,
     Lengths,
     Tip,
     Xacro,
     app,
+    columns_of,
     print_json,
     print_note,
 )
@@ -33,7 +35,7 @@ MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
 TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
-_ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
+_ARM = "a D-H table in any form (- is standard input), a robot's name or file, a URDF or xacro"
 
 
 @app.command(rich_help_panel=ROBOT_FILES)
@@ -44,6 +46,7 @@ def compare(
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Lengths = None,
     angle_unit: Angles = None,
+    column: Columns = None,
     base: Base = None,
     tip: Tip = None,
     xacro: Xacro = None,
@@ -56,16 +59,20 @@ def compare(
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm
+    from er3a.files.robot_library import holds_table
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
+    if a == b == "-":
+        raise Er3aError("standard input holds one table; give A or B as a file")
     _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip, "as_printed": True}
+    options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
     folder = Path(b)
     with noted_doubts() as doubtful:
         first = read_arm(a, xacro=xacro or (), **options)
-        others = _others(b, xacro or (), options)
+        # Names of columns are those of A, or of B if A is no table.
+        others = _others(b, xacro or (), options | ({"columns": ()} if holds_table(a) else {}))
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)

@@ -100,8 +100,17 @@ Lengths = Annotated[
     LengthUnit | None, typer.Option(help="unit of lengths in a D-H table (default: that of its columns)")
 ]
 Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in a D-H table (default: that of its columns)")]
+Columns = Annotated[
+    str | None,
+    typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (-: not read)"),
+]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
+
+
+def columns_of(given: str | None) -> list[str]:
+    """The meanings of columns that --column gives, with commas or blanks between them."""
+    return (given or "").replace(",", " ").split()
 
 
 def as_json_text(content: Any) -> str:

@@ -109,12 +109,12 @@ def teach(
 ):
     """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
-    A file (.csv with a D-H table, .yaml, .urdf) needs no study: its page is written into the current folder.
+    A file (.yaml, .urdf, a D-H table in any form) needs no study: its page is written into the current folder.
     """
-    from er3a.files.arm_file import READ
+    from er3a.robots.robot import robot_name
 
-    if Path(robot).suffix in READ:
-        _teach_file(robot, output or Path(f"{Path(robot).stem}.html"))
+    if robot == "-" or Path(robot).suffix:
+        _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"))
         return
     if output is not None:
         raise Er3aError(
@@ -134,7 +134,8 @@ def _teach_file(source: str, page: Path) -> None:
     arm = read_arm(source)
     for note in arm.notes:
         options.print_note(note)
-    provenance = Provenance((Input(source, sha256(Path(source)), {}),), code_digest())
+    inputs = (Input(source, sha256(Path(source)), {}),) if Path(source).is_file() else ()
+    provenance = Provenance(inputs, code_digest())
     command = shlex.join(["er3a", "teach", source, "--output", str(page)])
     write_panel(arm.robot, page, command=command, provenance=provenance)
     print(f"{page}: written")

@@ -32,7 +32,7 @@ def new(
     xacro: options.Xacro = None,
     base: options.Base = None,
     tip: options.Tip = None,
-    dh: Annotated[Path | None, typer.Option(help="the arm, as a CSV table: joint, a_mm, alpha_deg, d_mm ...")] = None,
+    dh: Annotated[Path | None, typer.Option(help="the arm, as a D-H table in any form (- is standard input)")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
     name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: the file's name)")] = None,
     convention: Annotated[
@@ -40,6 +40,7 @@ def new(
     ] = None,
     length_unit: options.Lengths = None,
     angle_unit: options.Angles = None,
+    column: options.Columns = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
     from er3a.pipeline.new_study.arms import arm_of
@@ -48,6 +49,7 @@ def new(
     ends, arguments = (base, tip), tuple(xacro or ())
     with shown_work(f"{folder}: reading the arm") as at:
         form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+        form["columns"] = options.columns_of(column)
         arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, **form)
         at(f"{folder}: searching for targets and paths that the arm can do")
         written = write_study(arm, folder)

@@ -50,6 +50,7 @@ def arm_of(
     convention: Convention | None = None,
     length_unit: LengthUnit | None = None,
     angle_unit: AngleUnit | None = None,
+    columns: Sequence[str] = (),
     ends: tuple[str | None, str | None] = (None, None),
     xacro: Sequence[str] = (),
 ) -> Arm:
@@ -59,6 +60,7 @@ def arm_of(
     ----------
     name : of the robot in the study; by default that of the file
     convention, length_unit, angle_unit : of the D-H table, where its columns don't say; "standard" if None
+    columns : what the columns of the D-H table mean, in their order
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
     xacro : arguments ``NAME:=VALUE`` of a URDF that is xacro
 
@@ -74,15 +76,16 @@ def arm_of(
     if name is not None and not re.match(NAME_PATTERN, name):
         allowed = "small letters, digits, - and _, a letter or digit first, 64 at most"
         raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
-    if dh is None and (convention, length_unit, angle_unit) != (None, None, None):
-        raise Er3aError("--convention, --length-unit and --angle-unit say how a table is meant; give them with --dh")
+    if dh is None and (columns or (convention, length_unit, angle_unit) != (None, None, None)):
+        named = "--convention, --length-unit, --angle-unit and --column"
+        raise Er3aError(f"{named} say how a table is meant; give them with --dh")
     if urdf is None and (ends != (None, None) or xacro):
         raise Er3aError("--base, --tip and --xacro say how a URDF is read; give them with --urdf")
     if urdf is not None:
         with plain_urdf(urdf, xacro) as file:
             return _from_urdf(file, name or robot_name(file), ends)
     if dh is not None:
-        units: Any = {"length_unit": length_unit, "angle_unit": angle_unit}
+        units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
         content, notes = read_dh_table(dh, name or robot_name(dh), convention or "standard", **units)
         return Arm(robot_of(content), _text(content), notes)
     return _known(str(robot), name)

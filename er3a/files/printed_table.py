@@ -1,0 +1,549 @@
+"""A D-H table in any text, as columns with er3a's headings.
+
+The text is cut into cells (:mod:`er3a.files.table_cells`, :mod:`er3a.files.table_code`), headings say what the columns
+mean (:mod:`er3a.files.table_headings`), and cells are parsed (:mod:`er3a.files.arithmetic`). What can be read in two
+ways is refused, with both.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import NoReturn
+
+from er3a.errors import InputError, given_bytes
+from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.csv_file import Lines, check_widths
+from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
+from er3a.files.table_code import LIBRARIES, code_grids, elements
+from er3a.files.table_headings import Heading, heading_of
+from er3a.formats.mesh_file import text_of
+from er3a.numerics.si_units import RADIANS_BELOW_DEG
+from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
+
+FIXED = "fixed", "tool"
+NEEDED = frozenset({"a", "alpha", "d"})
+PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
+_NUMBERED = re.compile(r"\d")
+_TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
+_CELL = (
+    (r"[{}$]", ""),
+    (r"\(t\)", ""),
+    (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
+    (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
+    (r"\*+(?=$|\s*[-+])", ""),
+    (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
+)
+"""Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
+_STARRED = re.compile(r"^\*$|\w\*+\s*(?:$|[-+])")
+_COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
+_NAMED = re.compile(r"[^\W\d]+\.?\s*\d+\s*:?")
+_BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
+_KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
+_KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
+SIGNS = {
+    "modified": re.compile(
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig'?s\b", re.I
+    ),
+    "standard": re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I),
+}
+"""What a text around a table says of its convention."""
+_GIVEN = re.compile(
+    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n(])+?)"
+    r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b)?"
+)
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither the
+    heading nor cells say the unit."""
+
+    lines: Lines
+    notes: tuple[str, ...]
+    without_unit: frozenset[str] = frozenset()
+
+
+MAX_BYTES = 200_000
+MOST_LINES = 1 + 10 * MAX_JOINTS  # a header, and more rows than joints, fixed ones and notes take
+
+
+def check_size(path: Path, lines: Lines) -> None:
+    """Refuse more rows than any arm has.
+
+    Parameters
+    ----------
+    lines : the header and the rows
+
+    Raises
+    ------
+    InputError
+        with the number of rows
+    """
+    if len(lines) > MOST_LINES:
+        problem = f"{len(lines) - 1:,} rows are no arm's table"
+        raise InputError(path, None, problem, f"er3a models 1 to {MAX_JOINTS} joints: write one row for each")
+
+
+def table_text(path: Path) -> str:
+    """The text of a file in UTF-8 or UTF-16, or of standard input for ``-``.
+
+    Raises
+    ------
+    InputError
+        if it is missing, too large or no text
+    """
+    pasted = str(path) == "-"
+    return text_of(path, _pasted() if pasted else given_bytes(path, MAX_BYTES, "Give the table without the rest"))
+
+
+@cache
+def _pasted() -> bytes:
+    """Standard input, which can be read once."""
+    return sys.stdin.buffer.read(MAX_BYTES)
+
+
+def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> PrintedTable | None:
+    """The one D-H table in a text, under er3a's headings, its cells as numbers.
+
+    Parameters
+    ----------
+    path : named in errors
+    columns : what the columns mean, in their order, in place of their headings: ``theta``, ``d``, ``a``, ``alpha``,
+        ``joint``, ``offset``, or ``-`` for one that is not read
+
+    Returns
+    -------
+    table : None if no row of the text has the headings of a D-H table
+
+    Raises
+    ------
+    InputError
+        naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
+    """
+    try:
+        found, from_code = _tables(text, columns)
+    except InputError as error:
+        raise InputError(path, error.field, error.problem, error.remedy) from None
+    tables = [table for n, table in enumerate(found[:9]) if [row for _, row in table] not in _rows_of(found[:n])]
+    if not tables:
+        return None
+    if len(tables) > 1:
+        lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
+        raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
+    check_size(path, tables[0])
+    return _Table(path, text, tables[0], from_code).converted()
+
+
+def table_in(path: Path) -> bool:
+    """Whether a file, or standard input for ``-``, holds a D-H table.
+
+    Raises
+    ------
+    InputError
+        for a table that can't be read
+    """
+    small = str(path) == "-" or (path.is_file() and path.stat().st_size < MAX_BYTES)
+    return small and printed_table(path, table_text(path)) is not None
+
+
+def is_printed_table(header: Iterable[str]) -> bool:
+    """Whether a table's headings are those of a D-H table, printed or er3a's own.
+
+    Parameters
+    ----------
+    header : column names in any order; further columns are allowed
+
+    Returns
+    -------
+    found : whether a, alpha and d are all among them
+    """
+    return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
+
+
+def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
+    return [[row for _, row in grid] for grid in grids]
+
+
+# Where the table is ---------------------------------------------------------------------------------------------------
+
+
+def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
+    """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
+    bare = code_grids(text, headed=False) if columns else []
+    if tables := [table for grid in bare for table in _headed(grid, columns)]:
+        return tables, True
+    page = html_grids(text) or latex_grids(text)
+    if tables := [table for grid in page for table in _headed(grid, columns)]:
+        return tables, False
+    if tables := [table for grid in code_grids(text) for table in _headed(grid, columns)]:
+        return tables, True
+    for mark, grid in line_grids(text):
+        if tables := _headed(grid, columns):
+            return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
+    if tables := [table for grid in _stacked(text) for table in _headed(grid, columns)]:
+        return tables, False
+    if bare := code_grids(text, headed=False):
+        problem = "a matrix whose columns have no names"
+        remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
+        raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
+    return [], False
+
+
+def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
+    """The tables of a grid: rows of headings, each with the rows below it."""
+    tables: list[Grid] = []
+    open_one, broken = False, 0
+    for line, cells in grid:
+        titled = is_printed_table(cells)
+        if titled and columns and len(cells) != len(columns):
+            problem = f"--column names {len(columns)} columns, and the table has {len(cells)}"
+            raise InputError(None, f"line {line}", problem, "Name each, - for one that is not read")
+        if titled or (columns and len(cells) == len(columns) and not tables):
+            tables.append([(line, list(columns) or cells)])
+            if not titled:
+                tables[-1].append((line, cells))
+            open_one, broken = True, 0
+        elif open_one:
+            filled = [cell for cell in cells if cell]
+            header = tables[-1][0][1]
+            if len(tables[-1]) == 1 and filled and all(_unit_in(cell) for cell in filled) and len(filled) > 1:
+                tables[-1][0] = line, _with_units(header, cells)
+            elif len(filled) < 2 or all("=" in cell for cell in filled):
+                broken = line
+            elif (len(cells) != len(header) and not _numeric(filled)) or (broken and not _numeric(filled)):
+                open_one = False
+            elif broken and len(tables[-1]) > 1 and _numeric(filled):
+                raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
+            else:
+                tables[-1].append((line, cells))
+    return [table for table in tables if len(table) > 1] or _turned(grid)
+
+
+def _numeric(cells: list[str]) -> bool:
+    return 2 * sum(bool(re.search(r"\d|π", cell)) for cell in cells) > len(cells)
+
+
+def _unit_in(cell: str) -> str:
+    return UNITS.get(plain(cell).strip("()[] .").lower(), "")
+
+
+def _with_units(header: list[str], cells: list[str]) -> list[str]:
+    return [f"{name} [{_unit_in(cell)}]" if _unit_in(cell) else name for name, cell in zip(header, cells)]
+
+
+def _trimmed(table: Grid) -> Grid:
+    """A table without what follows its last known column, where headings or cells hold blanks."""
+    header = table[0][1]
+    firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
+    counted = firsts in ([str(n + start) for n in range(len(table) - 1)] for start in (0, 1))
+    if counted or (len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts))):
+        header = ["joint", *header]  # a column of names or numbers that has no heading
+        table = [(table[0][0], header), *table[1:]]
+    widths = {len(cells) for _, cells in table}
+    known = [bool(heading_of(name)) for name in header]
+    last = len(known) - known[::-1].index(True)
+    if len(widths) > 1 and all(known[1:last]) and min(widths) >= last < len(header):
+        return [(line, cells[:last]) for line, cells in table]
+    return table
+
+
+def _stacked(text: str) -> list[Grid]:
+    """A table that was copied with each cell on a line of its own."""
+    lines = [(n, line) for n, line in enumerate(without_latex(plain(text)).split("\n"), 1) if line.strip()]
+    known = [heading_of(line.strip()) is not None for _, line in lines]
+    for start, width in ((k, w) for k in range(len(lines)) if all(known[k : k + 4]) for w in (6, 5, 4)):
+        cells = [line.strip() for _, line in lines[start:]]
+        if not is_printed_table(cells[:width]) or not all(known[start : start + width]):
+            continue
+        rows = [cells[place : place + width] for place in range(width, len(cells), width)]
+        good = next((n for n, row in enumerate(rows) if len(row) < width or not _numeric(row)), len(rows))
+        if good < len(rows) and re.fullmatch(r"[-\d.]+", rows[good][0]):
+            raise InputError(None, f"line {lines[start][0]}", "cells are missing in the last row", "Add them")
+        return [[(lines[start + n * width][0], row) for n, row in enumerate([cells[:width], *rows[:good]])]]
+    return []
+
+
+def _turned(grid: Grid) -> list[Grid]:
+    """A table whose rows are what columns usually are."""
+    rows = [(line, cells) for line, cells in grid if len(cells) > 2 and heading_of(cells[0])]
+    sizes = {len(cells) for _, cells in rows}
+    numbers = [_numeric(cells[1:]) for _, cells in rows]
+    if not is_printed_table(cells[0] for _, cells in rows) or len(sizes) > 1 or not all(numbers):
+        return []
+    return [[(rows[0][0], list(column)) for column in zip(*(cells for _, cells in rows))]]
+
+
+# What it says ---------------------------------------------------------------------------------------------------------
+
+
+class _Table:
+    """A table with its headings, of which each cell becomes an amount."""
+
+    def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
+        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
+        check_widths(path, [(0, self.header), *self.rows])
+        found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
+        if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
+            found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
+        labels = [k for k, own in found.items() if own.quantity == "joint"]
+        self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
+        self.column = {own.quantity: k for k, own in self.headings.items()}
+        self._check_headings()
+        self.convention = self._stated(text)
+        if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
+            self.notes.append("base and tool of the program are not read")
+        self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.given = (elements(self.text) if from_code else {}) | self._given()
+        self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
+        self.kinds = self._kinds()
+        self.columns: dict[str, list[str]] = {"joint": self._joints()}
+
+    def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
+        place = f"column {self.header[k]}"
+        raise InputError(self.path, place if row is None else f"row {self.rows[row][0]}, {place}", problem, remedy)
+
+    def _check_headings(self) -> None:
+        """Refuse two columns of one quantity, and d beside r, of which either can be the link's length."""
+        for k, own in self.headings.items():
+            if k != self.column[own.quantity]:
+                other = self.header[self.column[own.quantity]]
+                remedy = "Say what the columns are, - for one that is not read: --column joint,theta,d,a,alpha"
+                self._refuse(None, k, f"it and column '{other}' both mean {own.quantity}", remedy)
+        signs = [own.sign if own.sign in ("d", "r") else own.quantity for own in self.headings.values()]
+        if [each for each in signs if each in ("alpha", "d", "theta", "r")] == ["alpha", "d", "theta", "r"]:
+            remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
+            self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
+
+    def _stated(self, text: str) -> Convention | None:
+        """The convention that headings, the library, or the text around the table says."""
+        if "convention" in self.header:
+            return None
+        if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
+            self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
+            return "modified"
+        near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
+        said = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
+        said |= {name for name, sign in SIGNS.items() if sign.search(near)}
+        for one in CONVENTIONS if len(said) == 1 else ():
+            if one in said:
+                self.notes.append(f"the text says {one} D-H, and was read so")
+                return one
+        return None
+
+    def _given(self) -> dict[str, str]:
+        """Values of symbols, as expressions; a symbol with two values has none."""
+        found: dict[str, str] = {}
+        for name, value, unit in _GIVEN.findall(self.text):
+            if not re.search(r"[\[\"']|\(\)$", value):
+                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.rstrip(" \t.")
+                found[symbol] = value if found.get(symbol, value) == value else "two values"
+        for names, values in re.findall(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$", self.text):
+            if names.count(",") == values.count(","):
+                found |= dict(zip(map(name_of, names.split(",")), map(str.strip, values.strip(" ;").split(","))))
+        return found
+
+    def converted(self) -> PrintedTable:
+        """The table under er3a's headings, with variables taken out of the cells of theta and d.
+
+        Returns
+        -------
+        table : its lines as those of a file, the header first. Offsets and directions come from cells such as
+            ``q2-90``. The convention is modified if a and alpha belong to link i-1, and no column names another one.
+        """
+        unused = []
+        for k, name in enumerate(self.header):
+            own = self.headings.get(k)
+            stem = re.sub(r"_(m|in|cm|rad|mm|deg)(_s)?$", "", name)
+            if own and own.quantity == "theta":
+                self._theta(k)
+            elif own and own.quantity not in ("joint", "type"):
+                self._constants(k, own.quantity)
+            elif own is None and (stem in OWN or difflib.get_close_matches(stem.lower(), OWN, n=1, cutoff=0.8)):
+                self.columns[name] = [cells[k] for _, cells in self.rows]
+            elif own is None and name:
+                unused.append(name)
+        signs = [self._variable(row)[1] for row in range(len(self.rows))]
+        if min(signs) < 0:
+            if "direction" in self.header:
+                self._refuse(None, self.header.index("direction"), "signs of variables are directions too", "Keep one")
+            self.columns["direction"] = ["-1" if sign < 0 else "1" for sign in signs]
+        if set(self.kinds) - {"revolute"} or "type" in self.columns:
+            self.columns["type"] = self.kinds
+        if self.convention:
+            self.columns["convention"] = [self.convention] * len(self.kinds)
+        if unused:
+            self.notes.append(f"not used: {', '.join(unused)}")
+        made = [(line, list(cells)) for (line, _), cells in zip(self.rows, zip(*self.columns.values()))]
+        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid))
+
+    def _amounts(self, k: int) -> list[CellAmount | None]:
+        """The amounts of a column's cells; None for an empty one."""
+        cells = [cells[k] for _, cells in self.rows]
+        if self.headings[k].quantity == "type":
+            return []
+        commas = [found for cell in cells if (found := _COMMA.fullmatch(cell.strip()))]
+        thousands = [found[0] for found in commas if len(found[2]) == 3 and found[1].strip("+-") != "0"]
+        if thousands and len(thousands) == len(commas):
+            remedy = "Write a number with a point before decimals and nothing between thousands"
+            self._refuse(None, k, f"'{thousands[0]}' is not a number", remedy)
+        cells = [_COMMA.sub(r"\1.\2\3", cell) for cell in cells] if commas else cells
+        return [self._amount(row, k, cell) for row, cell in enumerate(cells)]
+
+    def _amount(self, row: int, k: int, cell: str) -> CellAmount | None:
+        text = plain(without_latex(cell)).strip().rpartition("=")[2]
+        for pattern, plainly in _CELL:
+            text = re.sub(pattern, plainly, text, flags=re.IGNORECASE)
+        if not text:
+            return None
+        given = self.given
+        if self.headings[k].quantity == "theta":  # a value of a joint there is a pose
+            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)\d*", name)}
+        try:
+            found = amount_of(text, given)
+        except ValueError as error:
+            remedy = "Write a number without a unit, or arithmetic with pi and names whose values are given"
+            self._refuse(row, k, f"'{cell}' {error}", remedy)
+        names = {name: times for name, times in found.variables.items() if times}
+        if len(names) > 1:
+            self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
+        if {*map(abs, names.values())} - {1.0}:
+            self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
+        return replace(found, variables=names)
+
+    def _kinds(self) -> list[str]:
+        """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no
+        variable although others have one, or at an end if it alone has no number in its name."""
+        k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
+        if k is not None:
+            return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
+        turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
+        starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
+        moving = any(turns) or any(starred)
+        names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
+        ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name.lower()}
+        ends = ends if ends <= {0, len(names) - 1} and len(ends) < len(names) else set()
+        found = []
+        for row, name in enumerate(names):
+            kind = "tool" if _TOOL.search(name.lower()) else "fixed"
+            if turns[row] or not (moving or (row in ends and name)):
+                kind = "revolute"
+            elif slides[row] and (starred[row] or any(turns)):
+                kind = "prismatic"
+            said = _BY_NAME.search(name)
+            if said and (_KINDS[said[1].lower()] == "prismatic") != (kind == "prismatic"):
+                problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {kind} by its variable"
+                self._refuse(row, self.column["joint"], problem, "Write the variable into theta or d")
+            found.append(kind)
+        return found
+
+    def _of(self, quantity: str) -> list[CellAmount | None]:
+        return self.amounts.get(quantity) or [None] * len(self.rows)
+
+    def _variable(self, row: int) -> tuple[str, float]:
+        """Name and sign of the variable of a row's joint."""
+        found = self._of("d" if self.kinds[row] == "prismatic" else "theta")[row]
+        return next(iter(found.variables.items()), ("", 1.0)) if found else ("", 1.0)
+
+    def _joints(self) -> list[str]:
+        """The number of each row's joint, "" where nothing moves.
+
+        The variables' numbers, from 0 or 1 on, are held against the order of the rows. Where some rows are fixed, the
+        table's numbers may be those of its rows; they become those of its joints.
+        """
+        moving = [row for row, kind in enumerate(self.kinds) if kind not in FIXED]
+        numbers = [re.search(r"\d+$", self._variable(row)[0]) for row in moving]
+        variables = [int(number[0]) if number else None for number in numbers]
+        start = 0 if variables[:1] == [0] else 1
+        for joint, (row, number) in enumerate(zip(moving, variables), start):
+            if number not in (None, joint):
+                problem = f"the variable is number {number} where that of joint {joint} belongs"
+                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Order the rows, or correct it")
+        order = [str(joint) for joint in range(1, len(moving) + 1)]
+        labels = order
+        if (k := self.column.get("joint")) is not None:
+            texts = [plain(self.rows[row][1][k]).strip() for row in moving]
+            firsts = [_label(text, 0) for text in texts]
+            labels = firsts if firsts == order else [_label(text, -1) for text in texts]
+            numbered = [int(label) for label in labels if label.isdecimal()]
+            from_zero = numbered == list(range(len(labels)))
+            by_row = len(moving) < len(self.kinds) and len({each - row for each, row in zip(numbered, moving)}) == 1
+            if from_zero:
+                self.notes.append("joints are numbered from 0")
+            if from_zero or by_row or len(numbered) < len(labels):  # names such as Elbow, Wrist 1 say no order
+                labels = order
+        found = dict(zip(moving, labels))
+        return [found.get(row, "") for row in range(len(self.kinds))]
+
+    def _constants(self, k: int, quantity: str) -> None:
+        """A column of constants; a sliding joint's d keeps the constant beside its variable."""
+        for row, (found, kind) in enumerate(zip(self.amounts[quantity], self.kinds)):
+            if found and found.variables and not (quantity == "d" and kind == "prismatic"):
+                name = min(found.variables)
+                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
+        self._add(k, quantity, self.amounts[quantity])
+
+    def _theta(self, k: int) -> None:
+        """Offsets of joints that turn, and theta of those that slide."""
+        sliding = [kind == "prismatic" for kind in self.kinds]
+        found = [each or CellAmount(0.0) for each in self.amounts["theta"]]
+        turning = [None if slides else each for slides, each in zip(sliding, found)]
+        rows = zip(self.columns["joint"], turning, self.rows)
+        offsets = [f"joint {n} {cells[k].strip()}" for n, each, (_, cells) in rows if n and each and each.number]
+        if "offset" not in self.column:
+            self._add(k, "offset", turning)
+            if offsets:
+                self.notes.append(f"theta was read as the joint's angle with an offset: {', '.join(offsets)}")
+        elif offsets:
+            self._refuse(None, k, f"{offsets[0]}: another column holds offsets too", "Keep one")
+        if any(sliding):
+            self._add(k, "theta", [each if slides else None for slides, each in zip(sliding, found)])
+
+    def _add(self, k: int, name: str, found: list[CellAmount | None]) -> None:
+        """A column of a quantity, in the unit that its heading or cells say; in mm or degrees if none do."""
+        length = name in ("a", "d")
+        for row, each in enumerate(found):
+            if each and each.unit and (each.unit in PER_MM) != length:
+                self._refuse(row, k, f"'{self.rows[row][1][k]}' is in {each.unit}", f"That is no unit of {name}")
+        units = sorted({each.unit for each in found if each and each.unit and each.number})
+        bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
+        unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
+        if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
+            unit = "rad"
+        if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
+            problem = f"{bare:g} among values in {' and '.join(units)}: which unit?"
+            self._refuse(None, k, problem, "Write all its values in one unit")
+        column = f"{name}_{unit or ('mm' if length else 'deg')}"
+        if not unit and not units:
+            self.unsaid.add(column)
+        unit = column.rpartition("_")[2]
+        self.columns[column] = ["" if each is None else repr(_in(each, unit)) for each in found]
+
+    def _has_radians(self) -> bool:
+        """Whether other columns are in radians, whose small angles are radians then."""
+        texts = [cell.lower() for _, cells in self.rows for cell in cells]
+        return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
+
+
+def _in(amount: CellAmount, unit: str) -> float:
+    """An amount's number in a unit, which is its own if it has none."""
+    if amount.unit in ("", unit):
+        return amount.number
+    if unit in PER_MM:
+        return amount.number * PER_MM[amount.unit] / PER_MM[unit]
+    return math.degrees(amount.number) if unit == "deg" else math.radians(amount.number)
+
+
+def _label(cell: str, place: int) -> str:
+    """The number of a joint in its name; of two, as in 0-1, that at a place."""
+    pair = re.search(r"(\d+)\s*(?:[-→>/]|to)+\s*(\d+)", cell)
+    found = pair.groups() if pair else re.findall(r"\d+", cell)[:1]
+    return found[place] if found else cell

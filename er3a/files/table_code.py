@@ -1,0 +1,486 @@
+"""D-H tables in programs and data: calls such as ``RevoluteDH(d=0.29)``, matrices, lists, JSON. Nothing is executed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from er3a.errors import InputError
+from er3a.files.table_cells import Grid
+from er3a.files.table_headings import heading_of
+
+_COMMENT = re.compile(
+    r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
+)
+_BLOCK = re.compile(
+    r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
+)
+_TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
+_OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
+_ORDERS = {
+    "dhlink": ("d", "alpha", "theta", "a", "sigma"),
+    "revolutedh": ("d", "a", "alpha", "offset"),
+    "revolutemdh": ("d", "a", "alpha", "offset"),
+    "prismaticdh": ("theta", "a", "alpha", "offset"),
+    "prismaticmdh": ("theta", "a", "alpha", "offset"),
+}
+"""The order of arguments without names, by the function."""
+LIBRARIES = {
+    "SerialLink": ("theta,d,a,alpha,type,offset", ""),
+    "setFixedTransform": ("a,alpha,d,theta", ""),
+    "pybotics": ("alpha,a,theta,d", "modified"),
+    "MDHKinematicChain": ("alpha,a,theta,d", "modified"),
+    "visual_kinematics": ("d,a,alpha,theta", "standard"),
+    "sympybotics": ("alpha,a,d,theta", ""),
+}
+"""Columns of a matrix, and the convention, by a name of the library that takes it."""
+_INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
+LONGEST_GROUP = 30_000  # characters between two brackets
+_CLOSING = {"(": ")", "[": "]", "{": "}"}
+
+
+@dataclass(frozen=True)
+class Code:
+    """A program: its text without comments, and these by their lines."""
+
+    text: str
+    comments: dict[int, str]
+
+    def line(self, place: int) -> int:
+        """The number of the line of a place in the text."""
+        return self.text.count("\n", 0, place) + 1
+
+
+@dataclass(frozen=True)
+class Group:
+    """A pair of brackets: where they are, what is in them and what is written before them."""
+
+    start: int
+    end: int
+    bracket: str
+    inside: str
+    before: str
+
+
+def code_of(text: str) -> Code:
+    """A program's text without its comments; the numbers of its lines stay."""
+    comments: dict[int, str] = {}
+    text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+
+    def kept(found: re.Match[str]) -> str:
+        if found[1] is None and found[2]:
+            comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
+        return found[1] or ""
+
+    return Code(_COMMENT.sub(kept, text), comments)
+
+
+def groups_of(text: str) -> list[Group]:
+    """All pairs of brackets, in the order of their ends."""
+    found, open_ones = list[Group](), list[int]()
+    for bracket in re.finditer(r"[()\[\]{}]", text):
+        place = bracket.start()
+        if bracket[0] in _CLOSING:
+            open_ones.append(place)
+        elif open_ones and _CLOSING[text[open_ones[-1]]] == bracket[0]:
+            start = open_ones.pop()
+            if place - start > LONGEST_GROUP:
+                continue
+            before = text[max(0, start - 80) : start]
+            found.append(Group(start, place, text[start], text[start + 1 : place], before))
+    return found
+
+
+def parts(text: str, mark: str = ",") -> list[str]:
+    """A text cut at marks that are in no brackets and no quotes."""
+    cut, depth, quote, start = list[str](), 0, "", 0
+    for place, sign in enumerate(text):
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'" and not re.match(r"[\w\])}.]", text[max(place - 1, 0) : place]):
+            quote = sign
+        else:
+            depth += (sign in "([{") - (sign in ")]}")
+            if sign == mark and depth == 0:
+                cut.append(text[start:place])
+                start = place + 1
+    return [each.strip() for each in [*cut, text[start:]]]
+
+
+def row_cells(text: str) -> list[str]:
+    """The elements of a list, with commas or, as MATLAB takes them, blanks between them."""
+    cells = parts(text)
+    if len(cells) == 1:
+        text = re.sub(r"\s*([*/^])\s*", r"\1", text.strip())
+        text = re.sub(r"(?<=[\w)\]])\s+([-+])\s+", r"\1", text)
+        text = re.sub(r"[(\[{][^()\[\]{}]*[)\]}]", lambda found: found[0].replace(" ", ""), text)
+        cells = text.split()
+    return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
+
+
+def _rows(group: Group) -> list[list[str]]:
+    """The rows of a matrix; [] if the group is none."""
+    inner = [each for each in parts(group.inside) if each]
+    if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
+        return [row_cells(each[1:-1]) for each in inner]
+    lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
+    if group.bracket != "[" or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
+        return []
+    return [row_cells(each.strip().strip("[],")) for each in lines]
+
+
+def _goes_on(line: str) -> bool:
+    return line.rstrip().endswith(",")
+
+
+def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
+    """The tables in a program or in data.
+
+    Parameters
+    ----------
+    headed : those whose columns have names; otherwise matrices of numbers without any
+
+    Returns
+    -------
+    grids : of each its headings and rows, with their lines
+    """
+    code = code_of(text)
+    groups = groups_of(code.text)
+    matrices = [grid for each in groups if (grid := _matrix(code, each))]
+    if not headed:
+        return [[(line, row) for line, row in grid if line] for grid in matrices]
+    named = [grid for grid in (*matrices, *_listed(code, groups)) if grid[0][1]]
+    return _calls(code, groups) or _records(code, groups) or _blocks(code) or named or _vectors(code) or _pairs(code)
+
+
+# Calls and records ----------------------------------------------------------------------------------------------------
+
+
+def _calls(code: Code, groups: list[Group]) -> list[Grid]:
+    """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
+    rows, unread = list[_Link](), list[int]()
+    for each in sorted(groups, key=lambda group: group.start):
+        named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
+        if each.bracket != "(" or named is None:
+            continue
+        cells = _arguments(named[2], each.inside)
+        index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
+        if cells is None and _TOOLBOX.fullmatch(named[2]) and not index:
+            unread.append(code.line(each.start))
+        elif cells is not None:
+            target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
+            rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
+    if rows and unread:
+        raise InputError(
+            None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
+        )
+    _assigned(code, rows)
+    texts = [cell for row in rows for cell in row.cells.values()]
+    if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
+        return []
+    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
+        return [_looped(code, rows)]
+    if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
+        problem = "links of another program, or of a loop, are added"
+        raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
+    names = {row.name: row for row in rows}
+    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
+    for links in chosen:
+        if len(links) > 1 and None not in links:  # the arm's list of named links
+            rows = [link for link in links if link]
+    lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
+    lists = [each for each in lists if len(each) > 1]
+    return [_grid([(row.line, row.cells) for row in each]) for each in lists or _begun_again(rows)]
+
+
+@dataclass(frozen=True)
+class _Link:
+    line: int
+    name: str
+    place: int
+    cells: dict[str, str]
+
+
+def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
+    """Links by the arms that they belong to: a name that is used again begins another arm."""
+    arms: list[list[_Link]] = []
+    for row in rows:
+        if not arms or (row.name and any(row.name == other.name for other in arms[-1])):
+            arms.append([])
+        arms[-1].append(row)
+    return arms
+
+
+def _arguments(function: str, text: str) -> dict[str, str] | None:
+    """A row's cells by their headings; None if the call makes no link."""
+    low, toolbox = function.lower(), _TOOLBOX.fullmatch(function)
+    given, words, cells = list[str](), list[str](), dict[str, str]()
+    pending = ""
+    for part in parts(text):
+        key, is_named, value = part.partition("=")
+        quoted = re.fullmatch(r"""["'](\w*)["']""", part)
+        if is_named and re.fullmatch(r"\w+\s*", key):
+            cells[key.strip().lower()] = value.strip(" \"'")
+        elif pending:
+            cells[pending], pending = part, ""
+        elif quoted and quoted[1].lower() in _FLAGS:
+            words.append(quoted[1].lower())
+        elif quoted and toolbox:
+            pending = quoted[1].lower()
+        elif part:
+            given.append(part)
+    if toolbox is None:
+        quantities = {found.quantity for key in cells if (found := heading_of(key))}
+        return cells if "alpha" in quantities and quantities & {"a", "d"} and not given else None
+    if len(given) == 1 and given[0].startswith("["):
+        order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
+        given = row_cells(given[0][1:-1])
+        if len(given) < 4:
+            return None
+        cells |= dict(zip(order, given))
+    elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
+        cells |= dict(zip(_ORDERS[low], given))
+    elif given or (low == "link" and not cells):
+        return None
+    return _of_toolbox(low, words, cells)
+
+
+_FLAGS = {"modified", "mod", "mdh", "standard", "std", "stddh", "moddh", "revolute", "prismatic", "flip", "sym"}
+
+
+def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
+    """A row of a toolbox: what is left out is 0; theta of a joint that turns, and d of one that slides, is its own."""
+    slides = "prismatic" in (*words, *re.findall("prismatic", function)) or cells.get("sigma", "0") in ("1", "1.0")
+    slides |= function == "link" and "theta" in cells and "d" not in cells
+    modified = "mdh" in function or bool({"modified", "mod", "mdh", "moddh"} & {*words})
+    modified |= cells.pop("mdh", "0").lower() in ("1", "true")
+    offset = cells.pop("offset", "0")
+    flipped = "flip" in words or cells.pop("flip", "").lower() in ("1", "true")
+    row = {name: cells.get(name, "0") for name in ("theta", "d", "a", "alpha")}
+    row |= {"offset": "" if slides else offset, "type": "prismatic" if slides else "revolute"}
+    if slides and offset != "0":
+        row["d"] = f"{row['d']}+{offset}"
+    row |= {"convention": "modified" if modified else "standard"}
+    return row | {"direction": "-1"} if flipped else row
+
+
+def _assigned(code: Code, rows: list[_Link]) -> None:
+    """Carry out what is set after a link was made: ``L(2).offset = -pi/2``."""
+    pattern = r"([\w.]+(?:[(\[{]\d+[)\]}])?)\.(offset|alpha|theta|a|d|flip|sigma|mdh)\s*=(?!=)\s*([^;\n]+)"
+    for found in re.finditer(pattern, code.text) if rows else ():
+        cells = next((row.cells for row in rows if row.name == found[1]), None)
+        if cells is None or found[2] not in cells:
+            if found[1] in ("self", "cls"):
+                continue
+            problem = f"{found[1]}.{found[2]} is set for a link that is not found"
+            raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
+        cells[found[2]] = found[3].strip()
+
+
+def _looped(code: Code, rows: list[_Link]) -> Grid:
+    """A link made in a loop, of lists with a number for each joint."""
+    line, cells = rows[0].line, rows[0].cells
+    lists = _lists(code)
+    found = {key: _INDEXED.fullmatch(cell) for key, cell in cells.items()}
+    columns = {key: lists[each[1]] for key, each in found.items() if each and each[1] in lists}
+    lengths = {len(values) for values in columns.values()}
+    counts = {int(each) for each in re.findall(r"(?:range\(|(?:=|in)\s*1\s*:\s*)(\d+)", code.text)}
+    if len(rows) > 1 or len(lengths) != 1 or (counts and not counts & lengths):
+        problem = f"links are made in a loop, of lists with {', '.join(map(str, sorted(lengths)))} numbers"
+        raise InputError(None, f"line {line}", f"{problem}, and otherwise", "Write a row for each joint")
+    return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
+
+
+def _records(code: Code, groups: list[Group]) -> list[Grid]:
+    """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
+    rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
+    for each in sorted(groups, key=lambda group: group.start):
+        if each.bracket != "{":
+            continue
+        pairs = [part.partition(":")[::2] for part in parts(each.inside) if ":" in part]
+        cells = {key.strip(" \"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+        quantities = {found.quantity for key in cells if (found := heading_of(key))}
+        if not ("alpha" in quantities and quantities & {"a", "d"}):
+            continue
+        lists = {key: row_cells(value[1:-1]) for key, value in cells.items() if value[:1] == "["}
+        line = code.line(each.start)
+        if lists:
+            grids.append(_columns(line, lists))
+        else:
+            label = re.search(r"""["']?([\w ]+)["']?\s*:\s*$""", each.before)
+            names = {"joint": label[1]} if label and re.search(r"\d", label[1]) else {}
+            rows.append((line, names | cells))
+    return [*grids, *([_grid(rows)] if rows else [])]
+
+
+def _blocks(code: Code) -> list[Grid]:
+    """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated."""
+    rows: list[tuple[int, dict[str, str]]] = [(0, {})]
+    for number, line in enumerate(code.text.split("\n"), 1):
+        found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*:\s*([^\[{]*)", line)
+        if found is None:
+            continue
+        key = found[2].lower()
+        if found[1] or key in rows[-1][1] or not found[3]:
+            label = {"joint": key} if not found[3] and re.search(r"\d", key) else {}
+            rows.append((number, label))
+        if found[3]:
+            rows[-1][1][key] = found[3].strip(" \"'")
+    full = [
+        (line, cells)
+        for line, cells in rows
+        if {"alpha", "d"} <= {each.quantity for key in cells if (each := heading_of(key))}
+    ]
+    return [_grid(full)] if len(full) > 1 else []
+
+
+def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
+    header = list(dict.fromkeys(key for _, cells in rows for key in cells))
+    blank = {"direction": "1"}
+    return [(0, header), *((line, [cells.get(key, blank.get(key, "")) for key in header]) for line, cells in rows)]
+
+
+def _columns(line: int, lists: dict[str, list[str]]) -> Grid:
+    longest = max(map(len, lists.values()))
+    fit = {key: values for key, values in lists.items() if len(values) == longest}
+    return [(0, list(fit)), *((line, list(row)) for row in zip(*fit.values()))]
+
+
+# Matrices and lists ---------------------------------------------------------------------------------------------------
+
+
+def _matrix(code: Code, group: Group) -> Grid:
+    """A matrix with the names of its columns, as a comment or the library that takes it says them."""
+    rows = _rows(group)
+    widths = {len(row) for row in rows}
+    if len(rows) < 2 or len(widths) > 1 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0]):
+        return []
+    (width,) = widths
+    if not 3 <= width <= 8:
+        return []
+    first, last = code.line(group.start), code.line(group.end)
+    header = _order(code, first, last, width) or _symbols(rows[0])
+    lines = _row_lines(code, first, last, len(rows))
+    labels = [code.comments.get(line, "") for line in lines]
+    named = header and "joint" not in header and len({*lines}) == len(rows)
+    if named and all(re.search(r"[^\W\d_]", each) and not heading_of(each) for each in labels):
+        header = ["joint", *header]
+        rows = [[label, *row] for label, row in zip(labels, rows)]
+    return [(0, header), *zip(lines, rows)]
+
+
+def _listed(code: Code, groups: list[Group]) -> list[Grid]:
+    """A matrix with a line for each row, of YAML: ``joint1: [0, 270, 0, 0]``."""
+    rows = list[tuple[int, list[str]]]()
+    for group in sorted(groups, key=lambda each: each.start):
+        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:)\s*$", group.before)
+        if group.bracket == "[" and label and "[" not in group.inside:
+            cells = row_cells(group.inside)
+            if (
+                4 <= len(cells) <= 8
+                and all(re.search(r"\d|pi|π", cell) for cell in cells)
+                and (not rows or len(cells) == len(rows[0][1]) - 1)
+            ):
+                rows.append((code.line(group.start), [label[1] or "", *cells]))
+    if len(rows) < 2:
+        return []
+    header = _order(code, rows[0][0], rows[-1][0], len(rows[0][1]) - 1)
+    return [[(0, ["joint", *header] if header else []), *rows]]
+
+
+def _row_lines(code: Code, first: int, last: int, rows: int) -> list[int]:
+    """The lines on which the rows of a matrix are."""
+    texts = code.text.split("\n")
+    filled = [line for line in range(first, last + 1) if re.search(r"[\d\w]", re.sub(r"^.*=", "", texts[line - 1]))]
+    return filled[-rows:] if len(filled) >= rows else [first] * rows
+
+
+def _symbols(row: list[str]) -> list[str]:
+    """The names of columns as a row of symbols has them: ``theta1 d1 a1 alpha1``."""
+    names = [re.sub(r"\d+$", "", cell) for cell in row]
+    quantities = {found.quantity for name in names if (found := heading_of(name))}
+    return names if len(quantities) == len(row) and {"a", "alpha", "d"} <= quantities else []
+
+
+def _order(code: Code, first: int, last: int, width: int) -> list[str]:
+    near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
+    for comment in reversed(near):
+        comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
+        words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
+        for start in range(len(words) - width + 1):
+            window = words[start : start + width]
+            quantities = [found.quantity for word in window if (found := heading_of(word))]
+            if len({*quantities}) == width and {"a", "alpha", "d"} <= {*quantities}:
+                return window
+    for library, (order, _convention) in LIBRARIES.items():
+        names = order.split(",")
+        if library in code.text and len(names) >= width and width >= 4:
+            return names[:width]
+    return []
+
+
+def elements(text: str) -> dict[str, str]:
+    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``."""
+    return {
+        f"{name}{number}": cell
+        for name, cells in _lists(code_of(text)).items()
+        for number, cell in enumerate(cells, 0 if f"{name}[" in text else 1)
+    }
+
+
+def _lists(code: Code) -> dict[str, list[str]]:
+    """The lists of a program by their names, each multiplied by what is written after it."""
+    found: dict[str, list[str]] = {}
+    for group in groups_of(code.text):
+        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?$", group.before)
+        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
+            continue
+        after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
+        cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
+        found[name[1]] = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+    return found
+
+
+def _vectors(code: Code) -> list[Grid]:
+    """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
+    named: dict[str, tuple[str, list[str]]] = {}
+    for name, cells in _lists(code).items():
+        heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
+        if heading and len(cells) > 1:
+            named[heading.quantity if heading.quantity not in named else name] = (name, cells)
+    if not {"a", "alpha", "d"} <= {*named}:
+        return []
+    length = len(named["alpha"][1])
+    columns = {quantity: cells for quantity, (_, cells) in named.items() if len(cells) == length}
+    if not {"a", "alpha", "d"} <= {*columns} or len(named["d"][1]) != len(named["a"][1]):
+        return []
+    if any(re.sub(r"[0.,()\s]", "", cell) and not re.search(r"[^\W\d]", cell) for cell in columns.pop("theta", [])):
+        problem = "the list theta may hold zeros of the joints, or a pose"
+        raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
+    return [_columns(1, {key: cells for key, cells in columns.items() if key in ("a", "alpha", "d", "offset")})]
+
+
+def _pairs(code: Code) -> list[Grid]:
+    """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
+    pattern = r"\b(alpha|theta|a|d|q|r)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
+    entries = {(name, int(number)): (value.strip(), place) for name, number, value, place in _found(pattern, code.text)}
+    joints = sorted(number for name, number in entries if name == "d")
+    shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
+    rows = list[tuple[int, dict[str, str]]]()
+    for joint in joints:
+        before = joint - shift
+        angle = entries.get(("q", joint)) or entries.get(("theta", joint)) or (f"q{joint}", 0)
+        cells = [entries.get((name, number)) for name, number in (("alpha", before), ("a", before), ("d", joint))]
+        if None in cells:
+            return []
+        names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
+        row = {name: cell[0] for name, cell in zip(names, cells) if cell}
+        rows.append((code.line(cells[2][1] if cells[2] else 0), {"joint": str(joint)} | row | {"theta": angle[0]}))
+    angles = {name for name, _ in entries} & {"q", "theta"}  # else they may be in a matrix of these symbols
+    return [_grid(rows)] if len(rows) > 1 and angles else []
+
+
+def _found(pattern: str, text: str) -> Iterator[tuple[str, str, str, int]]:
+    for each in re.finditer(pattern, text):
+        yield each[1], each[2], each[3], each.start()

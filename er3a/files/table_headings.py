@@ -1,0 +1,106 @@
+"""What a column heading of a D-H table means, in the words and signs of books, articles, programs and spreadsheets."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from er3a.files.arithmetic import UNITS, plain
+
+QUANTITIES = ("joint", "theta", "d", "a", "alpha", "offset", "beta", "type")
+_JOINT = {"joint", "joints", "link", "links", "axis", "i", "j", "n", "no", "no.", "#", "frame", "gelenk", "achse"}
+_JOINT |= {"jointi", "linki", "jointno", "jointno.", "linkno", "linkno.", "linknumber", "jointnumber", "kinematics"}
+_JOINT |= {
+    "关节",
+    "连杆",
+    "轴",
+    "序号",
+    "关节序号",
+    "关节号",
+    "连杆序号",
+    "关节i",
+    "连杆i",
+    "杆件",
+    "joint#",
+    "link#",
+    "articulation",
+}
+_NAMES = {"a": "a", "r": "a", "l": "a", "d": "d", "q": "theta", "th": "theta", "t": "", "offset": "offset"}
+_NAMES |= {"type": "type", "jointtype": "type", "sigma": "type", "σ": "type", "类型": "type", "theta0": "offset"}
+_NAMES |= {"θ0": "offset", "offsets": "offset", "relativeoffset": "offset"}
+_WORDS = (
+    ("angleoffset", "offset"),
+    ("thetaoffset", "offset"),
+    ("offsettheta", "offset"),
+    ("θoffset", "offset"),
+    ("θ,offset", "offset"),
+    ("theta,offset", "offset"),
+    ("linklength", "a"),
+    ("连杆长", "a"),
+    ("杆长", "a"),
+    ("linkoffset", "d"),
+    ("jointoffset", "d"),
+    ("jointdistance", "d"),
+    ("偏距", "d"),
+    ("偏移", "d"),
+    ("偏置", "d"),
+    ("α", "alpha"),
+    ("alpha", "alpha"),
+    ("twist", "alpha"),
+    ("扭", "alpha"),
+    ("θ", "theta"),
+    ("theta", "theta"),
+    ("jointangle", "theta"),
+    ("关节角", "theta"),
+    ("转角", "theta"),
+    ("β", "beta"),
+    ("beta", "beta"),
+)
+"""Each marks a heading that holds it; the first that is found counts."""
+_OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
+_PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|speed)_\w+|(?:beta|theta)_(?:deg|rad)")
+_LETTER = re.compile(r"[^\W\d_]|#")
+_BEFORE = re.compile(r"[ijn]-1")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """``quantity``: one of QUANTITIES; ``unit``: "" where none is printed; ``before``: whether it belongs to the link
+    before the joint, as in Craig's tables; ``sign``: the letter that was printed for a length."""
+
+    quantity: str
+    unit: str
+    before: bool
+    sign: str = ""
+
+
+@lru_cache(maxsize=4096)
+def heading_of(text: str) -> Heading | None:
+    """What a column heading of a D-H table means.
+
+    Parameters
+    ----------
+    text : such as ``a_mm``, ``α(i-1)``, ``d_i [m]``, ``Link length`` or ``关节角θ(°)``
+
+    Returns
+    -------
+    heading : None for any other text, and for er3a's own headings of other columns
+    """
+    if own := _OURS.fullmatch(text):
+        return Heading(own[1] or own[2], own[3] or "", False)
+    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text):
+        return None
+    short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
+    said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]
+    said += [found[1] for found in [re.search(r"[a-zα-ω]_(mm|cm|m|in|deg|rad)$", short)] if found]
+    unit = UNITS[said[0]] if said else ""
+    name = re.sub(r"_(mm|cm|m|in|deg|rad)$", "", short)
+    # Without the index, which says only whether the entry belongs to the joint or to the link before it.
+    name = re.sub(r"[(\[](?!offset|\d)[^()\[\]]*[)\]]|/.*|,(?!offset).*", "", name)
+    name = re.sub(r"_?[ijn]-1$|(?<=.)_?[ijn]$|\*$|_k$|:$", "", name).replace("_", "")
+    if name in _JOINT:
+        return Heading("joint", "", False)
+    marked = _NAMES.get(name) or next((quantity for mark, quantity in _WORDS if mark in name), None)
+    marked = marked or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
+    return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None

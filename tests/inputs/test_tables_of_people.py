@@ -1,0 +1,303 @@
+"""D-H tables in the forms in which people have them: read as they are meant, or refused with both readings."""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import er3a
+from er3a.errors import InputError
+from er3a.files.arithmetic import amount_of
+from er3a.files.dh_table import read_dh_table
+
+# a mm, alpha deg, d mm, offset deg of an IRB 120
+IRB120 = [(0, -90, 290, 0), (270, 0, 0, -90), (70, -90, 0, 0), (0, 90, 302, 0), (0, -90, 0, 0), (0, 0, 72, 180)]
+NAMES = {"a": 0, "alpha": 1, "d": 2, "theta": 3}
+GREEK = {"a": "a", "alpha": "α", "d": "d", "theta": "θ"}
+LATEX = {"a": "a_i", "alpha": r"\alpha_i", "d": "d_i", "theta": r"\theta_i"}
+CHINESE = {"a": "连杆长度a", "alpha": "扭转角α", "d": "偏距d", "theta": "关节角θ"}
+
+
+def shown(value, places=6):
+    return f"{round(value, places):g}" if value else "0"
+
+
+def cells_of(rows, order, variable, minus="-"):
+    """Cells in mm and degrees; theta is a sum of the joint's variable and its offset."""
+    lines = []
+    for joint, row in enumerate(rows, 1):
+        texts = {name: shown(row[k]) for name, k in NAMES.items()}
+        if variable:
+            offset = f" {'-' if row[3] < 0 else '+'} {abs(row[3])}" if row[3] else ""
+            texts["theta"] = variable.format(joint) + offset
+        lines.append([str(joint), *(texts[name].replace("-", minus) for name in order)])
+    return lines
+
+
+def si(value, angle):
+    if not angle:
+        return shown(value / 1000)
+    return {0: "0", 90: "pi/2", -90: "-pi/2", 180: "pi", -180: "-pi"}.get(value, f"{value}*pi/180")
+
+
+def markdown(rows, order, variable):
+    head = ["Joint", *(f"{GREEK[name]} ({'°' if NAMES[name] % 2 else 'mm'})" for name in order)]
+    lines = [head, ["---"] * len(head), *cells_of(rows, order, variable, "−")]
+    return "Some text.\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n\nMore of it.\n"
+
+
+def latex(rows, order, variable):
+    units = "mm", r"$^\circ$"
+    head = ["$i$", *(f"${LATEX[name]}$ [{units[NAMES[name] % 2]}]" for name in order)]
+    lines = [head, *([f"${cell}$" for cell in line] for line in cells_of(rows, order, variable))]
+    body = " \\\\ \\hline\n".join(" & ".join(line) for line in lines)
+    return f"\\begin{{tabular}}{{|c|*{{4}}{{c}}|}}\n\\hline\n{body} \\\\\n\\end{{tabular}}"
+
+
+def html(rows, order, variable):
+    head = "".join(f"<th>{GREEK[name]}<sub>i</sub> ({'deg' if NAMES[name] % 2 else 'mm'})</th>" for name in order)
+    lines = ["".join(f"<td>{cell}</td>" for cell in line) for line in cells_of(rows, order, variable)]
+    return f"<p>D-H</p><table><tr><th>Link</th>{head}</tr>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
+
+
+def tabs(rows, order, variable):
+    lines = [["关节", *(f"{CHINESE[name]}({'°' if NAMES[name] % 2 else 'mm'})" for name in order)]]
+    return "\n".join("\t".join(line) for line in lines + cells_of(rows, order, variable))
+
+
+def semicolons(rows, order, variable):
+    lines = [
+        ["i", *(f"{name} [{'deg' if NAMES[name] % 2 else 'mm'}]" for name in order)],
+        *cells_of(rows, order, variable),
+    ]
+    return "\n".join(";".join(line).replace(".", ",") for line in lines)
+
+
+def blanks(rows, order, variable):
+    lines = [["i", *(f"{GREEK[name]}i ({'deg' if NAMES[name] % 2 else 'mm'})" for name in order)]]
+    return "Table 2. Parameters\n" + "\n".join(" ".join(line) for line in lines + cells_of(rows, order, variable, "−"))
+
+
+def box(rows, order, variable):
+    lines = [["j", *(f"{GREEK[name]}ⱼ" for name in order)]]
+    for joint, row in enumerate(rows, 1):
+        texts = {"a": shown(row[0] / 1000), "d": shown(row[2] / 1000), "alpha": f"{row[1]:.1f}°"}
+        texts["theta"] = f"q{joint}" + (f" {'-' if row[3] < 0 else '+'} {abs(row[3])}°" if row[3] else "")
+        lines.append([str(joint), *(texts[name] for name in order)])
+    drawn = "\n".join(f"│ {' │ '.join(line)} │" for line in lines)
+    return f"DHRobot: x, standard DH parameters\n┌───┬───┐\n{drawn}\n└───┴───┘"
+
+
+def turned(rows, order, variable):
+    lines = [["joint", *(f"{name} ({'deg' if NAMES[name] % 2 else 'mm'})" for name in order)]]
+    return "\n".join(",".join(column) for column in zip(*(lines + cells_of(rows, order, variable))))
+
+
+def links(rows, order, variable):
+    made = [
+        f"L({j}) = Link([0 {si(d, 0)} {si(a, 0)} {si(al, 1)} 0 {si(o, 1)}]);" for j, (a, al, d, o) in enumerate(rows, 1)
+    ]
+    return "% theta d a alpha\n" + "\n".join(made) + "\nrobot = SerialLink(L, 'name', 'x');\nq = [0 0.1 0];\n"
+
+
+def revolutes(rows, order, variable):
+    made = [
+        f"    RevoluteDH(d={si(d, 0)}, a={si(a, 0)}, alpha={si(al, 1)}, offset={si(o, 1)}, qlim=[-pi, pi]),  # d=9"
+        for a, al, d, o in rows
+    ]
+    return "robot = DHRobot([\n" + "\n".join(made) + "\n], name='x')"
+
+
+def dictionaries(rows, order, variable):
+    keyed = [{"name": f"joint{j}"} | {name: row[NAMES[name]] for name in order} for j, row in enumerate(rows, 1)]
+    return json.dumps({"robot": "x", "dh": keyed})
+
+
+def yaml_lists(rows, order, variable):
+    lines = [f"  joint{j}: [{', '.join(shown(row[NAMES[name]]) for name in order)}]" for j, row in enumerate(rows, 1)]
+    return f"dh:  # [{', '.join(order)}]\n" + "\n".join(lines)
+
+
+def yaml_blocks(rows, order, variable):
+    return "dh:\n" + "\n".join(
+        f"  - {order[0]}: {row[NAMES[order[0]]]}\n" + "".join(f"    {name}: {row[NAMES[name]]}\n" for name in order[1:])
+        for row in rows
+    )
+
+
+def matrix(rows, order, variable):
+    lines = [
+        f"    [{', '.join(si(row[NAMES[name]], NAMES[name] % 2) for name in order)}],  # joint {j}"
+        for j, row in enumerate(rows, 1)
+    ]
+    return f"# {', '.join(order)}\ndh = np.array([\n" + "\n".join(lines) + "\n])\nT = np.array([[1, 0], [0, 1]])"
+
+
+def vectors(rows, order, variable):
+    names = "a", "alpha", "d", "offset"
+    return "\n".join(f"{name} = [{' '.join(si(row[k], k % 2) for row in rows)}];" for k, name in enumerate(names))
+
+
+def symbols(rows, order, variable):
+    lines = [f"{j},a{j},{al},d{j},{o}" for j, (_, al, _, o) in enumerate(rows, 1)]
+    values = [f"a{j} = {shown(a)} mm, d{j} = {shown(d)} mm" for j, (a, _, d, _) in enumerate(rows, 1)]
+    return "\n".join(["i,a,alpha (deg),d,theta (deg)", *lines, "", *values])
+
+
+FORMS = (markdown, latex, html, tabs, semicolons, blanks, box, turned, links, revolutes, dictionaries, yaml_lists)
+FORMS += yaml_blocks, matrix, vectors, symbols
+ORDERS = st.permutations(list(NAMES))
+
+
+def read(tmp_path, text, name="table.txt", **options):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return read_dh_table(tmp_path / name, "arm", as_printed=True, **options)
+
+
+def numbers(content):
+    return [
+        (row.a_mm, row.alpha_deg, row.d_mm, zero.offset_deg) for row, zero in zip(content.dh.rows, content.zero.rows)
+    ]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_table_is_read_as_it_is_meant_in_every_form(tmp_path, form):
+    content, _ = read(tmp_path, form(IRB120, ["theta", "d", "a", "alpha"], "θ{}"))
+    np.testing.assert_allclose(numbers(content), IRB120, atol=1e-9)
+
+
+# No longest link of an arm is shorter: a table without units would be in metres.
+LENGTHS = st.one_of(
+    st.just(0), st.integers(10, 900), st.integers(-900, -10), st.integers(100, 9000).map(lambda n: n / 10)
+)
+ROWS = st.tuples(LENGTHS, st.sampled_from([0, 90, -90, 180, 60]), LENGTHS, st.sampled_from([0, 0, 90, -90, 180, 30]))
+
+
+@pytest.mark.long
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    rows=st.lists(ROWS, min_size=2, max_size=7),
+    form=st.sampled_from(FORMS),
+    order=ORDERS,
+    variable=st.sampled_from(["", "q{}", "θ{}", "q_{}", "th({})", "θ{}*"]),
+)
+def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order, variable):
+    try:
+        content, _ = read(tmp_path, form(rows, order, variable))
+    except InputError:
+        return
+    np.testing.assert_allclose(numbers(content), rows, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("dh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "--column"),  # no names
+        ("theta,d,a,alpha,a\n0,290,0,90,0\n0,0,270,0,0\n", "--column"),  # one twice
+        ("a,alpha,d\n15,90,20\n30,0,0\n", "--length-unit"),
+        ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
+        ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
+        ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
+        ("L = [Link([0 0.3 0 pi/2])];\nL(2).offset = 1;\nL(3).offset = 2;", "call"),
+        ("L(1) = Link([0 0.1 0 pi/2]);\nL(2) = Link(dh(2,:));", "line 2"),
+        ("for i in range(3):\n  links.append(RevoluteDH(d=0.1, a=0.2))", "row for each"),
+        (
+            "i,a,alpha,d,theta\n1,0,90,300,0\n2,270,0,0,0\n\ni,a,alpha,d,theta\n1,0,90,301,0\n2,270,0,0,0\n",
+            "one of them",
+        ),
+        ("a (mm),alpha (deg),d (mm)\n0,pi/2°,3\n", "one unit|without a unit"),
+    ],
+)
+def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
+    with pytest.raises(InputError, match=names):
+        read(tmp_path, text)
+
+
+def test_columns_without_names_are_read_as_they_are_said_to_be(tmp_path):
+    text = "dh = [[0, 290, 0, -pi/2], [-pi/2, 0, 270, 0]]"
+    content, _ = read(tmp_path, text, columns=["theta", "d", "a", "alpha"])
+    np.testing.assert_allclose(numbers(content), [(0, -90, 290, 0), (270, 0, 0, -90)])
+    with pytest.raises(InputError, match="--column names 2"):
+        read(tmp_path, "i,a,alpha,d\n1,0,90,300\n", columns=["a", "d"])
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("25*10^-3", 0.025, ""),
+        ("2·10⁻³ m", 0.002, "m"),
+        ("-3pi/2", -1.5 * np.pi, "rad"),
+        ("deg2rad(30)", np.pi / 6, "rad"),
+        ("90*pi/180", np.pi / 2, "rad"),
+        ("0 - np.pi/2", -np.pi / 2, "rad"),
+        ("（１＋２）／４", 0.75, ""),
+        ("−90°", -90, "deg"),
+        ("2^-1 cm", 0.5, "cm"),
+    ],
+)
+def test_arithmetic_is_parsed(text, value, unit):
+    found = amount_of(text)
+    assert (found.number, found.unit) == (pytest.approx(value), unit)
+
+
+@pytest.mark.parametrize("text", ["__import__('os')", "9**9**9**9", "(" * 50, "1" * 300, "a b", "1/0", "q1*q2", "1;2"])
+def test_nothing_else_is(text):
+    with pytest.raises(ValueError, match=r"is|multiplies|divides"):
+        amount_of(text)
+
+
+def test_names_given_by_each_other_end():
+    with pytest.raises(ValueError, match="deep"):
+        amount_of("a", {"a": "b", "b": "a"})
+
+
+def test_rows_without_a_variable_are_base_and_flange_and_sliding_joints_keep_their_sign(tmp_path):
+    rows = "0 (base),0,180,0,0", "1,0,90,100,q1", "2,0,0,50-d2,90", "3 (to tool),0,0,60,0"
+    content, _ = read(tmp_path, "\n".join(["i,a (mm),alpha (deg),d (mm),theta (deg)", *rows]))
+    assert [row.type for row in content.dh.rows] == ["revolute", "prismatic"]
+    assert [row.direction for row in content.zero.rows] == [1, -1]
+    assert content.base.rpy_deg[0] == pytest.approx(180)
+    assert (content.flange or content.tool).xyz_mm[2] == pytest.approx(60)
+
+
+def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
+    values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
+    content, _ = read(tmp_path, values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
+    np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
+
+
+def test_links_are_in_the_order_of_their_arm(tmp_path):
+    made = [f"K{j} = Link('d', 0, 'a', {j / 10}, 'alpha', 0);" for j in (3, 1, 9, 2)]
+    content, _ = read(tmp_path, "\n".join([*made, "r = SerialLink([K1 K2 K3], 'name', 'x');"]))
+    assert [row.a_mm for row in content.dh.rows] == pytest.approx([100, 200, 300])
+
+
+@pytest.mark.parametrize("said", ["modified", "standard"])
+def test_the_convention_is_what_the_text_at_the_table_says(tmp_path, said):
+    content, _ = read(tmp_path, f"{said.title()} D-H parameters:\n\n" + tabs(IRB120, list(NAMES), "q{}"))
+    assert content.dh.convention == said
+
+
+def test_joints_named_without_numbers_all_move(tmp_path):
+    names = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
+    lines = [f"{name},{a},{alpha},{d},{offset}" for name, (a, alpha, d, offset) in zip(names, IRB120)]
+    content, _ = read(tmp_path, "\n".join(["joint,a (mm),alpha (deg),d (mm),theta (deg)", *lines]))
+    np.testing.assert_allclose(numbers(content), IRB120)
+
+
+def test_a_table_comes_from_standard_input_and_from_a_text(monkeypatch, tmp_path):
+    text = markdown(IRB120, list(NAMES), "q{}")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode("utf-16"))))
+    content, _ = read_dh_table("-", "arm")
+    np.testing.assert_allclose(numbers(content), IRB120)
+    with pytest.warns(er3a.InputWarning):
+        robot = er3a.read_table(text)
+    np.testing.assert_allclose(robot.a, [row[0] / 1000 for row in IRB120])
