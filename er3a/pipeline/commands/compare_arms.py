@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, is_dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
+from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
@@ -36,10 +37,35 @@ OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbe
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a call of ``er3a compare`` asks for: how files are read, tolerances (mm, deg), and what is written."""
+
+    options: dict[str, Any]
+    xacro: tuple[str, ...]
+    tolerance_mm: float
+    tolerance_deg: float
+    output: Path | None
+    html: Path | None
+    as_json: bool
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """In m and rad."""
+        return Tolerances(self.tolerance_mm / 1000, math.radians(self.tolerance_deg))
+
+
 @app.command(rich_help_panel=ROBOT_FILES)
 def compare(
     a: Annotated[str, typer.Argument(metavar="A", help=f"the arm to test: {_ARM}")],
-    b: Annotated[str, typer.Argument(metavar="B", help="the arm to compare with: as A, or a folder of such files")],
+    others: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="B",
+            help="the arm to compare with: as A, or a folder of such files; several: who agrees with whom; "
+            "none: which known arm is A?",
+        ),
+    ] = None,
     *,
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Lengths = None,
@@ -53,24 +79,52 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
 ):
-    """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
+    """Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?
+
+    Exit code 1 if anything differs.
+    """
+    from er3a.pipeline.commands.known_arms import compare_several, identify
+
+    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
+    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    options |= {"base": base, "tip": tip, "as_printed": True}
+    asked = Asked(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
+    if not others:
+        identify(a, asked)
+    elif len(others) == 1:
+        compare_two(a, others[0], asked)
+    else:
+        compare_several([a, *others], asked)
+
+
+def compare_two(a: str, b: str, asked: Asked, known: Mapping[str, Any] | None = None) -> None:
+    """Compare an arm with another, or with all of a folder, and print what was found.
+
+    Parameters
+    ----------
+    a, b : as they were named on the command line
+    known : what is printed as JSON of a known arm that ``b`` names, too
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs
+    """
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
-    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
-    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip, "as_printed": True}
     folder = Path(b)
     with noted_doubts() as doubtful:
-        first = read_arm(a, xacro=xacro or (), **options)
-        others = _others(b, xacro or (), options)
+        first = read_arm(a, xacro=asked.xacro, **asked.options)
+        others = _others(b, asked.xacro, asked.options)
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
     robots = {name: other.robot for name, other in others.items()}
-    ranked = best_of(arm, robots, tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)
+    tolerances = asked.tolerance_mm, asked.tolerance_deg
+    ranked = best_of(arm, robots, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1])
     ranked = [(each, _beside(found, first, others[each])) for each, found in ranked]
     name, found = ranked[0]
     notes = _notes((a, first), (name, others[name]))
@@ -84,9 +138,10 @@ def compare(
     for note in notes:
         print_note(note)
     where = str(folder / name) if folder.is_dir() else name
-    written = _written((a, arm), (where, others[name].robot), found, output, html, (tolerance_mm, tolerance_deg, told))
-    if as_json:
-        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told})
+    pair = (a, arm), (where, others[name].robot)
+    written = _written(*pair, found, asked.output, asked.html, (*tolerances, told))
+    if asked.as_json:
+        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told} | dict(known or {}))
     else:
         _print(ranked, folder.is_dir(), told)
         for file in written:
