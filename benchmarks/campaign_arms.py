@@ -31,8 +31,8 @@ NEAR_REACH = 0.02  # of the reach in a name, which is rounded
 HEAD = """# Known arms against public tables
 
 The tables of {package} {version} (`pip install --no-deps {package}=={version}`; AGPL, so none of its numbers are in the
-[catalogue](../known_arms.md)) whose names are arms of the catalogue with as many joints: {count} tables. Their files are
-read, not run. **{agree} have the catalogue's geometry**; {zeros} of these have its zeros and directions as well.
+[catalogue](../known_arms.md)) whose names are arms of the catalogue with as many joints: {count} tables. Their files
+are read, not run. **{agree} have the catalogue's geometry**; {zeros} of these have its zeros and directions as well.
 
 These {differ} differ. *Who is right* rests on documents other than the two that are compared: the maker's own numbers;
 a second source of the catalogue that agrees with it (both may be of one origin); or the reach that the arm is named

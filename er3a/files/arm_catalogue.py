@@ -26,7 +26,7 @@ OF_JOINTS = "lower", "upper", "speeds"
 
 
 @dataclass(frozen=True)
-class Origin:
+class Publication:
     """A public source: ``title`` as it is cited, and what its numbers are worth (``grade``)."""
 
     title: str
@@ -75,12 +75,12 @@ def known_arms() -> Mapping[str, KnownArm]:
     arms : by name, in the order of the file: by maker, then by name
     """
     with SOURCES.open(encoding="utf-8", newline="") as file:
-        origins = {row["key"]: Origin(row["title"], row["grade"]) for row in csv.DictReader(file)}  # type: ignore[arg-type]
+        origins = {row["key"]: Publication(row["title"], row["grade"]) for row in csv.DictReader(file)}  # type: ignore[arg-type]
     with ARMS.open(encoding="utf-8", newline="") as file:
         return {row["name"]: _known_arm(row, origins) for row in csv.DictReader(file)}
 
 
-def _known_arm(row: Mapping[str, str], origins: Mapping[str, Origin]) -> KnownArm:
+def _known_arm(row: Mapping[str, str], origins: Mapping[str, Publication]) -> KnownArm:
     """One row; what ``source`` and ``second`` have before the colon is a key of the sources."""
     source, second = (_cited(row[key], origins) for key in ("source", "second"))
     grade = origins[row["source"].partition(":")[0]].grade
@@ -93,7 +93,7 @@ def _known_arm(row: Mapping[str, str], origins: Mapping[str, Origin]) -> KnownAr
     return KnownArm(robot_of_row(row, sources), source=source, second=second, **{key: row[key] for key in names})
 
 
-def _cited(text: str, origins: Mapping[str, Origin]) -> str:
+def _cited(text: str, origins: Mapping[str, Publication]) -> str:
     """A place in a source with the source's title in place of its key."""
     key, _, place = text.partition(":")
     return ", ".join(filter(None, [origins[key].title, place.strip()])) if key else ""

@@ -23,6 +23,7 @@ from er3a.pipeline.commands.options import (
     app,
     print_json,
     print_note,
+    print_table,
 )
 from er3a.robots.robot import Convention, Robot
 
@@ -32,13 +33,15 @@ if TYPE_CHECKING:
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
+NEAR = 1  # entries of geometry in which a table may differ from a known arm and still be near it
+NEAREST_SHOWN = 3  # known arms, if none is near
 TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
 _ARM = "a D-H table (.csv), a robot's name or file, a URDF or xacro"
 
 
 @dataclass(frozen=True)
-class Asked:
+class CompareRequest:
     """What a call of ``er3a compare`` asks for: how files are read, tolerances (mm, deg), and what is written."""
 
     options: dict[str, Any]
@@ -83,12 +86,10 @@ def compare(
 
     Exit code 1 if anything differs.
     """
-    from er3a.pipeline.commands.known_arms import compare_several, identify
-
     _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True}
-    asked = Asked(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
+    asked = CompareRequest(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
     if not others:
         identify(a, asked)
     elif len(others) == 1:
@@ -97,7 +98,7 @@ def compare(
         compare_several([a, *others], asked)
 
 
-def compare_two(a: str, b: str, asked: Asked, known: Mapping[str, Any] | None = None) -> None:
+def compare_two(a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None) -> None:
     """Compare an arm with another, or with all of a folder, and print what was found.
 
     Parameters
@@ -147,6 +148,78 @@ def compare_two(a: str, b: str, asked: Asked, known: Mapping[str, Any] | None = 
         for file in written:
             print(f"{file}: written")
     if found.verdict != "equal":
+        raise typer.Exit(1)
+
+
+def identify(source: str, asked: CompareRequest) -> None:
+    """Print which known arm a table describes, by what it differs, and which others have the same geometry.
+
+    Parameters
+    ----------
+    source : as it was named on the command line
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs, or no arm is near
+    """
+    from er3a.comparison.compare import best_of
+    from er3a.comparison.nearest import likely, of_equal_geometry
+    from er3a.files.arm_catalogue import known_arms
+    from er3a.files.arm_file import read_arm
+    from er3a.files.units import noted_doubts
+    from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
+
+    with noted_doubts():
+        robot = read_arm(source, xacro=asked.xacro, **asked.options).robot
+    known = known_arms()
+    robots = {name: arm.robot for name, arm in known.items()}
+    tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
+    ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
+    name, best = ranked[0]
+    if best.different_entries > NEAR or (best.geometry and best.geometry.unexplained_mm):
+        if asked.as_json:
+            nearest = [{"arm": each, "different_entries": found.different_entries} for each, found in ranked]
+            print_json({"arm": None, "nearest": nearest})
+        else:
+            print("\n".join(not_near_lines([(known[each], found) for each, found in ranked[:NEAREST_SHOWN]])))
+        raise typer.Exit(1)
+    alike = of_equal_geometry(name, robots, asked.tolerances)
+    if not asked.as_json:
+        print("\n".join(identified_lines(known[name], best, [known[each] for each in alike])))
+    compare_two(source, name, asked, {"arm": name, "same_geometry": list(alike)})
+
+
+def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
+    """Print who agrees with whom, layer by layer, and the odd ones out.
+
+    Parameters
+    ----------
+    sources : three or more, as they were named on the command line
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs
+    """
+    from er3a.comparison.agreement import agreements, compared_in_pairs
+    from er3a.files.arm_file import read_arm
+    from er3a.pipeline.messages.known_arms import agreement_lines, matrix_rows
+
+    if asked.output or asked.html:
+        raise Er3aError("--output and --html are for two arms; give one B")
+    if len(set(sources)) < len(sources):
+        raise Er3aError("one arm is named twice; name each once")
+    arms = {source: read_arm(source, xacro=asked.xacro, **asked.options).robot for source in sources}
+    pairs = compared_in_pairs(arms, tolerance_mm=asked.tolerance_mm, tolerance_deg=asked.tolerance_deg)
+    found = agreements(sources, pairs)
+    if asked.as_json:
+        verdicts: list[dict[str, Any]] = [{"a": a, "b": b, "verdict": each.verdict} for (a, b), each in pairs.items()]
+        print_json({"pairs": verdicts, "layers": [vars(each) for each in found]})
+    else:
+        print_table(["", *sources], matrix_rows(sources, pairs))
+        print("\n".join(agreement_lines(found)))
+    if any(each.verdict != "equal" for each in pairs.values()):
         raise typer.Exit(1)
 
 
