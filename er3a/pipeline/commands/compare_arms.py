@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
     from er3a.files.arm_file import ReadArm
 
+Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
+"""An arm as it was read, and doubts about its units."""
+
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
 NEAR = 1  # entries of geometry in which a table may differ from a known arm and still be near it
@@ -98,13 +101,16 @@ def compare(
         compare_several([a, *others], asked)
 
 
-def compare_two(a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None) -> None:
+def compare_two(
+    a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None, read: Read | None = None
+) -> None:
     """Compare an arm with another, or with all of a folder, and print what was found.
 
     Parameters
     ----------
     a, b : as they were named on the command line
     known : what is printed as JSON of a known arm that ``b`` names, too
+    read : A, if it has been read
 
     Raises
     ------
@@ -112,14 +118,14 @@ def compare_two(a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] 
         with code 1 if anything differs
     """
     from er3a.comparison.compare import best_of
-    from er3a.files.arm_file import read_arm
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
     folder = Path(b)
+    first, found_before = read or _read(a, asked)
     with noted_doubts() as doubtful:
-        first = read_arm(a, xacro=asked.xacro, **asked.options)
         others = _others(b, asked.xacro, asked.options)
+    doubtful = list({str(each): each for each in (*found_before, *doubtful)}.values())
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
@@ -151,6 +157,16 @@ def compare_two(a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] 
         raise typer.Exit(1)
 
 
+def _read(source: str, asked: CompareRequest) -> Read:
+    """An arm, and the numbers of its file whose units are in doubt."""
+    from er3a.files.arm_file import read_arm
+    from er3a.files.units import noted_doubts
+
+    with noted_doubts() as doubtful:
+        arm = read_arm(source, xacro=asked.xacro, **asked.options)
+    return arm, doubtful
+
+
 def identify(source: str, asked: CompareRequest) -> None:
     """Print which known arm a table describes, by what it differs, and which others have the same geometry.
 
@@ -166,13 +182,10 @@ def identify(source: str, asked: CompareRequest) -> None:
     from er3a.comparison.compare import best_of
     from er3a.comparison.nearest import likely, of_equal_geometry
     from er3a.files.arm_catalogue import known_arms
-    from er3a.files.arm_file import read_arm
-    from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
 
-    with noted_doubts():
-        robot = read_arm(source, xacro=asked.xacro, **asked.options).robot
-    known = known_arms()
+    read, known = _read(source, asked), known_arms()
+    robot = read[0].robot
     robots = {name: arm.robot for name, arm in known.items()}
     tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
     ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
@@ -185,9 +198,12 @@ def identify(source: str, asked: CompareRequest) -> None:
             print("\n".join(not_near_lines([(known[each], found) for each, found in ranked[:NEAREST_SHOWN]])))
         raise typer.Exit(1)
     alike = of_equal_geometry(name, robots, asked.tolerances)
+    others = {each for each, found in ranked if found.different_entries == best.different_entries} - {name, *alike}
+    groups = [[known[each] for each in names] for names in (alike, sorted(others))]
     if not asked.as_json:
-        print("\n".join(identified_lines(known[name], best, [known[each] for each in alike])))
-    compare_two(source, name, asked, {"arm": name, "same_geometry": list(alike)})
+        print("\n".join(identified_lines(known[name], best, *groups)))
+    record = {"arm": name, "same_geometry": list(alike), "as_near": sorted(others)}
+    compare_two(source, name, asked, record, read)
 
 
 def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
@@ -203,14 +219,13 @@ def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
         with code 1 if anything differs
     """
     from er3a.comparison.agreement import agreements, compared_in_pairs
-    from er3a.files.arm_file import read_arm
     from er3a.pipeline.messages.known_arms import agreement_lines, matrix_rows
 
     if asked.output or asked.html:
         raise Er3aError("--output and --html are for two arms; give one B")
     if len(set(sources)) < len(sources):
         raise Er3aError("one arm is named twice; name each once")
-    arms = {source: read_arm(source, xacro=asked.xacro, **asked.options).robot for source in sources}
+    arms = {source: _read(source, asked)[0].robot for source in sources}
     pairs = compared_in_pairs(arms, tolerance_mm=asked.tolerance_mm, tolerance_deg=asked.tolerance_deg)
     found = agreements(sources, pairs)
     if asked.as_json:

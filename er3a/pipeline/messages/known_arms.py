@@ -31,12 +31,15 @@ def _named(arm: KnownArm) -> str:
     return f"{arm.maker} {arm.model} ({arm.robot.name})"
 
 
-def identified_lines(arm: KnownArm, found: Comparison, alike: Sequence[KnownArm]) -> list[str]:
-    """Which arm a table is of, which others have its geometry, and where the arm's numbers are from."""
+def identified_lines(
+    arm: KnownArm, found: Comparison, alike: Sequence[KnownArm], as_near: Sequence[KnownArm]
+) -> list[str]:
+    """Which arm a table is of, which others have its geometry, or are as near, and where the arm's numbers are from."""
     same = found.geometry is not None and found.geometry.same
-    text = f"this is {_named(arm)}" if same else f"but for one entry this is {_named(arm)}"
-    others = [f"of the same geometry: {', '.join(map(_named, alike))}"] if alike else []
-    return [text, *others, *provenance_lines(arm), ""]
+    lines = [f"this is {_named(arm)}" if same else f"nearest, one entry differs: {_named(arm)}"]
+    for text, arms in {"of the same geometry": alike, "others that are as near": as_near}.items():
+        lines += [f"{text}: {', '.join(map(_named, arms))}"] if arms else []
+    return [*lines, *provenance_lines(arm), ""]
 
 
 def provenance_lines(arm: KnownArm) -> list[str]:
