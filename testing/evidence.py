@@ -35,6 +35,7 @@ PAGES = (
     "pages",
     "fleet",
     "comparison",
+    "arms",
     "programs",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md"}

@@ -537,8 +537,8 @@ def _distances(
         u = row_values(a, q)
         return forward_of_rows(a, u), found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
 
-    mm = [1000 * _largest(_shift, flanges, a) for flanges in (printed, aligned)]
-    deg = [math.degrees(_largest(_turn, flanges, a)) for flanges in (printed, aligned)]
+    mm = [1000 * largest_gap(_shift, flanges, a) for flanges in (printed, aligned)]
+    deg = [math.degrees(largest_gap(_turn, flanges, a)) for flanges in (printed, aligned)]
     return mm[0], mm[1], deg[0], deg[1]
 
 
@@ -552,9 +552,21 @@ def _turn(one: Reals, other: Reals) -> Reals:
     return np.asarray(scipy.spatial.transform.Rotation.from_matrix(between).magnitude())
 
 
-def _largest(
+def largest_gap(
     off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
 ) -> float:
+    """The largest of what two flanges are off over an arm's joint ranges, as far as sampling and climbing find it.
+
+    Parameters
+    ----------
+    off : of poses (k, 4, 4) of both, what is sought (k,)
+    flanges : the two at joint values (k, n)
+    robot : whose ranges count
+
+    Returns
+    -------
+    largest : no bound: the true one may be a little larger
+    """
     generator = np.random.default_rng(0)
     q = generator.uniform(robot.lower, robot.upper, (SAMPLES, robot.joints))
     values = off(*flanges(q))

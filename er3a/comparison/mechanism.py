@@ -292,7 +292,7 @@ def _likely_senses(
     by_link = np.arange(links)
     normals = np.where(cost[by_link, folds, 0] <= cost[by_link, folds, 1], 1.0, -1.0)
     total = cost.min(axis=2)[by_link, folds].sum(axis=1)
-    for first, last, along in _parallel_blocks(other, parallel):
+    for first, last, along in parallel_blocks(other, parallel):
         if first == 0 or last == m - 1 or not placed[max(first - 1, 0) : last + 1].all():
             continue
         inside = slice(first, last + 1)
@@ -339,7 +339,7 @@ def _beside_a_slide(sliding: Flags) -> Flags:
     return np.asarray(touched)
 
 
-def _parallel_blocks(mechanism: Mechanism, parallel: Flags) -> list[tuple[int, int, Reals]]:
+def parallel_blocks(mechanism: Mechanism, parallel: Flags) -> list[tuple[int, int, Reals]]:
     """Runs of parallel axes: the first and the last axis, and the sense of each along the first."""
     found, first = [], 0
     for k in range(len(mechanism.d)):

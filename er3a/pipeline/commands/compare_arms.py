@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, is_dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
+from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
@@ -24,6 +25,7 @@ from er3a.pipeline.commands.options import (
     columns_of,
     print_json,
     print_note,
+    print_table,
 )
 from er3a.robots.robot import Convention, Robot
 
@@ -31,17 +33,47 @@ if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
     from er3a.files.arm_file import ReadArm
 
+Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
+"""An arm as it was read, and doubts about its units."""
+
 MAX_TOLERANCE = 1000.0  # mm, and deg
 MATCHES_SHOWN = 5  # of a folder
+NEAR = 1  # entries of geometry in which a table may differ from a known arm and still be near it
+NEAREST_SHOWN = 3  # known arms, if none is near
 TOOLS_EQUAL = 1e-9  # m, and of axes
 OF_A_TABLE = ("column", "angles", "alpha", "offset", "dh.rows")  # keys of numbers that a comparison looks at
 _ARM = "a D-H table in any form (- is standard input), a robot's name or file, a URDF or xacro"
 
 
+@dataclass(frozen=True)
+class CompareRequest:
+    """What a call of ``er3a compare`` asks for: how files are read, tolerances (mm, deg), and what is written."""
+
+    options: dict[str, Any]
+    xacro: tuple[str, ...]
+    tolerance_mm: float
+    tolerance_deg: float
+    output: Path | None
+    html: Path | None
+    as_json: bool
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """In m and rad."""
+        return Tolerances(self.tolerance_mm / 1000, math.radians(self.tolerance_deg))
+
+
 @app.command(rich_help_panel=ROBOT_FILES)
 def compare(
     a: Annotated[str, typer.Argument(metavar="A", help=f"the arm to test: {_ARM}")],
-    b: Annotated[str, typer.Argument(metavar="B", help="the arm to compare with: as A, or a folder of such files")],
+    others: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="B",
+            help="the arm to compare with: as A, or a folder of such files; several: who agrees with whom; "
+            "none: which known arm is A?",
+        ),
+    ] = None,
     *,
     convention: Annotated[Convention, typer.Option(help="D-H convention of tables")] = "standard",
     length_unit: Lengths = None,
@@ -56,6 +88,7 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
 ):
+<<<<<<< HEAD
     """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
     from er3a.comparison.compare import best_of
     from er3a.files.arm_file import read_arm
@@ -68,16 +101,61 @@ def compare(
     _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
+=======
+    """Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?
+
+    Exit code 1 if anything differs.
+    """
+    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
+    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    options |= {"base": base, "tip": tip, "as_printed": True}
+    asked = CompareRequest(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
+    if not others:
+        identify(a, asked)
+    elif len(others) == 1:
+        compare_two(a, others[0], asked)
+    else:
+        compare_several([a, *others], asked)
+
+
+def compare_two(
+    a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None, read: Read | None = None
+) -> None:
+    """Compare an arm with another, or with all of a folder, and print what was found.
+
+    Parameters
+    ----------
+    a, b : as they were named on the command line
+    known : what is printed as JSON of a known arm that ``b`` names, too
+    read : A, if it has been read
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs
+    """
+    from er3a.comparison.compare import best_of
+    from er3a.files.units import noted_doubts
+    from er3a.robots.robot import to_modified, to_standard
+
+>>>>>>> arms66
     folder = Path(b)
+    first, found_before = read or _read(a, asked)
     with noted_doubts() as doubtful:
+<<<<<<< HEAD
         first = read_arm(a, xacro=xacro or (), **options)
         # Names of columns are those of A, or of B if A is no table.
         others = _others(b, xacro or (), options | ({"columns": ()} if holds_table(a) else {}))
+=======
+        others = _others(b, asked.xacro, asked.options)
+    doubtful = list({str(each): each for each in (*found_before, *doubtful)}.values())
+>>>>>>> arms66
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
     robots = {name: other.robot for name, other in others.items()}
-    ranked = best_of(arm, robots, tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)
+    tolerances = asked.tolerance_mm, asked.tolerance_deg
+    ranked = best_of(arm, robots, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1])
     ranked = [(each, _beside(found, first, others[each])) for each, found in ranked]
     name, found = ranked[0]
     notes = _notes((a, first), (name, others[name]))
@@ -91,14 +169,96 @@ def compare(
     for note in notes:
         print_note(note)
     where = str(folder / name) if folder.is_dir() else name
-    written = _written((a, arm), (where, others[name].robot), found, output, html, (tolerance_mm, tolerance_deg, told))
-    if as_json:
-        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told})
+    pair = (a, arm), (where, others[name].robot)
+    written = _written(*pair, found, asked.output, asked.html, (*tolerances, told))
+    if asked.as_json:
+        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told} | dict(known or {}))
     else:
         _print(ranked, folder.is_dir(), told)
         for file in written:
             print(f"{file}: written")
     if found.verdict != "equal":
+        raise typer.Exit(1)
+
+
+def _read(source: str, asked: CompareRequest) -> Read:
+    """An arm, and the numbers of its file whose units are in doubt."""
+    from er3a.files.arm_file import read_arm
+    from er3a.files.units import noted_doubts
+
+    with noted_doubts() as doubtful:
+        arm = read_arm(source, xacro=asked.xacro, **asked.options)
+    return arm, doubtful
+
+
+def identify(source: str, asked: CompareRequest) -> None:
+    """Print which known arm a table describes, by what it differs, and which others have the same geometry.
+
+    Parameters
+    ----------
+    source : as it was named on the command line
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs, or no arm is near
+    """
+    from er3a.comparison.compare import best_of
+    from er3a.comparison.nearest import likely, of_equal_geometry
+    from er3a.files.arm_catalogue import known_arms
+    from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
+
+    read, known = _read(source, asked), known_arms()
+    robot = read[0].robot
+    robots = {name: arm.robot for name, arm in known.items()}
+    tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
+    ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
+    name, best = ranked[0]
+    if best.different_entries > NEAR or (best.geometry and best.geometry.unexplained_mm):
+        if asked.as_json:
+            nearest = [{"arm": each, "different_entries": found.different_entries} for each, found in ranked]
+            print_json({"arm": None, "nearest": nearest})
+        else:
+            print("\n".join(not_near_lines([(known[each], found) for each, found in ranked[:NEAREST_SHOWN]])))
+        raise typer.Exit(1)
+    alike = of_equal_geometry(name, robots, asked.tolerances)
+    others = {each for each, found in ranked if found.different_entries == best.different_entries} - {name, *alike}
+    groups = [[known[each] for each in names] for names in (alike, sorted(others))]
+    if not asked.as_json:
+        print("\n".join(identified_lines(known[name], best, *groups)))
+    record = {"arm": name, "same_geometry": list(alike), "as_near": sorted(others)}
+    compare_two(source, name, asked, record, read)
+
+
+def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
+    """Print who agrees with whom, layer by layer, and the odd ones out.
+
+    Parameters
+    ----------
+    sources : three or more, as they were named on the command line
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs
+    """
+    from er3a.comparison.agreement import agreements, compared_in_pairs
+    from er3a.pipeline.messages.known_arms import agreement_lines, matrix_rows
+
+    if asked.output or asked.html:
+        raise Er3aError("--output and --html are for two arms; give one B")
+    if len(set(sources)) < len(sources):
+        raise Er3aError("one arm is named twice; name each once")
+    arms = {source: _read(source, asked)[0].robot for source in sources}
+    pairs = compared_in_pairs(arms, tolerance_mm=asked.tolerance_mm, tolerance_deg=asked.tolerance_deg)
+    found = agreements(sources, pairs)
+    if asked.as_json:
+        verdicts: list[dict[str, Any]] = [{"a": a, "b": b, "verdict": each.verdict} for (a, b), each in pairs.items()]
+        print_json({"pairs": verdicts, "layers": [vars(each) for each in found]})
+    else:
+        print_table(["", *sources], matrix_rows(sources, pairs))
+        print("\n".join(agreement_lines(found)))
+    if any(each.verdict != "equal" for each in pairs.values()):
         raise typer.Exit(1)
 
 

@@ -13,7 +13,7 @@ from er3a.errors import Er3aError, InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import NAME_PATTERN, RobotFile
-from er3a.files.robot_library import read_robot, robot_of, robot_path
+from er3a.files.robot_library import known_arm, read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf
@@ -21,6 +21,7 @@ from er3a.formats.urdf_tree import plain_urdf
 from er3a.robots.robot import Convention, Robot, robot_name
 
 REFERENCES = "data/manual_refs"
+NO_SHAPES = "no collision shapes; capsules are guessed from the table's axes"
 SCHEMA_LINE = "# yaml-language-server: $schema=../../config/robot.schema.json\n"
 
 
@@ -98,12 +99,16 @@ def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Ar
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"
     notes = [*imported.notes, misfit]
     if not arm_shapes(robot).given:
-        notes.append("the URDF gives no collision shapes; capsules are guessed from the table's axes")
+        notes.append(f"the URDF gives {NO_SHAPES}")
     return Arm(robot_of(content), _text(content), tuple(notes))
 
 
 def _known(robot: str, name: str | None) -> Arm:
-    """A robot file as it is written, with its comments, and its references; under another name if one is asked for."""
+    """A robot file as it is written, with its comments, and its references, or an arm of the catalogue; under another
+    name if one is asked for."""
+    if known := known_arm(robot):
+        content = robot_file(known.robot.replace(name=name or robot))
+        return Arm(robot_of(content), _text(content), (f"the catalogue gives {NO_SHAPES}",))
     path = robot_path(robot)
     content = read_robot(path)
     text = read_text(path)
