@@ -14,12 +14,8 @@ from pydantic import Field, model_validator
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
-<<<<<<< HEAD
-from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
-=======
 from er3a.files.arm_catalogue import KnownArm, known_arms
-from er3a.files.dh_table import read_dh_table
->>>>>>> arms66
+from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
 from er3a.files.pieces_file import load_pieces
 from er3a.files.units import doubt_millimetres
@@ -46,39 +42,19 @@ MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
-<<<<<<< HEAD
-    """Load a robot by the name of a file in data/robots, or by the path of a robot file or a D-H table.
-
-    A name is looked up below the working folder first, then among the robots that come with er3a. Other files than
-    robot files (.yaml) hold a D-H table, as :func:`read_table` takes it. Assumptions give a warning
-    (``er3a.InputWarning``).
-=======
-    """Load a robot by the name of a file in data/robots or of a known arm, or by a path that ends in .yaml or .csv.
+    """Load a robot by the name of a file in data/robots or of a known arm, or by the path of a robot file or a D-H table.
 
     A name is looked up below the working folder first, then among the robots that come with er3a, then in the catalogue
-    of arms (``er3a arms``). A .csv holds a D-H
-    table (:mod:`er3a.files.dh_table`), mm and degrees, in the given convention unless the file names one. Assumptions
-    give a warning (``er3a.InputWarning``).
->>>>>>> arms66
+    of arms (``er3a arms``). Other files than robot files (.yaml) hold a D-H table, as :func:`read_table` takes it.
+    Assumptions give a warning (``er3a.InputWarning``).
 
     Raises
     ------
     InputError
         naming file, field and remedy
     """
-<<<<<<< HEAD
-    return (
-        read_table(name_or_path, convention)
-        if holds_table(name_or_path)
-        else robot_of(read_robot(robot_path(name_or_path)))
-    )
-
-
-def holds_table(source: str | Path) -> bool:
-    """Whether a path is that of a D-H table, not a robot's name or file, nor a URDF.
-=======
-    if str(name_or_path).endswith(".csv"):
-        return robot_of(read_table(Path(name_or_path), convention))
+    if holds_table(name_or_path):
+        return read_table(name_or_path, convention)
     if known := known_arm(str(name_or_path)):
         return known.robot
     return robot_of(read_robot(robot_path(name_or_path)))
@@ -105,9 +81,8 @@ def _named_file(name: str) -> Path | None:
     return path if path and path.is_file() else None
 
 
-def read_table(path: Path, convention: Convention = "standard") -> robot_file.RobotFile:
-    """A robot file made from a D-H table; assumptions give a warning (``er3a.InputWarning``).
->>>>>>> arms66
+def holds_table(source: str | Path) -> bool:
+    """Whether a path is that of a D-H table, not a robot's name or file, nor a URDF.
 
     Parameters
     ----------

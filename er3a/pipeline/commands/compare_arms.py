@@ -88,27 +88,15 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
 ):
-<<<<<<< HEAD
-    """Do A and B describe the same arm? Lists the entries that differ. Exit code 1 if any do."""
-    from er3a.comparison.compare import best_of
-    from er3a.files.arm_file import read_arm
-    from er3a.files.robot_library import holds_table
-    from er3a.files.units import noted_doubts
-    from er3a.robots.robot import to_modified, to_standard
-
-    if a == b == "-":
-        raise Er3aError("standard input holds one table; give A or B as a file")
-    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
-    options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
-=======
     """Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?
 
     Exit code 1 if anything differs.
     """
+    if [a, *(others or ())].count("-") > 1:
+        raise Er3aError("standard input holds one table; give the others as files")
     _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    options |= {"base": base, "tip": tip, "as_printed": True}
+    options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
     asked = CompareRequest(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
     if not others:
         identify(a, asked)
@@ -135,21 +123,16 @@ def compare_two(
         with code 1 if anything differs
     """
     from er3a.comparison.compare import best_of
+    from er3a.files.robot_library import holds_table
     from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
->>>>>>> arms66
     folder = Path(b)
     first, found_before = read or _read(a, asked)
     with noted_doubts() as doubtful:
-<<<<<<< HEAD
-        first = read_arm(a, xacro=xacro or (), **options)
         # Names of columns are those of A, or of B if A is no table.
-        others = _others(b, xacro or (), options | ({"columns": ()} if holds_table(a) else {}))
-=======
-        others = _others(b, asked.xacro, asked.options)
+        others = _others(b, asked.xacro, asked.options | ({"columns": ()} if holds_table(a) else {}))
     doubtful = list({str(each): each for each in (*found_before, *doubtful)}.values())
->>>>>>> arms66
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)

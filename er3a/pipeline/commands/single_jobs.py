@@ -109,23 +109,14 @@ def teach(
 ):
     """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
-<<<<<<< HEAD
-    A file (.yaml, .urdf, a D-H table in any form) needs no study: its page is written into the current folder.
-    """
-    from er3a.robots.robot import robot_name
-
-    if robot == "-" or Path(robot).suffix:
-        _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"))
-=======
-    A file (.csv with a D-H table, .yaml, .urdf) needs no study, nor does a known arm where there is none: the page is
+    A file (.yaml, .urdf, a D-H table in any form) needs no study, nor does a known arm where there is none: the page is
     written into the current folder.
     """
     from er3a.files.arm_catalogue import known_arms
-    from er3a.files.arm_file import READ
+    from er3a.robots.robot import robot_name
 
-    if Path(robot).suffix in READ or (robot in known_arms() and (output or not study.is_file())):
-        _teach_file(robot, output or Path(f"{Path(robot).stem}.html"))
->>>>>>> arms66
+    if robot == "-" or Path(robot).suffix or (robot in known_arms() and (output or not study.is_file())):
+        _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"))
         return
     if output is not None:
         raise Er3aError(
@@ -137,7 +128,7 @@ def teach(
 def _teach_file(source: str, page: Path) -> None:
     """Write the panel of an arm that is given as a file."""
     from er3a.files.arm_catalogue import ARMS
-    from er3a.files.arm_file import READ, read_arm
+    from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
     from er3a.pipeline.code_digest import code_digest
     from er3a.pipeline.results import Input, Provenance
@@ -146,13 +137,8 @@ def _teach_file(source: str, page: Path) -> None:
     arm = read_arm(source)
     for note in arm.notes:
         options.print_note(note)
-<<<<<<< HEAD
-    inputs = (Input(source, sha256(Path(source)), {}),) if Path(source).is_file() else ()
-    provenance = Provenance(inputs, code_digest())
-=======
-    file = Path(source) if Path(source).suffix in READ else ARMS
-    provenance = Provenance((Input(source, sha256(file), {}),), code_digest())
->>>>>>> arms66
+    file = Path(source) if Path(source).is_file() else ARMS if source != "-" else None
+    provenance = Provenance((Input(source, sha256(file), {}),) if file else (), code_digest())
     command = shlex.join(["er3a", "teach", source, "--output", str(page)])
     write_panel(arm.robot, page, command=command, provenance=provenance)
     print(f"{page}: written")
