@@ -42,7 +42,7 @@ MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
-    """Load a robot by the name of a file in data/robots or of a known arm, or by the path of a robot file or a D-H table.
+    """Load a robot by the name of a file in data/robots or of a known arm, or by a path of a robot file or D-H table.
 
     A name is looked up below the working folder first, then among the robots that come with er3a, then in the catalogue
     of arms (``er3a arms``). Other files than robot files (.yaml) hold a D-H table, as :func:`read_table` takes it.
