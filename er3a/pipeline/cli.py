@@ -25,6 +25,7 @@ _UsageError: Any = typer.BadParameter.__base__  # click's, which some versions o
 for _room in (
     "studies",
     "compare_arms",
+    "confirm",
     "robot_files",
     "programs",
     "single_jobs",
