@@ -29,9 +29,9 @@ from er3a.robots.robot import Robot, Source
 Layer = Literal["reading", "frames", "joints", "small", "another"]
 Verdict = Literal["agrees", "reading", "frames", "joints", "small", "another", "open"]
 LAYERS: tuple[Layer, ...] = ("reading", "frames", "joints", "small", "another")
-SEARCHED, FITTED = 40, 300  # rows with which hypotheses are sought, and with which the chosen one is fitted
+SEARCHED, FITTED = 40, 300  # rows with which explanations are sought, and with which the chosen one is fitted
 LEAST, LEAST_POSITIONS = 4, 8  # distinct poses with orientations, and without
-ALIKE = 45.0  # squares and price by which another hypothesis may be worse and is named
+ALIKE = 45.0  # squares and price by which another explanation may be worse and is named
 MOST_NOISE, NOISE_SHARE = 5e-4, 0.2  # m that an arm that moved a little may leave, and share of what was before
 OPEN_M, OPEN_RAD = 1e-3, float(np.radians(0.1))
 FOLDS, HELD_OUT = 5, 8
@@ -202,10 +202,10 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
     return Confirmation(
         verdict=(layers[-1] if layers else "agrees") if explained else "open",
         layers=layers,
-        form=final.hypothesis.form,
-        renamed=final.hypothesis.form not in found.named,
-        factor=final.hypothesis.factor,
-        joints=final.hypothesis.joints.faults,
+        form=final.explanation.form,
+        renamed=final.explanation.form not in found.named,
+        factor=final.explanation.factor,
+        joints=final.explanation.joints.faults,
         base=places["base"],
         tool=places["tool"],
         entries=entries,
@@ -220,7 +220,7 @@ def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
         fits=~misread,
         lines=pairs.lines,
         noise=noise,
-        held_out_mm=_held_out(fitter, final) if final.hypothesis.small else None,
+        held_out_mm=_held_out(fitter, final) if final.explanation.small else None,
         alike=_alike(found, chosen) if explained else (),
         not_settled=unseen,
         taken_up=taken_up,
@@ -242,17 +242,17 @@ def _chosen(found: Attempts) -> tuple[Solution, float]:
 
 
 def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
-    """The chosen hypothesis fitted to more rows, without those that don't fit."""
+    """The chosen explanation fitted to more rows, without those that don't fit."""
     start = chosen.Y, chosen.X, chosen.amounts
-    solution = fitter.fit(chosen.hypothesis, start)
+    solution = fitter.fit(chosen.explanation, start)
     bad = fitter.at(chosen).by_row > 9.0 * fitter.dimensions
     if solution.per_freedom > EXPLAINED and 0 < bad.sum() <= 0.2 * len(bad):
-        solution = fitter.fit(chosen.hypothesis, start, np.where(bad, 0.0, 1.0))
+        solution = fitter.fit(chosen.explanation, start, np.where(bad, 0.0, 1.0))
     return solution
 
 
 def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
-    found = solution.hypothesis
+    found = solution.explanation
     of_units = [each for each in found.joints.faults if each.code == "joints_in"]
     columns = [each.column for each in found.entries]
     holds: dict[Layer, bool] = {
@@ -267,7 +267,7 @@ def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
 
 def _places(solution: Solution) -> dict[str, Placed | None]:
     """Base and tool with their intervals, as far as they were fitted."""
-    errors, found = INTERVAL_95 * solution.errors, solution.hypothesis
+    errors, found = INTERVAL_95 * solution.errors, solution.explanation
     placed: dict[str, Placed | None] = {"base": None, "tool": None}
     for name, T in (("base", solution.Y), ("tool", solution.X)):
         if name in found.free:
@@ -288,7 +288,7 @@ def _entries(robot: Robot, solution: Solution) -> tuple[tuple[FoundEntry, ...], 
         )
         for each, amount, error in zip(solution.entries, solution.amounts, errors)
     ]
-    own = len(solution.hypothesis.entries)
+    own = len(solution.explanation.entries)
     by_size = sorted(
         every[own:], key=lambda each: -abs(each.found - each.given) / (each.entry.scale * each.entry.in_unit)
     )
@@ -298,8 +298,8 @@ def _entries(robot: Robot, solution: Solution) -> tuple[tuple[FoundEntry, ...], 
 def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
     """The robot as the controller has it: table, joints, base and tool."""
     found = corrected(robot, solution.entries, solution.amounts)
-    factors, shift = solution.hypothesis.joints.factors, solution.hypothesis.joints.shift
-    if solution.hypothesis.joints.faults:
+    factors, shift = solution.explanation.joints.factors, solution.explanation.joints.shift
+    if solution.explanation.joints.faults:
         sizes = np.abs(factors).max(axis=1)
         factors = factors / np.where(np.abs(sizes - 1) > 0.01, sizes, 1.0)[:, None]
         moved = robot.direction * row_values(robot, shift)
@@ -313,12 +313,12 @@ def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
         else:
             own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
             found = found.replace(coupling=own @ factors)
-    if solution.hypothesis.free:
+    if solution.explanation.free:
         found = found.replace(base=solution.Y, tool=solution.X)
-    if not (solution.entries or solution.hypothesis.free or solution.hypothesis.joints.faults):
+    if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
         return found
     source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")
-    named = ("dh", "zero", *solution.hypothesis.free)
+    named = ("dh", "zero", *solution.explanation.free)
     return found.replace(sources={**robot.sources, **dict.fromkeys(named, source)})
 
 
@@ -332,7 +332,7 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
         out = rows[fold::FOLDS]
         weights = solution.rows.astype(float)
         weights[out] = 0.0
-        left = fitter.fit(solution.hypothesis, (solution.Y, solution.X, solution.amounts), weights)
+        left = fitter.fit(solution.explanation, (solution.Y, solution.X, solution.amounts), weights)
         squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
     return float(MM * np.sqrt(np.mean(squares)))
 
@@ -345,15 +345,15 @@ def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
         if found.total(each) > found.total(chosen) + ALIKE or any(before <= parts for before in seen):
             continue
         seen.append(parts)
-        entries = tuple(entry.name for entry in each.hypothesis.entries)
+        entries = tuple(entry.name for entry in each.explanation.entries)
         named.append(
-            fact("explains_too", joints=each.hypothesis.joints.faults, places=each.hypothesis.free, entries=entries)
+            fact("explains_too", joints=each.explanation.joints.faults, places=each.explanation.free, entries=entries)
         )
     return tuple(named)
 
 
 def _parts(solution: Solution) -> frozenset[object]:
-    found = solution.hypothesis
+    found = solution.explanation
     row = ["row"] if not solution.rows.all() else []
     own = [(each.code, tuple(sorted(each.params.items()))) for each in found.joints.faults]
     units = [found.factor] if found.factor != 1 else []
@@ -365,8 +365,10 @@ def _parts(solution: Solution) -> frozenset[object]:
 def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Entries that could be off by 1 mm or 0.1 deg: without a trace, and because base or tool acts alike."""
     every = [each for each in fitter.every if each not in solution.entries]
-    hypothesis = replace(solution.hypothesis, entries=(*solution.entries, *every), small=False)
-    J, _ = fitter.linear(hypothesis, (solution.Y, solution.X, np.concatenate([solution.amounts, np.zeros(len(every))])))
+    explanation = replace(solution.explanation, entries=(*solution.entries, *every), small=False)
+    J, _ = fitter.linear(
+        explanation, (solution.Y, solution.X, np.concatenate([solution.amounts, np.zeros(len(every))]))
+    )
     first = J.shape[1] - len(every)
     least = INTERVAL_95 / np.array([OPEN_M if each.unit == "mm" else OPEN_RAD for each in every])
     Q = np.linalg.qr(J[:, :first])[0]

@@ -34,7 +34,7 @@ DONE = 1e-9  # m or rad
 FLOOR = 5e-6
 """M and rad, standard deviation of what no digits explain: tables are printed to 0.01 mm."""
 SMALL = 2e-3  # m and rad: standard deviation of what a factory's calibration corrects
-BIG = 4.0  # of these, beyond which a correction is no small one
+BIG = 3.0  # of these, beyond which a correction is no small one
 SINGULAR = 1e-9
 
 
@@ -64,7 +64,7 @@ class JointReading:
 
 
 @dataclass(frozen=True, eq=False)
-class Meaning:
+class Explanation:
     """What could be between a model and its controller.
 
     Attributes
@@ -85,7 +85,7 @@ class Meaning:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A hypothesis with the values that fit best.
+    """An explanation with the values that fit best.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Solution:
     rows : (N,) bool, those that were fitted
     """
 
-    hypothesis: Meaning
+    explanation: Explanation
     entries: tuple[Entry, ...]
     Y: Reals
     X: Reals
@@ -133,7 +133,7 @@ class Solution:
 
 
 class Fitter:
-    """Fits hypotheses to pairs; ``widen``: of all standard deviations, where more than digits is left."""
+    """Fits explanations to pairs; ``widen``: of all standard deviations, where more than digits is left."""
 
     def __init__(self, robot: Robot, pairs: Pairs):
         self.robot, self.pairs = robot, pairs
@@ -181,36 +181,36 @@ class Fitter:
         return np.concatenate([(plus - minus)[..., :3, 3] / (2 * STEP), turn], axis=-1), F[-1]
 
     def fit(
-        self, hypothesis: Meaning, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
+        self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
     ) -> Solution:
         """The values that fit best.
 
         Parameters
         ----------
-        start : Y, X (4, 4), and amounts of the hypothesis's entries
+        start : Y, X (4, 4), and amounts of the explanation's entries
         weights : (N,), of rows; 0 leaves one out
 
         Returns
         -------
         solution : the best near to the start
         """
-        entries = hypothesis.entries
-        if hypothesis.small:
+        entries = explanation.entries
+        if explanation.small:
             entries = (*entries, *(each for each in self.every if each not in entries))
         state = start[0], start[1], np.zeros(len(entries))
         if start[2] is not None:
             state[2][: len(start[2])] = start[2]
-        u = self.rows_at(hypothesis)
+        u = self.rows_at(explanation)
         weights = np.ones(len(u)) if weights is None else weights
-        prior = np.array([0.0 if each in hypothesis.entries else 1 / SMALL for each in entries])
-        whiten = self._whitening(hypothesis, entries, state, u) * weights[:, None, None]
-        left, off = self._left(hypothesis, entries, state, u, whiten, prior)
-        for number in range(STEPS if hypothesis.free or entries else 0):
-            J = self._jacobian(hypothesis, entries, state, u, whiten, prior)
+        prior = np.array([0.0 if each in explanation.entries else 1 / SMALL for each in entries])
+        whiten = self._whitening(explanation, entries, state, u) * weights[:, None, None]
+        left, off = self._left(explanation, entries, state, u, whiten, prior)
+        for number in range(STEPS if explanation.free or entries else 0):
+            J = self._jacobian(explanation, entries, state, u, whiten, prior)
             step = np.asarray(np.linalg.lstsq(J, -left, rcond=SINGULAR)[0], np.float64)
             for halving in range(HALVINGS):
-                tried = self._stepped(hypothesis, state, step * 0.5**halving)
-                now, now_off = self._left(hypothesis, entries, tried, u, whiten, prior)
+                tried = self._stepped(explanation, state, step * 0.5**halving)
+                now, now_off = self._left(explanation, entries, tried, u, whiten, prior)
                 if now @ now < left @ left:
                     break
             else:
@@ -218,35 +218,35 @@ class Fitter:
             gain = 1 - (now @ now) / (left @ left)
             state, left, off = tried, now, now_off
             if number < 2:
-                whiten = self._whitening(hypothesis, entries, state, u) * weights[:, None, None]
-                left, off = self._left(hypothesis, entries, state, u, whiten, prior)
+                whiten = self._whitening(explanation, entries, state, u) * weights[:, None, None]
+                left, off = self._left(explanation, entries, state, u, whiten, prior)
             elif gain < 1e-4 or np.abs(step).max() < DONE:
                 break
-        J = self._jacobian(hypothesis, entries, state, u, whiten, prior)
-        plain = self._whitening(hypothesis, entries, state, u)
+        J = self._jacobian(explanation, entries, state, u, whiten, prior)
+        plain = self._whitening(explanation, entries, state, u)
         by_row = (np.einsum("nij,nj->ni", plain, off) ** 2).sum(axis=1)
         rows = weights > 0
         own = J.shape[1] - int((prior > 0).sum())
         freedom = max(int(rows.sum()) * self.dimensions - own, 1)
         squares = float(((prior * state[2]) ** 2).sum())
-        return Solution(hypothesis, entries, *state, off, by_row, squares, freedom, J, rows)
+        return Solution(explanation, entries, *state, off, by_row, squares, freedom, J, rows)
 
-    def linear(self, hypothesis: Meaning, state: tuple[Reals, Reals, Reals]) -> tuple[Reals, Reals]:
+    def linear(self, explanation: Explanation, state: tuple[Reals, Reals, Reals]) -> tuple[Reals, Reals]:
         """Derivatives of the differences, and these, in standard deviations.
 
         Parameters
         ----------
-        state : base, tool and amounts of all entries of the hypothesis
+        state : base, tool and amounts of all entries of the explanation
 
         Returns
         -------
         J, left : (r, p), and (r,)
         """
-        entries, prior = hypothesis.entries, np.zeros(len(hypothesis.entries))
-        u = self.rows_at(hypothesis)
-        whiten = self._whitening(hypothesis, entries, state, u)
-        J = self._jacobian(hypothesis, entries, state, u, whiten, prior)
-        left = self._left(hypothesis, entries, state, u, whiten, prior)[0]
+        entries, prior = explanation.entries, np.zeros(len(explanation.entries))
+        u = self.rows_at(explanation)
+        whiten = self._whitening(explanation, entries, state, u)
+        J = self._jacobian(explanation, entries, state, u, whiten, prior)
+        left = self._left(explanation, entries, state, u, whiten, prior)[0]
         return J[: len(J) - len(prior)], left[: len(left) - len(prior)]
 
     def at(self, solution: Solution) -> Solution:
@@ -256,13 +256,13 @@ class Fitter:
         ----------
         solution : of the same robot, fitted to any pairs
         """
-        hypothesis, state, u = (
-            solution.hypothesis,
+        explanation, state, u = (
+            solution.explanation,
             (solution.Y, solution.X, solution.amounts),
-            self.rows_at(solution.hypothesis),
+            self.rows_at(solution.explanation),
         )
-        whiten = self._whitening(hypothesis, solution.entries, state, u)
-        _, off = self._left(hypothesis, solution.entries, state, u, whiten, np.zeros(len(solution.entries)))
+        whiten = self._whitening(explanation, solution.entries, state, u)
+        _, off = self._left(explanation, solution.entries, state, u, whiten, np.zeros(len(solution.entries)))
         by_row = (np.einsum("nij,nj->ni", whiten, off) ** 2).sum(axis=1)
         return replace(solution, off=off, by_row=by_row, rows=np.ones(len(u), dtype=bool))
 
@@ -274,27 +274,27 @@ class Fitter:
         solution : of the same robot
         """
         state = solution.Y, solution.X, solution.amounts
-        whiten = self._whitening(solution.hypothesis, solution.entries, state, self.rows_at(solution.hypothesis))
+        whiten = self._whitening(solution.explanation, solution.entries, state, self.rows_at(solution.explanation))
         size = self.dimensions
         by_place = np.linalg.inv(whiten[:, :size, :size])
         squares = (by_place**2).sum(axis=2).mean(axis=0)
         return float(np.sqrt(squares[:3].sum())), float(np.sqrt(squares[3:].sum()))
 
-    def rows_at(self, hypothesis: Meaning) -> Reals:
+    def rows_at(self, explanation: Explanation) -> Reals:
         """Row values (N, m), rad or m, of the model.
 
         Parameters
         ----------
-        hypothesis : which says how the pendant's joints are read
+        explanation : which says how the pendant's joints are read
         """
-        return row_values(self.robot, hypothesis.joints.of(self.pairs.q))
+        return row_values(self.robot, explanation.joints.of(self.pairs.q))
 
     @property
     def dimensions(self) -> int:
         """Numbers of a pose: 6, or 3 without orientations."""
         return 6 if self.pairs.turns else 3
 
-    def twists(self, hypothesis: Meaning, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
+    def twists(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
                by: Sequence[Entry]) -> Reals:  # fmt: skip
         """Twists (k, N, 6) of the controller's tool point by entries, in the controller's axes."""
         Y, X, amounts = state
@@ -304,56 +304,56 @@ class Fitter:
         found: Reals = np.concatenate([point @ Y[:3, :3].T, moved[..., 3:] @ Y[:3, :3].T], axis=-1)
         return found
 
-    def _whitening(self, hypothesis: Meaning, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals],
+    def _whitening(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals],
                    u: Reals) -> Reals:  # fmt: skip
         """(N, 6, 6), which make standard deviations of differences; rows of 0 for orientations that are not given."""
         robot, pairs = self.robot, self.pairs
         moving = [Entry("d" if slides else "offset", k + 1) for k, slides in enumerate(robot.sliding)]
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = (robot.direction[:, None] * coupling) @ hypothesis.joints.factors * (pairs.q_digit * ROUNDED)
-        J = np.einsum("kni,kj->nij", self.twists(hypothesis, entries, state, u, moving), by_joint)
-        own = np.r_[pairs.xyz_digit * abs(hypothesis.factor), np.full(3, pairs.turn_digit)] * ROUNDED
+        by_joint = (robot.direction[:, None] * coupling) @ explanation.joints.factors * (pairs.q_digit * ROUNDED)
+        J = np.einsum("kni,kj->nij", self.twists(explanation, entries, state, u, moving), by_joint)
+        own = np.r_[pairs.xyz_digit * abs(explanation.factor), np.full(3, pairs.turn_digit)] * ROUNDED
         covariance = J @ transposed(J) + np.diag(own**2 + FLOOR**2)
         size = self.dimensions
         found: Reals = np.zeros((len(u), 6, 6))
         found[:, :size, :size] = np.linalg.inv(np.linalg.cholesky(covariance[:, :size, :size])) / self.widen
         return found
 
-    def _left(self, hypothesis: Meaning, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
+    def _left(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
               whiten: Reals, prior: Reals) -> tuple[Reals, Reals]:  # fmt: skip
         """Differences in standard deviations, and in m and rad (N, 6)."""
         Y, X, amounts = state
         M = Y @ self.flanges(entries, amounts[None], u)[0] @ X
         off = np.zeros((len(M), 6))
-        off[:, :3] = M[:, :3, 3] - hypothesis.factor * self.pairs.xyz
+        off[:, :3] = M[:, :3, 3] - explanation.factor * self.pairs.xyz
         if self.pairs.turns:
-            off[:, 3:] = log_rotation(M[:, :3, :3] @ transposed(self.pairs.turns[hypothesis.form]))
+            off[:, 3:] = log_rotation(M[:, :3, :3] @ transposed(self.pairs.turns[explanation.form]))
         left = np.einsum("nij,nj->ni", whiten, off)[:, : self.dimensions].ravel()
         return np.concatenate([left, prior * amounts]), off
 
-    def _jacobian(self, hypothesis: Meaning, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
+    def _jacobian(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
                   whiten: Reals, prior: Reals) -> Reals:  # fmt: skip
         """Derivatives of the differences in standard deviations by base, tool and entries."""
-        columns = self.columns(hypothesis, entries, state, u, entries)
+        columns = self.columns(explanation, entries, state, u, entries)
         count = len(columns) * self.dimensions
         J = np.einsum("nij,njk->nik", whiten, columns)[:, : self.dimensions].reshape(count, columns.shape[-1])
         rows = np.zeros((len(prior), J.shape[1]))
         rows[:, J.shape[1] - len(prior) :] = np.diag(prior)
         return np.concatenate([J, rows])
 
-    def columns(self, hypothesis: Meaning, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
+    def columns(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
                 by: Sequence[Entry]) -> Reals:  # fmt: skip
         """Derivatives (N, 6, p) of the differences, m and rad, by base and tool, as far as free, and by entries."""
         Y, X, amounts = state
         F = self.flanges(entries, amounts[None], u)[0]
         R = Y[:3, :3] @ F[:, :3, :3]
         parts = []
-        if "base" in hypothesis.free:
+        if "base" in explanation.free:
             base = np.zeros((len(F), 6, 6))
             base[:, :3, :3] = base[:, 3:, 3:] = np.eye(3)
             base[:, :3, 3:] = -skew(R @ X[:3, 3] + F[:, :3, 3] @ Y[:3, :3].T)
             parts.append(base)
-        if "tool" in hypothesis.free:
+        if "tool" in explanation.free:
             turned = self.dimensions == 6
             tool = np.zeros((len(F), 6, 6 if turned else 3))
             tool[:, :3, :3] = R
@@ -361,17 +361,17 @@ class Fitter:
                 tool[:, 3:, 3:] = R @ X[:3, :3]
             parts.append(tool)
         if by:
-            parts.append(np.moveaxis(self.twists(hypothesis, entries, state, u, by), 0, -1))
+            parts.append(np.moveaxis(self.twists(explanation, entries, state, u, by), 0, -1))
         return np.concatenate(parts, axis=-1) if parts else np.zeros((len(F), 6, 0))
 
-    def _stepped(self, hypothesis: Meaning, state: tuple[Reals, Reals, Reals], step: Reals
+    def _stepped(self, explanation: Explanation, state: tuple[Reals, Reals, Reals], step: Reals
                  ) -> tuple[Reals, Reals, Reals]:  # fmt: skip
         """Base, tool and amounts after a step of all that is free."""
         Y, X, amounts = state
-        if "base" in hypothesis.free:
+        if "base" in explanation.free:
             Y = posed(exp_rotation(step[3:6]) @ Y[:3, :3], Y[:3, 3] + step[:3])
             step = step[6:]
-        if "tool" in hypothesis.free:
+        if "tool" in explanation.free:
             size = self.dimensions
             turn = exp_rotation(step[3:6]) if size == 6 else np.eye(3)
             X = posed(X[:3, :3] @ turn, X[:3, 3] + step[:3])

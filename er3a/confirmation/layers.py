@@ -1,7 +1,8 @@
 """The least that explains what is between a model and its controller.
 
-Hypotheses are fitted in order of what they ask for: nothing; orientations, units or joints read otherwise; a tool or a
-base; rows misread; one or two entries of the table; small corrections of all. What leaves no more than digits explains.
+Explanations are fitted in order of what they ask for: nothing; orientations, units or joints read otherwise; a tool or
+a base; rows misread; one or two entries of the table; small corrections of all. What leaves no more than digits
+explains.
 Of several, the one is chosen whose squares plus ``PRICE`` times its cost are least.
 """
 
@@ -14,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import BIG, SMALL, Fitter, Meaning, Place, Solution
+from er3a.confirmation.fit import BIG, SMALL, Explanation, Fitter, Place, Solution
 from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
@@ -36,13 +37,13 @@ BOTH: tuple[Place, ...] = ("base", "tool")
 
 
 def cost(solution: Solution, named: Sequence[str]) -> float:
-    """What a hypothesis asks for.
+    """What an explanation asks for.
 
     Parameters
     ----------
     named : forms of orientation that the columns' names allow
     """
-    found = solution.hypothesis
+    found = solution.explanation
     return (
         OTHER_FORM * (found.form not in named)
         + OTHER_UNIT * (found.factor != 1)
@@ -74,15 +75,15 @@ class Attempts:
         """Solutions that leave no more than digits, the best first."""
         return sorted((each for each in self.found if each.per_freedom <= EXPLAINED), key=self.total)
 
-    def add(self, hypothesis: Meaning, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
+    def add(self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
             ) -> Solution:  # fmt: skip
-        """Fit a hypothesis and keep it."""
-        self.found.append(self.fitter.fit(hypothesis, start, weights))
+        """Fit an explanation and keep it."""
+        self.found.append(self.fitter.fit(explanation, start, weights))
         return self.found[-1]
 
 
 def search(fitter: Fitter) -> Attempts:
-    """Fit hypotheses until one explains.
+    """Fit explanations until one explains.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def search(fitter: Fitter) -> Attempts:
     """
     robot, found = fitter.robot, Attempts(fitter, [])
     for form in found.named:
-        found.add(Meaning(plain(robot), form), (robot.base, robot.tool, None))
+        found.add(Explanation(plain(robot), form), (robot.base, robot.tool, None))
     if found.explained():
         return found
     candidates = _candidates(fitter, found)
@@ -159,9 +160,9 @@ def _with_frames(found: Attempts, near: Near) -> None:
                     X = _middle(inverted(robot.base @ F) @ C)
                 if free == ("base",):
                     Y = _middle(C @ inverted(F @ robot.tool))
-            hypothesis = Meaning(near.joints, near.form, factor, free)
+            explanation = Explanation(near.joints, near.form, factor, free)
             start = Y if "base" in free else robot.base, X if "tool" in free else robot.tool, None
-            found.add(hypothesis, start)
+            found.add(explanation, start)
 
 
 def _coupling(fitter: Fitter) -> Reals:
@@ -185,7 +186,7 @@ def _start_of(solution: Solution) -> tuple[Reals, Reals, Reals]:
 
 
 def _without_rows(found: Attempts, solution: Solution) -> None:
-    """The same hypothesis without the rows that don't fit, if these are few."""
+    """The same explanation without the rows that don't fit, if these are few."""
     count = len(solution.by_row)
     most, numbers = int(max(1, MOST_ROWS * count)), found.fitter.dimensions
     if count < 5:
@@ -193,24 +194,24 @@ def _without_rows(found: Attempts, solution: Solution) -> None:
     for _ in range(ROUNDS):
         size = max(float(np.median(solution.by_row)), 2.0 * numbers)
         weights = 1 / np.sqrt(1 + solution.by_row / size)
-        last, solution = solution, found.fitter.fit(solution.hypothesis, _start_of(solution), weights)
+        last, solution = solution, found.fitter.fit(solution.explanation, _start_of(solution), weights)
         if (np.abs(last.by_row - solution.by_row) < 0.1 + 0.01 * solution.by_row).all():
             break
     bad = solution.by_row > ROW_OFF * numbers
     if 0 < bad.sum() <= most:
-        found.add(solution.hypothesis, _start_of(solution), np.where(bad, 0.0, 1.0))
+        found.add(solution.explanation, _start_of(solution), np.where(bad, 0.0, 1.0))
 
 
 def _starts(found: Attempts) -> list[list[Solution]]:
     """Solutions to which entries are added: of the nearest ways of reading, without frames and with both."""
-    both = [each for each in found.found if each.hypothesis.free == BOTH]
+    both = [each for each in found.found if each.explanation.free == BOTH]
     both = sorted(both, key=lambda each: each.chi2**0.5 * 1.2 ** cost(each, found.named))[:TRIED]
-    alone = [each for each in found.found if not each.hypothesis.free and each.rows.all()]
+    alone = [each for each in found.found if not each.explanation.free and each.rows.all()]
     return [[*[other for other in alone if _same_reading(other, each)][:1], each] for each in both]
 
 
 def _same_reading(first: Solution, second: Solution) -> bool:
-    a, b = first.hypothesis, second.hypothesis
+    a, b = first.explanation, second.explanation
     return a.joints is b.joints and a.form == b.form and a.factor == b.factor and not (a.entries or b.entries)
 
 
@@ -219,11 +220,11 @@ def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]
     reached = []
     for state in states:
         for more in _promising(found.fitter, state):
-            entries = (*state.hypothesis.entries, *more)
+            entries = (*state.explanation.entries, *more)
             if len(entries) <= MOST:
-                hypothesis = replace(state.hypothesis, entries=entries)
-                amounts = np.concatenate([state.amounts[: len(state.hypothesis.entries)], np.zeros(len(more))])
-                reached.append(_with_fewer_frames(found, found.add(hypothesis, (state.Y, state.X, amounts))))
+                explanation = replace(state.explanation, entries=entries)
+                amounts = np.concatenate([state.amounts[: len(state.explanation.entries)], np.zeros(len(more))])
+                reached.append(_with_fewer_frames(found, found.add(explanation, (state.Y, state.X, amounts))))
     return sorted(reached, key=lambda each: each.chi2)[:STATES]
 
 
@@ -232,19 +233,19 @@ def _with_fewer_frames(found: Attempts, solution: Solution) -> Solution:
     robot = found.fitter.robot
     if solution.per_freedom > EXPLAINED:
         return solution
-    for free in PLACES[: 3 if solution.hypothesis.free == BOTH else 0]:
+    for free in PLACES[: 3 if solution.explanation.free == BOTH else 0]:
         Y, X = solution.Y if "base" in free else robot.base, solution.X if "tool" in free else robot.tool
-        found.add(replace(solution.hypothesis, free=free), (Y, X, solution.amounts))
+        found.add(replace(solution.explanation, free=free), (Y, X, solution.amounts))
     return solution
 
 
 def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
     """Entries, alone and in pairs, that reduce the squares most, to first order."""
-    own = set(state.hypothesis.entries)
+    own = set(state.explanation.entries)
     every = [each for each in fitter.every if each not in own and each.column != "beta"]
-    hypothesis = replace(state.hypothesis, entries=(*state.hypothesis.entries, *every))
+    explanation = replace(state.explanation, entries=(*state.explanation.entries, *every))
     amounts = np.concatenate([state.amounts, np.zeros(len(every))])
-    J, left = fitter.linear(hypothesis, (state.Y, state.X, amounts))
+    J, left = fitter.linear(explanation, (state.Y, state.X, amounts))
     first = J.shape[1] - len(every)
     Q = np.linalg.qr(J[:, :first])[0] if first else np.zeros((len(J), 0))
     own_size = np.linalg.norm(J[:, first:], axis=0)
@@ -268,9 +269,9 @@ def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
 def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[Solution]) -> None:
     """Small corrections of all entries, with the entries that are off by more free."""
     for start in [*starts, *sorted(states, key=lambda each: each.chi2)[: 2 * STATES]]:
-        solution = found.add(replace(start.hypothesis, small=True), _start_of(start))
+        solution = found.add(replace(start.explanation, small=True), _start_of(start))
         for _ in range(MOST):
-            own = len(solution.hypothesis.entries)
+            own = len(solution.explanation.entries)
             sizes = np.abs(solution.amounts[own:])
             if not len(sizes) or sizes.max() < BIG * SMALL:
                 break
@@ -282,20 +283,20 @@ def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[So
 
 def _released(found: Attempts, solution: Solution, k: int) -> Solution:
     """The solution with one more entry that may be off by any amount."""
-    own = solution.hypothesis.entries
+    own = solution.explanation.entries
     order = [*range(len(own)), k, *(i for i in range(len(own), len(solution.amounts)) if i != k)]
-    hypothesis = replace(solution.hypothesis, entries=(*own, solution.entries[k]))
-    return found.add(hypothesis, (solution.Y, solution.X, solution.amounts[order]))
+    explanation = replace(solution.explanation, entries=(*own, solution.entries[k]))
+    return found.add(explanation, (solution.Y, solution.X, solution.amounts[order]))
 
 
 def _with_fewer_entries(found: Attempts, solution: Solution) -> None:
     """The solution with its large corrections alone, and with one of them small as the others."""
-    own = solution.hypothesis.entries
+    own = solution.explanation.entries
     if not own:
         return
-    alone = replace(solution.hypothesis, small=False)
+    alone = replace(solution.explanation, small=False)
     _with_fewer_frames(found, found.add(alone, (solution.Y, solution.X, solution.amounts[: len(own)])))
     for entry in own:
         kept = [k for k in range(len(own)) if own[k] != entry]
-        hypothesis = replace(solution.hypothesis, entries=tuple(own[k] for k in kept))
-        found.add(hypothesis, (solution.Y, solution.X, solution.amounts[kept]))
+        explanation = replace(solution.explanation, entries=tuple(own[k] for k in kept))
+        found.add(explanation, (solution.Y, solution.X, solution.amounts[kept]))

@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.collision.along import clearance
-from er3a.confirmation.fit import SMALL, Fitter, Meaning
+from er3a.confirmation.fit import SMALL, Explanation, Fitter
 from er3a.confirmation.pairs import Pairs
 from er3a.confirmation.screen import plain
 from er3a.errors import Er3aError
@@ -96,6 +96,6 @@ def _effects(robot: Robot, q: Reals) -> Reals:
     turns = {"": forward(robot, q)[:, :3, :3]}
     digits = np.full(robot.joints, np.radians(DIGIT_DEG)), np.full(3, DIGIT_M), float(np.radians(DIGIT_DEG))
     fitter = Fitter(robot, Pairs(q, forward(robot, q)[:, :3, 3], turns, 1, *digits))
-    hypothesis = Meaning(plain(robot), "", 1.0, ("base", "tool"), fitter.every)
-    J, _ = fitter.linear(hypothesis, (robot.base, robot.tool, np.zeros(len(fitter.every))))
+    explanation = Explanation(plain(robot), "", 1.0, ("base", "tool"), fitter.every)
+    J, _ = fitter.linear(explanation, (robot.base, robot.tool, np.zeros(len(fitter.every))))
     return J.reshape(len(q), 6, -1) * SMALL

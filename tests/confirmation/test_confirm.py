@@ -7,9 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import er3a
+from er3a.confirmation.fit import Fitter
+from er3a.confirmation.layers import search
 from er3a.confirmation.pairs import Pairs
 from er3a.confirmation.poses import of_angles, read_pairs
 from er3a.errors import Er3aError, InputError
+from testing import controller_cases
 from testing.arms import links_of_rows
 
 DEG = np.pi / 180
@@ -238,3 +241,12 @@ def test_a_confirmation_has_no_truth_value():
     with pytest.raises(TypeError):
         bool(found)
     assert "agrees" in repr(found)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", controller_cases.ARMS)
+def test_each_cause_alone_is_named_first(name):
+    robot = er3a.load_robot(name)
+    for causes in ((), *((cause,) for cause in controller_cases.CAUSES)):
+        made = controller_cases.case(robot, causes, seed=0)
+        assert controller_cases.judged(search(Fitter(robot, made.pairs)), made.truth) == "first", causes
