@@ -6,6 +6,7 @@ The command line prints such an error as one line and ends with exit code 2; any
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 from er3a.finding import AnyFinding
@@ -34,6 +35,33 @@ class InputError(Er3aError):
         where = ": ".join(part for part in (self.file, self.field) if part)
         message = f"{self.problem}. {self.remedy}"
         super().__init__(f"{where}: {message}" if where else message)
+
+
+def given_bytes(path: Path, most: int, too_large: str) -> bytes:
+    """The content of a file that a user gave.
+
+    Parameters
+    ----------
+    most : bytes that it may have
+    too_large : what to do about a larger one
+
+    Raises
+    ------
+    InputError
+        if it is missing, not a plain file, unreadable or too large
+    """
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(path, None, "not a file", "Check the path")
+        if status.st_size > most:
+            raise InputError(path, None, f"larger than {most} bytes", too_large)
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(path, None, "there is no such file", "Check the path") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
 
 
 class InputWarning(UserWarning):

@@ -116,6 +116,12 @@ class Solution:
         return float(self.by_row[self.rows].sum()) + self.prior
 
     @property
+    def plausible(self) -> bool:
+        """Whether small corrections are small."""
+        small = self.amounts[len(self.explanation.entries) :]
+        return float(np.abs(small).max(initial=0.0)) <= BIG * SMALL
+
+    @property
     def rms(self) -> float:
         """Root mean square of the distances, m, of the rows that were fitted."""
         return float(np.sqrt((self.off[self.rows, :3] ** 2).sum(axis=1).mean()))

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import BIG, SMALL, Explanation, Fitter, Place, Solution
+from er3a.confirmation.fit import Explanation, Fitter, Place, Solution
 from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
@@ -73,7 +73,8 @@ class Attempts:
 
     def explained(self) -> list[Solution]:
         """Solutions that leave no more than digits, the best first."""
-        return sorted((each for each in self.found if each.per_freedom <= EXPLAINED), key=self.total)
+        every = (each for each in self.found if each.per_freedom <= EXPLAINED and each.plausible)
+        return sorted(every, key=self.total)
 
     def add(self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
             ) -> Solution:  # fmt: skip
@@ -272,10 +273,9 @@ def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[So
         solution = found.add(replace(start.explanation, small=True), _start_of(start))
         for _ in range(MOST):
             own = len(solution.explanation.entries)
-            sizes = np.abs(solution.amounts[own:])
-            if not len(sizes) or sizes.max() < BIG * SMALL:
+            if solution.plausible:
                 break
-            solution = _released(found, solution, own + int(sizes.argmax()))
+            solution = _released(found, solution, own + int(np.abs(solution.amounts[own:]).argmax()))
         if solution.per_freedom <= EXPLAINED:
             _with_fewer_frames(found, solution)
             _with_fewer_entries(found, solution)

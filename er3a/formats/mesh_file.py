@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import stat
 import struct
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -12,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.errors import InputError
+from er3a.errors import InputError, given_bytes
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import LinkMesh
 
@@ -218,18 +217,7 @@ def read_text(path: Path, most: int = MAX_BYTES, too_large: str = TOO_LARGE) -> 
     InputError
         if it is missing, not a plain file, unreadable, too large, or not UTF-8 (with the number of the byte)
     """
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, None, "not a file", "Check the path")
-        raw = path.read_bytes() if status.st_size <= most else None
-    except FileNotFoundError:
-        raise InputError(path, None, "there is no such file", "Check the path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
-    if raw is None:
-        raise InputError(path, None, f"larger than {most} bytes", too_large)
+    raw = given_bytes(path, most, too_large)
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -33,17 +33,12 @@ from er3a.formats.mesh_file import link_mesh
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
-from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.quasi_random import quasi_random_points
-from er3a.numerics.si_units import decimals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
 MISFIT_POSES = 1000
 NO_RANGE = math.pi
 NO_SLIDE_M, MAX_SLID_M = 1.0, 100.0
-LOOKED_AT, TURNED_ALONE = 12, 75.0  # poses, deg
-STEP_RAD = math.pi / 12
-MIN_DECIMALS = 4  # of lengths in m: a file that prints fewer left zeros out
 MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
@@ -170,105 +165,6 @@ def urdf_groups(
         "drives": urdf_tree.drives_of(root, moving) is not None,
     }
     return frozenset(group for group, there in stated.items() if there)
-
-
-@dataclass(frozen=True, eq=False)
-class UrdfStatements(ByValue):
-    """What a URDF says of an arm, without any table.
-
-    Attributes
-    ----------
-    directions, points : (n, 3), unit vectors of positive motion and points, m, on the axes with all joints at 0; empty
-        where joints follow others, for which there is no one axis
-    sliding : (n,) bool
-    lower, upper, speed : (n,), rad or m, NaN where the file states none
-    q : (P, n), rad or m, all at 0 first; flanges : (P, 4, 4), m, the tip's frame there
-    half_width_m, half_width_rad : by how much the digits that the file prints leave the flange open
-    """
-
-    directions: Reals
-    points: Reals
-    sliding: Flags
-    lower: Reals
-    upper: Reals
-    speed: Reals
-    q: Reals
-    flanges: Reals
-    half_width_m: float
-    half_width_rad: float
-
-
-def urdf_statements(path: str | Path, *, base: str | None = None, tip: str | None = None) -> UrdfStatements:
-    """Axes, limits, and the flange at poses all over the limits, by the URDF's own transforms.
-
-    Parameters and errors are those of :func:`import_urdf`.
-
-    Returns
-    -------
-    statements : in m and rad, in the frame of the base link. There are no axes where joints are coupled, and limits are
-        NaN where the file states none. ``half_width_m`` is the rounding of the printed digits at the flange.
-    """
-    path = Path(path)
-    chain = urdf_tree.read_chain(path, base, tip, False)
-    robot, sources, coupling, shift, _ = _robot_of_chain(path, chain)
-    moving = [joint for joint in chain.joints if joint.moves]
-    plain = robot.coupling is None
-    order = [moving.index(joint) for joint in sources] if plain else []
-    directions, points, _ = _axes_at_zero(chain.joints, shift)
-    stated = [
-        (joint.lower, joint.upper) == tuple(row)
-        for joint, row in zip(sources, np.stack([robot.lower, robot.upper], axis=1).tolist())
-    ]
-    q = _looked_at(robot)
-    length, angle = _rounding(urdf_tree.urdf_root(path), chain)
-    reach = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) if len(points) > 1 else 0.0
-    return UrdfStatements(
-        directions[order],
-        points[order],
-        robot.slides,
-        np.where(stated, robot.lower, math.nan),
-        np.where(stated, robot.upper, math.nan),
-        robot.speed,
-        q,
-        _chain_forward(chain.joints, q @ coupling.T + shift),
-        length + angle * reach,
-        angle,
-    )
-
-
-def _looked_at(robot: Robot) -> Reals:
-    """Joint values (P, n), rad or m: all at 0; each joint alone elsewhere, the others at 0 or as near as they can be;
-    and all elsewhere at once. In whole degrees and mm, within the limits."""
-    unit = np.where(robot.slides, 1e-3, math.radians(1.0))
-    lower, upper = np.ceil(robot.lower / unit - 1e-9), np.floor(robot.upper / unit + 1e-9)
-    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
-    home = np.clip(0.0, lower, upper)
-    alone = np.tile(home, (robot.joints, 1))
-    ahead, behind = upper - home, home - lower
-    most = np.where(robot.slides, np.inf, TURNED_ALONE)
-    turned = np.where(ahead > behind, home + np.minimum(ahead / 2, most), home - np.minimum(behind / 2, most))
-    np.fill_diagonal(alone, np.round(turned))
-    spread = np.round(quasi_random_points(lower, upper, LOOKED_AT))
-    return np.concatenate([np.zeros((1, robot.joints)), alone, spread]) * unit
-
-
-def _rounding(root: ElementTree.Element, chain: urdf_tree.UrdfChain) -> tuple[float, float]:
-    """How far the digits that a URDF prints leave the ends of a chain apart, m and rad: half the last digit of lengths,
-    and of angles what they lack of a fraction of a turn that is cut off, else half the last digit; added up."""
-    names = {joint.name for joint in chain.joints}
-    origins = [
-        origin for joint in root.findall("joint") if joint.get("name") in names for origin in joint.iter("origin")
-    ]
-    lengths, angles = ([word for origin in origins for word in origin.get(key, "").split()] for key in ("xyz", "rpy"))
-    digits = max((decimals(word) for word in lengths if float(word)), default=MIN_DECIMALS)
-    most = max((decimals(word) for word in angles if float(word)), default=MIN_DECIMALS)
-    total = 0.0
-    for word in angles:
-        value, own = abs(float(word)), 0.5 * 10.0 ** -decimals(word)
-        lacks = abs(value - round(value / STEP_RAD) * STEP_RAD)
-        total += 0.0 if not value else lacks if lacks <= own else 0.5 * 10.0**-most
-    counted = sum(any(float(word) for word in origin.get("xyz", "").split()) for origin in origins)
-    return counted * 0.5 * 10.0 ** -max(digits, MIN_DECIMALS), total
 
 
 def _robot_of_chain(

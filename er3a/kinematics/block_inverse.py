@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from er3a.geometry.transforms import MAX_DISTANCE_M, ORTHONORMAL_TOLERANCE
 from er3a.geometry.vectors import TURN, Vector
+from er3a.kinematics.chain import rows_at
 from er3a.kinematics.classes.arm_angle import about_x, about_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
@@ -232,9 +233,7 @@ def solve_blocks(  # noqa: C901, PLR0912
 def _check(w: Reals) -> None:
     """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
     for i in range(BLOCK):
-        a, b, c, x = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
-        d, e, f, y = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
-        g, h, k, z = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
+        a, b, c, x, d, e, f, y, g, h, k, z = rows_at(w, BLOCK, i)
         first, second, third = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + k * k - 1.0
         off_1, off_2, off_3 = a * d + b * e + c * f, a * g + b * h + c * k, d * g + e * h + f * k
         volume = a * (e * k - f * h) + b * (f * g - d * k) + c * (d * h - e * g)
@@ -312,9 +311,7 @@ def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float
 def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
     """Wrist centre and wrist axes in frame 1; both roots of theta_1."""
     for i in range(BLOCK):
-        t00, t01, t02, t03 = w[i], w[BLOCK + i], w[2 * BLOCK + i], w[3 * BLOCK + i]
-        t10, t11, t12, t13 = w[4 * BLOCK + i], w[5 * BLOCK + i], w[6 * BLOCK + i], w[7 * BLOCK + i]
-        t20, t21, t22, t23 = w[8 * BLOCK + i], w[9 * BLOCK + i], w[10 * BLOCK + i], w[11 * BLOCK + i]
+        t00, t01, t02, t03, t10, t11, t12, t13, t20, t21, t22, t23 = rows_at(w, BLOCK, i)
         a, b, c = arm.wrist_in_tool
         vx, vy, vz = in_frame_1(
             arm.to_frame_1,

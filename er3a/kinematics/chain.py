@@ -321,3 +321,23 @@ def post_rotate_z(A: Reals, c: float, s: float) -> None:
     for i in range(3):
         x, y = A[i, 0], A[i, 1]
         A[i, 0], A[i, 1] = c * x + s * y, c * y - s * x
+
+
+@inner_kernel
+def rows_at(w: Reals, size: int, at: int) -> tuple[float, ...]:
+    """The first three rows of one of several transforms that are stored entry by entry. Kernel.
+
+    Parameters
+    ----------
+    w : flat; an entry of all transforms, then the next entry, row by row
+    size : how many transforms there are
+    at : number of the one that is wanted, plus where the first entry begins
+
+    Returns
+    -------
+    entries : twelve, row by row
+    """
+    a, b, c, x = w[at], w[size + at], w[2 * size + at], w[3 * size + at]
+    d, e, f, y = w[4 * size + at], w[5 * size + at], w[6 * size + at], w[7 * size + at]
+    g, h, k, z = w[8 * size + at], w[9 * size + at], w[10 * size + at], w[11 * size + at]
+    return a, b, c, x, d, e, f, y, g, h, k, z

@@ -34,7 +34,7 @@ import numpy as np
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
-from er3a.kinematics.chain import arm_length, constant_links, joint_starts
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts, rows_at
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import Iteration, NotFound, PoseUnsolved, Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
@@ -331,12 +331,8 @@ def _pose_error(mask: Reals, length: float, w: Reals) -> None:
     """Masked error of each lane in the target's tool frame: position over length, rotation vector (rad), and sizes."""
     m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
     for i in range(LANES):
-        a0, a1, a2, px = w[i], w[LANES + i], w[2 * LANES + i], w[3 * LANES + i]
-        b0, b1, b2, py = w[4 * LANES + i], w[5 * LANES + i], w[6 * LANES + i], w[7 * LANES + i]
-        c0, c1, c2, pz = w[8 * LANES + i], w[9 * LANES + i], w[10 * LANES + i], w[11 * LANES + i]
-        d0, d1, d2, tx = w[12 * LANES + i], w[13 * LANES + i], w[14 * LANES + i], w[15 * LANES + i]
-        e0, e1, e2, ty = w[16 * LANES + i], w[17 * LANES + i], w[18 * LANES + i], w[19 * LANES + i]
-        f0, f1, f2, tz = w[20 * LANES + i], w[21 * LANES + i], w[22 * LANES + i], w[23 * LANES + i]
+        a0, a1, a2, px, b0, b1, b2, py, c0, c1, c2, pz = rows_at(w, LANES, i)
+        d0, d1, d2, tx, e0, e1, e2, ty, f0, f1, f2, tz = rows_at(w, LANES, _TARGET * LANES + i)
         # Rotation vector of (arm's rotation)^T (target's rotation).
         cosine = 0.5 * (a0 * d0 + b0 * e0 + c0 * f0 + a1 * d1 + b1 * e1 + c1 * f1 + a2 * d2 + b2 * e2 + c2 * f2 - 1.0)
         wx = 0.5 * ((a2 * d1 + b2 * e1 + c2 * f1) - (a1 * d2 + b1 * e2 + c1 * f2))

@@ -378,8 +378,10 @@ def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
 
 
 def _unreached(execution: Execution) -> Iterator[tuple[Place, str]]:
-    """Motions of the program's own file that no way comes to."""
-    met = {step.place for step in execution.steps} | execution.open
+    """Motions of the program's own file that no way comes to; none where not all ways were followed."""
+    if not execution.complete:
+        return
+    met = {step.place for step in execution.steps}
     for place, text in _motion_texts(execution.program):
         if place not in met and place.file == execution.program.file:
             yield place, text
@@ -412,7 +414,7 @@ def _verdicts(
         done[step.place].append(motion)
         lines.setdefault(step.place, execution.own_line(step))
     levels: dict[Place, list[found_in.Level]] = defaultdict(list)
-    lost = set(execution.open)
+    lost: set[Place] = set()
     for each in located:
         levels[each.place].append(each.level)
         if is_one(each.finding, *NOT_FOLLOWED):
@@ -423,7 +425,7 @@ def _verdicts(
         here = done[place]
         if not here and place.file != program.file:
             continue
-        followed = bool(here) and place not in lost
+        followed = bool(here) and place not in lost and execution.complete
         durations = [each.path.law.duration for each in here if each.path is not None]
         clear = [each.clearance for each in here if each.clearance is not None]
         found.append(

@@ -470,16 +470,27 @@ def _too_fast(path: MotionPath, limits: JointLimits) -> Shares:
     if path.law.ramp > 0:  # the fastest point of a part may lie within it
         middle = path.law.speeds((path.share[:-1] + path.share[1:]) / 2)
         speeds = np.maximum(speeds, slopes * middle[:, None])
-    found: Shares = {}
-    for j in np.flatnonzero(speeds.max(axis=0) > OVER_SPEED * limits.speed).tolist():
-        first = int(np.argmax(speeds[:, j] > OVER_SPEED * limits.speed[j]))
-        assumed = not np.isfinite(path.arm.speed[j])
+
+    def begins(j: int, first: int) -> float:
         comes_to = path.law.share_at(float(limits.speed[j]) / float(slopes[first, j]))
-        (needed, slides), (able, _) = (
-            joint_shown(path.arm, j, value) for value in (float(speeds[:, j].max()), float(limits.speed[j]))
-        )
-        share = float(np.clip(comes_to, path.share[first], path.share[first + 1]))
-        found[motion_faults.rate_fault(1, j + 1, needed, able, slides, assumed)] = share
+        return float(np.clip(comes_to, path.share[first], path.share[first + 1]))
+
+    return _beyond_rates(path, 1, speeds, limits.speed, begins)
+
+
+def _beyond_rates(
+    path: MotionPath, order: int, needed: Reals, able: Reals, begins: Callable[[int, int], float]
+) -> Shares:
+    """Joints that need more of a rate (parts, n) than they have (n,), each with the worst it comes to.
+
+    ``begins``: at which share of the way a joint does, by the number of the first part in which it does.
+    """
+    found: Shares = {}
+    for j in np.flatnonzero(needed.max(axis=0) > OVER_SPEED * able).tolist():
+        first = int(np.argmax(needed[:, j] > OVER_SPEED * able[j]))
+        (worst, slides), (most, _) = (joint_shown(path.arm, j, float(each[j])) for each in (needed.max(axis=0), able))
+        assumed = order == 1 and not np.isfinite(path.arm.speed[j])
+        found[motion_faults.rate_fault(order, j + 1, worst, most, slides, assumed)] = begins(j, first)
     return found
 
 
@@ -491,14 +502,7 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
     ramp, speeds = law.ramp * law.duration, law.speeds(middle)
     rises = np.where(speeds < law.top, law.top / ramp if ramp > 0 else 0.0, 0.0) * np.sign(0.5 - middle)
     needed = np.abs(bends * speeds[:, None] ** 2 + slopes * rises[:, None])
-    found: Shares = {}
-    for j in np.flatnonzero(needed.max(axis=0) > OVER_SPEED * able).tolist():
-        first = int(np.argmax(needed[:, j] > OVER_SPEED * able[j]))
-        (worst, slides), (most, _) = (
-            joint_shown(path.arm, j, value) for value in (float(needed[:, j].max()), float(able[j]))
-        )
-        found[motion_faults.rate_fault(2, j + 1, worst, most, slides)] = float(share[first])
-    return found
+    return _beyond_rates(path, 2, needed, able, lambda j, first: float(share[first]))
 
 
 def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:

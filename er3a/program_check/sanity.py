@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -22,6 +23,9 @@ MOST_TURNED = 4 * np.pi  # rad, beyond which no joint goes; degrees up to 360
 MANY_TIMES = 10.0  # the usual speed
 USUAL = 3  # motions, from which others are compared with them
 
+Suspect = tuple[Step, str, str, str]
+"""A step, the kind of its number, the number as it is written, and what is usual or may be meant."""
+
 
 def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, Finding]]:
     """Numbers of a program that are likely mistakes.
@@ -38,17 +42,21 @@ def suspect_numbers(execution: Execution, robot: Robot) -> Iterator[tuple[Step, 
     """
     steps = list({step.place: step for step in execution.steps if isinstance(step.instruction, ArmMotion)}.values())
     motions = [(step, step.instruction) for step in steps if isinstance(step.instruction, ArmMotion)]
-    yield from _other_units(motions, robot, execution.program.language not in IN_SI)
-    yield from _speeds(motions, robot)
-    for which in ("tool", "base"):
-        frames = [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)]
-        yield from (
-            (step, fact("suspect_number", kind=which, text=text, usual=usual))
-            for step, text, usual in _used_once(frames)
-        )  # type: ignore[arg-type]
+    in_mm = execution.program.language not in IN_SI
+    frames = [
+        (which, [(step, getattr(motion, which)) for step, motion in motions if isinstance(motion.target, PoseTarget)])
+        for which in ("tool", "base")
+    ]
+    suspects = chain(
+        _other_units(motions, robot, in_mm),
+        _speeds(motions, robot),
+        *(_used_once(which, used) for which, used in frames),
+    )
+    for step, kind, text, usual in suspects:
+        yield step, fact("suspect_number", kind=kind, text=text, usual=usual)
 
 
-def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool) -> Iterator[tuple[Step, Finding]]:
+def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: bool) -> Iterator[Suspect]:
     """Targets that are none of the arm's as they are written, and would be in the other unit."""
     reach = arm_length(robot)
     unit, meant, scale = ("mm", "m", MM) if in_mm else ("m", "mm", 1.0)
@@ -58,38 +66,14 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: boo
             xyz = target.pose[:3, 3]
             small = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
             if (small or not in_mm) and 0.1 * reach < other * np.linalg.norm(xyz) < 1.5 * reach:
-                yield (
-                    step,
-                    fact(
-                        "suspect_number",
-                        kind=meant,
-                        text=_listed(xyz * scale, unit),
-                        usual=_listed(xyz * scale * other, unit),
-                    ),
-                )
+                yield step, meant, _listed(xyz * scale, unit), _listed(xyz * scale * other, unit)
         elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
             q = target.joints
             degrees = np.degrees(q)
             if in_mm and may_be_radians(degrees.tolist()):
-                yield (
-                    step,
-                    fact(
-                        "suspect_number",
-                        kind="rad",
-                        text=_listed(degrees, "deg"),
-                        usual=_listed(np.degrees(degrees).round(), "deg"),
-                    ),
-                )
+                yield step, "rad", _listed(degrees, "deg"), _listed(np.degrees(degrees).round(), "deg")
             elif not in_mm and MOST_TURNED < np.abs(q).max() <= 360:
-                yield (
-                    step,
-                    fact(
-                        "suspect_number",
-                        kind="deg",
-                        text=_listed(q, "rad"),
-                        usual=_listed(np.radians(q).round(3), "rad"),
-                    ),
-                )
+                yield step, "deg", _listed(q, "rad"), _listed(np.radians(q).round(3), "rad")
 
 
 def _listed(values: Reals, unit: str) -> str:
@@ -105,58 +89,31 @@ def _value(rate: Rate | None, unit: str) -> float | None:
     return float(number) if refused else rate.value
 
 
-def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[tuple[Step, Finding]]:
+def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[Suspect]:
     known = not robot.slides.any() and np.isfinite(robot.speed).all()
     fastest = float(robot.speed.sum()) * arm_length(robot) if known else np.inf  # no point of the arm is faster
     quickest = 2 * float(robot.speed.max()) if known else np.inf
     for step, motion in motions:
         if motion.speed and motion.speed.unit == "share" and motion.speed.text.endswith(" %"):
-            yield step, fact("suspect_number", kind="share", text=motion.speed.text, usual="100 %")
+            yield step, "share", motion.speed.text, "100 %"
         along, turning = _value(motion.speed, "m/s"), _value(motion.speed, "rad/s")
         if along is not None and along > fastest:
             if along / MM < fastest:
-                yield (
-                    step,
-                    fact("suspect_number", kind="mm/s", text=f"{along:g} m/s", usual=f"{along / MM:g} m/s"),
-                )
+                yield step, "mm/s", f"{along:g} m/s", f"{along / MM:g} m/s"
             else:
-                yield (
-                    step,
-                    fact(
-                        "suspect_number",
-                        kind="impossible_speed",
-                        text=f"{MM * along:g} mm/s",
-                        usual=f"{MM * fastest:.0f} mm/s",
-                    ),
-                )
+                yield step, "impossible_speed", f"{MM * along:g} mm/s", f"{MM * fastest:.0f} mm/s"
         if turning is not None and turning > quickest > np.radians(turning):
-            yield (
-                step,
-                fact(
-                    "suspect_number",
-                    kind="deg/s",
-                    text=f"{turning:g} rad/s",
-                    usual=f"{np.radians(turning):.2f} rad/s",
-                ),
-            )
+            yield step, "deg/s", f"{turning:g} rad/s", f"{np.radians(turning):.2f} rad/s"
     given = [(step, motion.speed.value) for step, motion in motions if motion.speed and motion.speed.unit == "m/s"]
     values = [value for _, value in given if value > 0]
     if len(values) > USUAL:
         usual = float(np.median(values))
         for step, value in given:
             if MANY_TIMES * usual < value <= fastest:
-                yield (
-                    step,
-                    fact(
-                        "suspect_number",
-                        kind="speed",
-                        text=f"{1000 * value:g} mm/s",
-                        usual=f"{1000 * usual:g} mm/s",
-                    ),
-                )
+                yield step, "speed", f"{1000 * value:g} mm/s", f"{1000 * usual:g} mm/s"
 
 
-def _used_once(frames: list[tuple[Step, NamedFrame]]) -> Iterator[tuple[Step, str, str]]:
+def _used_once(which: str, frames: list[tuple[Step, NamedFrame]]) -> Iterator[Suspect]:
     """Frames that one motion alone has, between others that have one in common."""
     frames = [(step, each) for step, each in frames if each.pose is not None]
     keys = [b"" if each.pose is None else each.pose.round(6).tobytes() for _, each in frames]
@@ -165,4 +122,4 @@ def _used_once(frames: list[tuple[Step, NamedFrame]]) -> Iterator[tuple[Step, st
         near = {keys[k] for k in (i - 1, i + 1) if 0 <= k < len(keys)}
         if count[keys[i]] == 1 and len(near) == 1 and count[(usual := near.pop())] >= USUAL - 1:
             other = next(each.name for key, (_, each) in zip(keys, frames) if key == usual)
-            yield step, frame.name or "?", other or "?"
+            yield step, which, frame.name or "?", other or "?"

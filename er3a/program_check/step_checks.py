@@ -12,6 +12,7 @@ References
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
@@ -137,7 +138,7 @@ class Judge:
 
     def __call__(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
         """A motion from joints (n,), None where they are not known."""
-        key = _key(motion), _rounded(before)
+        key = pickle.dumps(motion), _rounded(before)  # equal bytes are equal motions; hashes of arrays are crude
         if key not in self.motions:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
@@ -315,26 +316,6 @@ def _say_of(checked: CheckedMotion) -> None:
         checked.add(fact("not_followed", text=", ".join(outer), reason="external_axes"))
     if motion.not_followed:
         checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
-
-
-def _key(motion: instructions.ArmMotion) -> Hashable:
-    """A key that is equal for motions with the same numbers."""
-    frames = tuple(
-        (each.name, None if each.pose is None else each.pose.tobytes()) for each in (motion.tool, motion.base)
-    )
-    rates = motion.speed, motion.turn_speed, motion.acceleration, motion.zone
-    said = motion.kind, motion.form, motion.angle, motion.not_followed, motion.with_path
-    return said, _target_key(motion.target), _target_key(motion.via), rates, frames, motion.load
-
-
-def _target_key(target: instructions.Target | None) -> Hashable:
-    match target:
-        case instructions.JointTarget():
-            return (target.joints.tobytes(), target.external)
-        case instructions.PoseTarget():
-            near = None if target.near is None else target.near.tobytes()
-            return (target.pose.tobytes(), target.configuration, target.branch is None, near, target.external)
-    return target
 
 
 @dataclass(frozen=True, eq=False)

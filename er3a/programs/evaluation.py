@@ -203,7 +203,9 @@ class Dialect(ABC):
     Attributes
     ----------
     modal : variables that motions use implicitly
-    frames : of these, tool and base, which a routine that is not followed may set
+    frames : of these, tool and base, which a routine that is not followed may set; the text that is assigned to them is
+        kept, as their name
+    signals : with what the names of the controller's outputs begin
     local_by_default : whether a routine's assignment to a name that nothing else knows makes a local variable
     whole_division : whether whole numbers are divided to a whole number; None where this is not documented
     first_index : index of a list's first element
@@ -214,25 +216,13 @@ class Dialect(ABC):
 
     modal: frozenset[str] = frozenset()
     frames: tuple[str, ...] = ()
+    signals: tuple[str, ...] = ()
     local_by_default: bool = False
     whole_division: bool | None = False
     first_index: int = 1
     harmless: frozenset[str] = frozenset()
     reading: frozenset[str] = frozenset()
     by_reference: bool = False
-
-    def is_signal(self, name: str) -> bool:
-        """Whether an assignment to a name sets an output of the controller.
-
-        Parameters
-        ----------
-        name : full, with fields and indices
-
-        Returns
-        -------
-        signal : False for all names, unless a language says otherwise
-        """
-        return False
 
     def reads_back(self, name: str) -> bool:
         """Whether reading a variable gives the value that the program set last.
@@ -273,19 +263,6 @@ class Dialect(ABC):
         value : as it is, unless a language converts it
         """
         return value
-
-    def named(self, name: str) -> bool:
-        """Whether the text that is assigned to a variable is kept, as the name of a tool or base.
-
-        Parameters
-        ----------
-        name : full, with fields and indices
-
-        Returns
-        -------
-        named : False for all names, unless a language says otherwise
-        """
-        return False
 
     def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
         """The value of a predefined name, such as a frame or the arm's position.
@@ -733,6 +710,23 @@ def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | No
         return None if plain is None else function(*plain)
     except (ValueError, OverflowError, ZeroDivisionError, TypeError):
         return None
+
+
+def external_axes(value: syntax.Record, keys: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Axes beside the arm that a target moves.
+
+    Parameters
+    ----------
+    value : the target
+    keys : names of such axes
+
+    Returns
+    -------
+    axes : pairs of name and value, as the controller has it, of those that are given and not 0; NaN where not known
+    """
+    given = ((key, value.get(key)) for key in keys)
+    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given)
+    return tuple((key, each) for key, each in known if each)
 
 
 def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Reals
-from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place, alike
+from er3a.programs.instructions import ArmMotion, Decision, Instruction, Listing, Place
 from er3a.programs.syntax import Program, Value
 
 EndKind = Literal["end", "joins", "operations", "ways", "depth"]
@@ -99,14 +99,12 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
-    open : places that may be come to on ways that were not followed
     entered : names of the routines that a way came to
     """
 
     program: Program
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
-    open: frozenset[Place] = frozenset()
     entered: frozenset[str] = frozenset()
 
     @property
@@ -209,4 +207,4 @@ class Execution(ByValue):
         if start < length:
             return False
         pairs = ((self.steps[kept[i - length]], self.steps[kept[i]]) for i in range(start, len(kept)))
-        return all(a.place == b.place and alike(a.instruction, b.instruction) for a, b in pairs)
+        return all(a.place == b.place and a.instruction == b.instruction for a, b in pairs)

@@ -21,8 +21,8 @@ Angles are in (-180, 180]. Where the middle angle is +-90 deg the last one is 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -319,39 +319,7 @@ class Listing:
     @property
     def motions(self) -> tuple[ArmMotion, ...]:
         """The motions alone."""
-        return tuple(motions_of(self.instructions))
-
-
-def alike(a: object, b: object) -> bool:
-    """Whether two instructions, or parts of them, are the same in all numbers.
-
-    Parameters
-    ----------
-    a, b : dataclasses, arrays or plain values; fields that do not count for equality are passed over
-
-    Returns
-    -------
-    alike : NaN equals NaN here
-    """
-    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        return isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and np.array_equal(a, b, equal_nan=True)
-    if is_dataclass(a) and type(a) is type(b):
-        return all(alike(getattr(a, part.name), getattr(b, part.name)) for part in fields(a) if part.compare)
-    return a == b
-
-
-def motions_of(instructions: Iterable[Instruction]) -> Iterable[ArmMotion]:
-    """The motions among instructions.
-
-    Parameters
-    ----------
-    instructions : in any order
-
-    Returns
-    -------
-    motions : in the same order, made as they are asked for
-    """
-    return (each for each in instructions if isinstance(each, ArmMotion))
+        return tuple(each for each in self.instructions if isinstance(each, ArmMotion))
 
 
 Convention = Literal["kuka", "efort", "ur", "abb"]

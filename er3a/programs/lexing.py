@@ -9,13 +9,12 @@ from __future__ import annotations
 import codecs
 import os
 import re
-import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from er3a.errors import InputError
+from er3a.errors import InputError, given_bytes
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
 
 DEEPEST = 40
@@ -406,18 +405,7 @@ def read_program_text(path: Path) -> ProgramText:
     InputError
         if it is missing, too large, or no text
     """
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, None, "not a file", "Check the path")
-        if status.st_size > MAX_PROGRAM_BYTES:
-            raise InputError(path, None, f"larger than {MAX_PROGRAM_BYTES} bytes", "Programs are small text files")
-        raw = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(path, None, "there is no such file", "Check the path") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(path, None, f"can't be read ({reason})", "Check the path and its permissions") from None
+    raw = given_bytes(path, MAX_PROGRAM_BYTES, "Programs are small text files")
     if raw.startswith(b"PK\x03\x04"):
         raise InputError(path, None, "is a ZIP archive", "Unpack it, and name a program in its folder")
     text, encoding = decoded(raw, path)

@@ -4,7 +4,7 @@ Where a condition is not known, both sides are followed. The ways go on in the o
 each other where the sides meet: ways in the same state become one, and so do, with what differs between them unknown,
 more than a few in the same place. A loop that goes on until something unknown happens, or for ever, is followed for
 some rounds; then what it changes is unknown. So each way ends, repeats a state, or meets a limit; what may be carried
-out beyond a limit is named (``Execution.open``), and is no part of what was followed.
+out beyond a limit is no part of what was followed (``Execution.complete``).
 """
 
 from __future__ import annotations
@@ -122,7 +122,6 @@ class Machine:
         self.steps: list[Step] = []
         self.endings: list[Ending] = []
         self.entered: set[str] = set()
-        self.cut: set[tuple[str, int]] = set()  # operations that may be carried out on ways that were not followed
         self.budget = limits.operations
         self.pending: list[Way] = []
         self.seen: dict[Hashable, int] = {}
@@ -134,8 +133,7 @@ class Machine:
 
         Returns
         -------
-        execution : all steps, each with the one before it, and how each way ends. What a limit cut off is named in
-            ``open``.
+        execution : all steps, each with the one before it, and how each way ends.
         """
         start = ProgramMemory(self.dialect, self.cell)
         for each in self.program.data:
@@ -160,9 +158,7 @@ class Machine:
             each if each.repeats_from is None else replace(each, repeats_from=after.get(each.repeats_from))
             for each in self.endings
         )
-        places = (self.program.routines[name].code[at].place for name, at in self.cut)
-        found = self.program, tuple(self.steps), tuple(endings), frozenset(places), frozenset(self.entered)
-        return Execution(*found)
+        return Execution(self.program, tuple(self.steps), tuple(endings), frozenset(self.entered))
 
     def _entries(self) -> Iterator[str]:
         """The program's beginning, and the routines of its file that nothing that was followed has come to."""
@@ -347,22 +343,6 @@ class Machine:
     ) -> None:
         """``follows``: the step after which another way goes on as this one does."""
         code, at = way.frames[-1].routine.code, way.frames[-1].at
-        waiting = [] if kind in ("end", "joins") else list(way.where)
-        while waiting:
-            name, number = waiting.pop()
-            if (name, number) in self.cut or name not in self.program.routines:
-                continue
-            self.cut.add((name, number))
-            self.entered.add(name)
-            match self.program.routines[name].code[number]:
-                case syntax.GoTo(to=to):
-                    waiting.append((name, to))
-                case syntax.Branch(otherwise=otherwise):
-                    waiting += [(name, number + 1), (name, otherwise)]
-                case syntax.Call(routine=routine):
-                    waiting += [(name, number + 1), (routine, 0)]
-                case operation if not isinstance(operation, syntax.Return):
-                    waiting.append((name, number + 1))
         self.endings.append(Ending(kind, way.step, place or code[min(at, len(code) - 1)].place, follows, way.entry))
 
     def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Instruction | None:
@@ -375,7 +355,7 @@ class Machine:
         value = memory.value(each.value)
         key = memory.key(each.target)
         name = key or memory.shown(each.target)
-        if self.dialect.is_signal(name):  # which others may set too
+        if name.startswith(self.dialect.signals):  # which others may set too
             return instructions.Output(name, syntax.shown(value))
         if key is None and memory.outside:  # where the controller stops: nothing is set
             return None
@@ -384,7 +364,7 @@ class Machine:
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default
             memory.assign(each.target, value, each.local or (not declared and _is_new(memory, name)))
-        if self.dialect.named(name):
+        if name in self.dialect.frames:
             of = memory.key(each.value) if isinstance(each.value, syntax.Element) else None
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
         return None if self.dialect.is_followed(name) else instructions.Unknown(each.text, False, shapes=True)

@@ -1,5 +1,4 @@
-"""Flange poses with orientation, in every way of writing one, and what a URDF says as a reference set; the URDF's own
-kinematics are read from its XML, without er3a."""
+"""Flange poses with orientation, in every way of writing one, and what they settle of the last joint."""
 
 from __future__ import annotations
 
@@ -11,16 +10,13 @@ from scipy.spatial.transform import Rotation
 
 import er3a
 from er3a.errors import InputError
-from er3a.files.arm_file import write_urdf_references
 from er3a.files.reference_sets import check_reference_file, load_references
 from er3a.files.robot_library import load_robot
-from er3a.formats.urdf import export_urdf
 from er3a.geometry.transforms import rot_x, rot_z, translation
 from er3a.identifiability.evidence import evidence_of
 from er3a.references.predict import predict
 from er3a.references.reference import expected_of
 from er3a.references.rows import PositionRow
-from testing.published_tables import urdf_flange
 
 HEADER = "name,point,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,uncertainty_mm,"
 BEHIND = "source,grade,origin"
@@ -40,6 +36,22 @@ def one_row(folder: Path, columns: str, values: str, point: str = "flange") -> P
     return path
 
 
+def write_poses(arm: er3a.Robot, folder: Path, columns: str = "qw,qx,qy,qz", count: int = 4) -> None:
+    """Flange poses of an arm, with orientation, as a document says them."""
+    rows, n = [], arm.joints
+    for k in range(count):
+        q = np.random.default_rng(k).uniform(-90, 90, n).round(2)
+        T = er3a.forward(arm, np.radians(q))
+        turn = Rotation.from_matrix(T[:3, :3])
+        ways = turn.as_euler("xyz", True), turn.as_quat(scalar_first=True), turn.as_rotvec(True), T[:3, :3].T.ravel()
+        values = [*q, *1000 * T[:3, 3], 0.05, *dict(zip(WRITTEN, ways))[columns], 0.02]
+        rows.append(f"p{k},flange,{','.join(f'{v:.8f}' for v in values)},s,official,sheet")
+    joints = ",".join(f"q{joint}_deg" for joint in range(1, n + 1))
+    header = f"name,point,{joints},x_mm,y_mm,z_mm,uncertainty_mm,{columns},uncertainty_deg,{BEHIND}"
+    (folder / "positions.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    (folder / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,KUKA,\n", encoding="utf-8")
+
+
 @pytest.mark.parametrize("columns", WRITTEN)
 def test_every_way_of_writing_an_orientation_is_the_same(tmp_path, columns):
     (row,) = check_reference_file(one_row(tmp_path, columns, ",".join(f"{v:.6f}" for v in WRITTEN[columns])))
@@ -52,18 +64,8 @@ def test_every_way_of_writing_an_orientation_is_the_same(tmp_path, columns):
 
 @pytest.mark.parametrize("columns", WRITTEN)
 def test_poses_of_ten_joints_are_compared_however_they_are_written(tmp_path, columns):
-    arm, rows = some_arm(10), []
-    for k in range(4):
-        q = np.random.default_rng(k).uniform(-90, 90, 10).round(2)
-        T = er3a.forward(arm, np.radians(q))
-        turn = Rotation.from_matrix(T[:3, :3])
-        ways = turn.as_euler("xyz", True), turn.as_quat(scalar_first=True), turn.as_rotvec(True), T[:3, :3].T.ravel()
-        values = [*q, *1000 * T[:3, 3], 0.05, *dict(zip(WRITTEN, ways))[columns], 0.02]
-        rows.append(f"p{k},flange,{','.join(f'{v:.8f}' for v in values)},s,official,sheet")
-    joints = ",".join(f"q{joint}_deg" for joint in range(1, 11))
-    header = f"name,point,{joints},x_mm,y_mm,z_mm,uncertainty_mm,{columns},uncertainty_deg,{BEHIND}"
-    (tmp_path / "positions.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
-    (tmp_path / "documents.csv").write_text("name,title,publisher,derived_from\nsheet,Sheet,KUKA,\n", encoding="utf-8")
+    arm = some_arm(10)
+    write_poses(arm, tmp_path, columns)
     stated = load_references(tmp_path, arm).checkable
     expected, uncertainty = expected_of(stated)
     assert np.all(np.abs(predict(arm, stated) - expected) <= uncertainty)
@@ -107,36 +109,11 @@ def some_arm(joints: int, sliding: tuple[int, ...] = ()) -> er3a.Robot:
     )
 
 
-@pytest.mark.parametrize(("joints", "sliding"), [(1, ()), (3, ()), (4, (2,)), (7, ()), (10, (0,))])
-def test_a_urdf_as_references_is_met_by_its_arm_and_missed_by_others(tmp_path, joints, sliding):
-    arm, urdf = some_arm(joints, sliding), tmp_path / "arm.urdf"
-    urdf.write_text(export_urdf(arm), encoding="utf-8")
-    folder = tmp_path / "refs"
-    written = {path.name for path in write_urdf_references(urdf, folder)}
-    assert written >= {"documents.csv", "axes.csv", "positions.csv"}
-    found = load_references(folder, arm)
-    for row in found.of(PositionRow):
-        q = np.array([*row.pose, *[0.0] * joints][:joints])
-        T = urdf_flange(urdf, "base", "flange", np.where(arm.slides, q / 1000, np.radians(q)))
-        assert row.xyz_mm == pytest.approx(1000 * T[:3, 3], abs=1e-5)
-        assert np.allclose(row.orientation, T[:3, :3], atol=1e-7)
-    expected, uncertainty = expected_of(found.checkable)
-    assert np.all(np.abs(predict(arm, found.checkable) - expected) <= uncertainty)
-    last = arm.offset.copy()
-    last[-1] += np.radians(1.0)
-    missed = np.abs(predict(arm.replace(offset=last), found.checkable) - expected) > uncertainty
-    assert any("orientation" in each.subject.code for each, own in zip(found.checkable, missed) if own)
-    with pytest.raises(InputError, match="holds references already"):
-        write_urdf_references(urdf, folder)
-
-
 @pytest.mark.long
 def test_the_last_offset_and_alpha_are_settled_or_contradicted_like_others(tmp_path):
     right = load_robot("lbr_iiwa_14").without_tool()
-    urdf = tmp_path / "arm.urdf"
-    urdf.write_text(export_urdf(right), encoding="utf-8")
-    write_urdf_references(urdf, tmp_path / "refs")
-    found = load_references(tmp_path / "refs", right)
+    write_poses(right, tmp_path, count=14)
+    found = load_references(tmp_path, right)
     names = ["offset7", "alpha7", "direction7"]
     sound = evidence_of(right, found.references, found.documents, only=names)
     assert [sound[name].status for name in names] == ["settled"] * 3

@@ -698,7 +698,43 @@ def at_angle(equations: Reals, angle: float, F: Reals) -> None:
 
 
 @inner_kernel
-def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:  # noqa: C901, PLR0912
+def eliminate(M: Reals, rows: int, columns: int) -> tuple[float, float]:
+    """Eliminate below the first columns by row pivots. Kernel.
+
+    Parameters
+    ----------
+    M : (rows, 9), changed
+    columns : how many
+
+    Returns
+    -------
+    value, smallest : product of the pivots, with the sign of the rows' order, and the smallest of them; the
+        determinant, if of all columns of a square matrix
+    """
+    value, smallest = 1.0, np.inf
+    for k in range(columns):
+        pivot = k
+        for r in range(k + 1, rows):
+            if abs(M[r, k]) > abs(M[pivot, k]):
+                pivot = r
+        if pivot != k:
+            value = -value
+            for j in range(k, 9):
+                M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
+        value *= M[k, k]
+        smallest = min(smallest, abs(M[k, k]))
+        if M[k, k] == 0.0:
+            continue
+        per = 1.0 / M[k, k]
+        for r in range(k + 1, rows):
+            x = M[r, k] * per
+            for j in range(k + 1, 9):
+                M[r, j] -= x * M[k, j]
+    return value, smallest
+
+
+@inner_kernel
+def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:
     """Reduce the twelve equations to nine with the same zeros. Kernel.
 
     Six rows are F; three are combinations of F without C^2 of joint 4, one power further.
@@ -716,65 +752,13 @@ def nine_rows(F: Reals, M: Reals) -> tuple[float, float]:  # noqa: C901, PLR0912
     for r in range(6):
         for j in range(9):
             M[r, j] = F[r, j]
-    factor, smallest = 1.0, np.inf
-    for k in range(3):
-        pivot = k
-        for r in range(k + 1, 6):
-            if abs(F[r, k]) > abs(F[pivot, k]):
-                pivot = r
-        if pivot != k:
-            factor = -factor
-            for j in range(k, 9):
-                F[k, j], F[pivot, j] = F[pivot, j], F[k, j]
-        factor *= F[k, k]
-        smallest = min(smallest, abs(F[k, k]))
-        if F[k, k] == 0.0:
-            continue
-        per = 1.0 / F[k, k]
-        for r in range(k + 1, 6):
-            x = F[r, k] * per
-            for j in range(k + 1, 9):
-                F[r, j] -= x * F[k, j]
+    factor, smallest = eliminate(F, 6, 3)
     for r in range(3):
         for j in range(6):
             M[6 + r, j] = F[3 + r, 3 + j]
         for j in range(6, 9):
             M[6 + r, j] = 0.0
     return factor, smallest
-
-
-@kernel
-def determinant(M: Reals) -> tuple[float, float]:
-    """Determinant by elimination with row pivots. Kernel.
-
-    Parameters
-    ----------
-    M : (9, 9), changed
-
-    Returns
-    -------
-    value, smallest : the determinant, and its smallest pivot
-    """
-    value, smallest = 1.0, np.inf
-    for k in range(9):
-        pivot = k
-        for r in range(k + 1, 9):
-            if abs(M[r, k]) > abs(M[pivot, k]):
-                pivot = r
-        if M[pivot, k] == 0.0:
-            return 0.0, 0.0
-        if pivot != k:
-            value = -value
-            for j in range(k, 9):
-                M[k, j], M[pivot, j] = M[pivot, j], M[k, j]
-        value *= M[k, k]
-        smallest = min(smallest, abs(M[k, k]))
-        per = 1.0 / M[k, k]
-        for r in range(k + 1, 9):
-            x = M[r, k] * per
-            for j in range(k + 1, 9):
-                M[r, j] -= x * M[k, j]
-    return value, smallest
 
 
 @inner_kernel
@@ -793,7 +777,7 @@ def determinant_at(equations: Reals, angle: float, F: Reals, M: Reals) -> tuple[
     """
     at_angle(equations, angle, F)
     factor, smallest = nine_rows(F, M)
-    value, smallest_of_nine = determinant(M)
+    value, smallest_of_nine = eliminate(M, 9, 9)
     smallest = min(smallest, smallest_of_nine)
     value *= factor
     return value, ROUNDING * abs(value) / smallest if smallest > 0.0 else 0.0

@@ -42,15 +42,11 @@ def import_urdf(
     *,
     base: options.Base = None,
     tip: options.Tip = None,
-    references: Annotated[
-        Path | None, typer.Option(help="also write the URDF's data as a reference set into this new folder")
-    ] = None,
     snap: Annotated[bool, typer.Option(help="round angles within 1e-4 rad of a right angle, with a note")] = False,
     xacro: options.Xacro = None,
     as_json: options.AsJson = False,
 ):
     """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
-    from er3a.files.arm_file import write_urdf_references
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
     from er3a.formats.urdf_tree import plain_urdf
@@ -58,24 +54,15 @@ def import_urdf(
 
     with shown_work(f"{file}: reading the arm"), plain_urdf(file, xacro or ()) as plain:
         imported = read_urdf(plain, base=base, tip=tip, snap=snap)
-        if references:
-            write_urdf_references(plain, references, base=base, tip=tip)
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(imported.robot.replace(name=output.stem), output)
     for note in imported.notes:
         options.print_note(note)
     if as_json:
-        options.print_json(
-            {"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes}
-            | ({"references": str(references)} if references else {})
-        )
+        options.print_json({"output": str(output), "misfit_mm": imported.misfit_m * 1000, "notes": imported.notes})
         return
     print(f"{output}: written; differs from the URDF by at most {imported.misfit_m * 1000:.2g} mm on random poses")
-    if references:
-        print(
-            f"{references}: references written; `references: [{references.name}]` in a robot file compares it with them"
-        )
 
 
 @options.app.command(rich_help_panel=options.ROBOT_FILES)

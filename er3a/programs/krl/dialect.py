@@ -11,7 +11,16 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, SIZES, Dialect, ProgramMemory, evaluated, root, unresolved
+from er3a.programs.evaluation import (
+    IN_DEGREES,
+    SIZES,
+    Dialect,
+    ProgramMemory,
+    evaluated,
+    external_axes,
+    root,
+    unresolved,
+)
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -128,12 +137,12 @@ def relative(memory: ProgramMemory, value: syntax.Value, frames: Frames, said: t
         return instructions.UnresolvedTarget(text, "position_unknown")
     offset = instructions.pose_of([each or 0.0 for each in given], "kuka")
     if in_tool:
-        return instructions.PoseTarget(seen @ offset, external=_external(found))
+        return instructions.PoseTarget(seen @ offset, external=external_axes(found, EXTERNAL_KEYS))
     # Along and about the axes of the base, with the tool point as the centre of the turn.
     pose = seen.copy()
     pose[:3, 3] += offset[:3, 3]
     pose[:3, :3] = offset[:3, :3] @ seen[:3, :3]
-    return instructions.PoseTarget(pose, external=_external(found))
+    return instructions.PoseTarget(pose, external=external_axes(found, EXTERNAL_KEYS))
 
 
 def _position(memory: ProgramMemory, value: syntax.Value, text: str) -> syntax.Record | instructions.UnresolvedTarget:
@@ -170,13 +179,6 @@ def _components(
     return found
 
 
-def _external(value: syntax.Record) -> tuple[tuple[str, float], ...]:
-    """Axes beside the arm that are given and not 0; NaN where the value is not known."""
-    given = ((key, value.get(key)) for key in EXTERNAL_KEYS)
-    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given)
-    return tuple((key, each) for key, each in known if each)
-
-
 def _joints(memory: ProgramMemory, value: syntax.Record, text: str, missing: Reals) -> instructions.Target:
     degrees = _components(value, AXIS_KEYS, text)
     if isinstance(degrees, instructions.UnresolvedTarget):
@@ -185,7 +187,7 @@ def _joints(memory: ProgramMemory, value: syntax.Record, text: str, missing: Rea
     if any(degrees[count:]):
         return instructions.UnresolvedTarget(text, "too_many_joints")
     joints = [missing[i] if each is None else math.radians(each) for i, each in enumerate(degrees[:count])]
-    return instructions.JointTarget(np.array(joints), _external(value))
+    return instructions.JointTarget(np.array(joints), external_axes(value, EXTERNAL_KEYS))
 
 
 def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str) -> instructions.Target:
@@ -202,7 +204,7 @@ def _pose(memory: ProgramMemory, value: syntax.Record, frames: Frames, text: str
     configuration = tuple((key, each) for key, each in given_words if each is not None)
     pose = instructions.pose_of([each or 0.0 for each in given], "kuka")
     branch = _branch(syntax.number(value.get("T")), memory.cell.joints)
-    return instructions.PoseTarget(pose, configuration, external=_external(value), branch=branch)
+    return instructions.PoseTarget(pose, configuration, external=external_axes(value, EXTERNAL_KEYS), branch=branch)
 
 
 def _branch(turn: float | None, joints: int) -> instructions.MeantSolution | None:
@@ -528,20 +530,12 @@ class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
     frames = ("$TOOL", "$BASE")
+    signals = ("$OUT[", "$ANOUT[")
     whole_division = True
     modal = frozenset((*MODAL, "PDAT_ACT", "LDAT_ACT", "FDAT_ACT"))
     harmless = HARMLESS | EVALUATED | OF_SETTINGS
     reading = READING | EVALUATED | OF_SETTINGS | {"BAS"}
     by_reference = True
-
-    def is_signal(self, name: str) -> bool:
-        """Whether a name is an output of the controller.
-
-        Returns
-        -------
-        signal : True for ``$OUT[n]`` and ``$ANOUT[n]``
-        """
-        return name.startswith(("$OUT[", "$ANOUT["))
 
     def reads_back(self, name: str) -> bool:
         """Whether reading a variable gives the value that the program set last.
@@ -561,15 +555,6 @@ class KrlDialect(Dialect):
             (``HARMLESS_VARIABLES``)
         """
         return not name.startswith("$") or root(name) in HARMLESS_VARIABLES
-
-    def named(self, name: str) -> bool:
-        """Whether a variable keeps the name of what it is set to.
-
-        Returns
-        -------
-        named : True for ``$TOOL`` and ``$BASE``, so that a frame that only the controller knows is called by its name
-        """
-        return name in ("$TOOL", "$BASE")
 
     def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
         """What a variable of a type holds: coordinates are REAL, however they are written, and a frame has no posture.
@@ -815,21 +800,28 @@ def _axis_share(memory: ProgramMemory, name: str) -> instructions.Rate | None:
     return min(beyond or given, key=lambda rate: rate.value, default=None)
 
 
+ZONES: dict[str, tuple[instructions.ZoneKind, str, float]] = {
+    "C_PTP": ("share", "$APO.CPTP", 100.0),
+    "C_DIS": ("distance", "$APO.CDIS", 1000.0),
+    "C_ORI": ("angle", "$APO.CORI", math.degrees(1.0)),
+    "C_VEL": ("velocity", "$APO.CVEL", 100.0),
+}
+"""Words after a motion: the kind of their zone, the variable of its size, and how many of its units make one of SI."""
+
+
 def _zone(memory: ProgramMemory, kind: instructions.MotionKind, words: tuple[str, ...]) -> instructions.Zone:
     given = [word for word in words if word.startswith("C_")]
     if not given:
         return instructions.FINE
-    word, size = given[0], None
-    distance, joint_zone = syntax.number(memory.read("$APO.CDIS")), memory.read("$APO.CPTP")
-    joint_word = word == "C_PTP" or (word == "C_SPL" and kind == "joint")
     if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
         return instructions.Zone("named", 0.0, " ".join(given))
-    if joint_word and (share := syntax.number(joint_zone)) is not None:
-        return instructions.Zone("share", share / 100, word)
-    if distance is not None and (word in ("C_DIS", "C_SPL") or (joint_word and joint_zone == "#CDIS")):
-        return instructions.Zone("distance", distance / 1000, word)
-    if word == "C_ORI" and (size := syntax.number(memory.read("$APO.CORI"))) is not None:
-        return instructions.Zone("angle", math.radians(size), word)
-    if word == "C_VEL" and (size := syntax.number(memory.read("$APO.CVEL"))) is not None:
-        return instructions.Zone("velocity", size / 100, word)
+    word = given[0]
+    meant: tuple[str, ...] = (word,)
+    if word == "C_SPL":
+        meant = ("C_PTP", "C_DIS") if kind == "joint" else ("C_DIS",)
+    if "C_PTP" in meant and memory.read("$APO.CPTP") == "#CDIS":
+        meant = ("C_DIS",)
+    for form, variable, scale in (ZONES[each] for each in meant if each in ZONES):
+        if (size := syntax.number(memory.read(variable))) is not None:
+            return instructions.Zone(form, size / scale, word)
     return instructions.Zone("named", 0.0, word)

@@ -12,7 +12,7 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, writing
-from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS, TURN_RATES
+from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS, TURN_RATES, ZONES
 from er3a.robots.masses import MassBody
 
 DIGITS = 6
@@ -153,34 +153,15 @@ class KrlWriter(writing.Writer):
         self.set_once("vel", f"BAS(#VEL_PTP,{writing.short(max(share, 0.001) * 100, 3)})")
 
     def _zone(self, motion: instructions.ArmMotion) -> str:
-        zone = motion.zone
-        found = _joint_zone(zone) if motion.kind == "joint" else _line_zone(zone)
-        if found is None:
-            self.count["zones"] += zone.kind != "fine"
-            return ""
-        word, variable, value = found
-        if variable:
-            self.set_once(variable, f"{variable}={writing.cut(value, 3)}")
-        return f" {word}"
-
-
-def _joint_zone(zone: instructions.Zone) -> tuple[str, str, float] | None:
-    if zone.kind == "share":
-        return "C_PTP", "$APO.CPTP", zone.value * 100
-    return ("C_PTP", "", 0.0) if zone.text == "C_PTP" and zone.kind == "named" else None
-
-
-def _line_zone(zone: instructions.Zone) -> tuple[str, str, float] | None:
-    match zone.kind:
-        case "distance":
-            return "C_DIS", "$APO.CDIS", zone.value * 1000
-        case "angle":
-            return "C_ORI", "$APO.CORI", math.degrees(zone.value)
-        case "velocity":
-            return "C_VEL", "$APO.CVEL", zone.value * 100
-        case "named" if zone.text in ("C_DIS", "C_ORI", "C_VEL"):
-            return zone.text, "", 0.0
-    return None
+        zone, joint = motion.zone, motion.kind == "joint"
+        for word, (kind, variable, scale) in ZONES.items():
+            sized = zone.kind == kind
+            if joint == (word == "C_PTP") and (sized or (zone.kind == "named" and zone.text == word)):
+                if sized:
+                    self.set_once(variable, f"{variable}={writing.cut(zone.value * scale, 3)}")
+                return f" {word}"
+        self.count["zones"] += zone.kind != "fine"
+        return ""
 
 
 def _axes_text(joints: Reals) -> str:

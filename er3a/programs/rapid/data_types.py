@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
 from er3a.programs.syntax import Record, Unclear, Value, finite, number, numbers
-from er3a.robots.masses import MassBody
+from er3a.robots.masses import MassBody, moved
 
 AXES = "A B C D E F"
 SHAPES: Mapping[str, Mapping[str, str]] = {
@@ -231,15 +231,12 @@ def load_of(value: Value | None) -> MassBody | None:
     3 loaddata: kg, mm, moments of inertia in kg m^2 about the axes aom through the centre of mass. 3 tooldata: a
     tool's are those of the wrist's frame, which is the flange's.
     """
-    mass, moments = number(part(value, "MASS")), [number(part(value, name)) for name in ("IX", "IY", "IZ")]
-    centre, R = plain(part(value, "COG"), 3), rotation_of(part(value, "AOM"))
-    given = [each for each in moments if each is not None]
-    if mass is None or not mass > 0 or centre is None or R is None or len(given) < 3:
+    mass, T = number(part(value, "MASS")), pose_matrix((part(value, "COG") or 0, part(value, "AOM") or 0))
+    given = numbers(tuple(part(value, name) for name in ("IX", "IY", "IZ")))
+    if mass is None or not mass > 0 or T is None or given is None:
         return None
-    full = R @ np.diag(given) @ R.T
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = full.tolist()
-    x, y, z = (each / 1000 for each in centre)
-    return MassBody(mass, (x, y, z), (xx, yy, zz, xy, xz, yz))
+    x, y, z = given
+    return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), T)
 
 
 def orient_record(R: Reals) -> Record:

@@ -158,29 +158,26 @@ class RapidWriter(writing.Writer):
     def _speed(self, ready: writing.ReadyMotion) -> str:
         motion = ready.motion
         speed = motion.speed
-        if speed is None or not speed.value > 0:
-            self.set_once("vel", "VelSet 100,5000;")
+        given = speed is not None and speed.value > 0
+        share = None
+        if speed is not None and given and speed.unit not in ("s", "m/s"):
+            share = self.share(ready)
+            self.count["estimated"] += speed.unit != "share"
+        if share is not None:
+            self.set_once("vel", f"VelSet {writing.short(max(share, 0.001) * 100, 3)},5000;")
+            return "vmax"
+        self.set_once("vel", "VelSet 100,5000;")  # it may scale timed motions too
+        if speed is None or not given:
             return "v100" if motion.kind != "joint" else "vmax"
         if speed.unit == "s":
-            self.set_once("vel", "VelSet 100,5000;")  # it may scale timed motions too
             return f"v1000\\T:={writing.short(speed.value)}"
-        if speed.unit == "m/s":
-            self.set_once("vel", "VelSet 100,5000;")
-            along = speed.value * 1000
-            turn = math.degrees(motion.turn_speed) if motion.turn_speed else data_types.TURN_SPEED
-            if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
-                return f"v{along:g}"
-            return (
-                f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
-            )
-        share = self.share(ready)
-        if speed.unit != "share":
-            self.count["estimated"] += 1
-        if share is None:
-            self.set_once("vel", "VelSet 100,5000;")
+        if speed.unit != "m/s":
             return "v100"
-        self.set_once("vel", f"VelSet {writing.short(max(share, 0.001) * 100, 3)},5000;")
-        return "vmax"
+        along = speed.value * 1000
+        turn = math.degrees(motion.turn_speed) if motion.turn_speed else data_types.TURN_SPEED
+        if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
+            return f"v{along:g}"
+        return f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
 
     def _zone(self, motion: instructions.ArmMotion) -> str:
         """A zone by its name, or with turn and external axes as those that have one."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, evaluated, unresolved
+from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, evaluated, external_axes, unresolved
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
@@ -23,16 +23,8 @@ class RplDialect(Dialect):
     """RPL, as a run needs it."""
 
     whole_division = None
+    signals = ("io.", "fidbus.")
     harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
-
-    def is_signal(self, name: str) -> bool:
-        """Whether a name is an output of the controller.
-
-        Returns
-        -------
-        signal : True for ``io.`` and for what goes to the field bus, ``fidbus.``
-        """
-        return name.startswith(("io.", "fidbus."))
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
         """The value of a function of RPL: points, OFFSET, roots and absolute values.
@@ -156,9 +148,7 @@ def _target(value: syntax.Value, text: str) -> instructions.Target:
         return instructions.UnresolvedTarget(text, "not_understood")
     if not syntax.finite(plain):
         return instructions.UnresolvedTarget(text, "not_finite")
-    given_outer = ((key, value.get(key)) for key in OUTER)
-    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given_outer)
-    outer = tuple((key, each) for key, each in known if each)
+    outer = external_axes(value, OUTER)
     if keys is JOINTS:
         return instructions.JointTarget(np.radians(plain), outer)
     given = ((key, value.get(key)) for key in CONFIGURATION)

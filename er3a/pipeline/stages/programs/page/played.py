@@ -23,7 +23,6 @@ from er3a.program_check.program_check_findings import RANKS, Level, MotionCollid
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-SINGULAR = Finding
 MOMENT = 1e-6  # s
 WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "caution", "fail": "fail"}
 
@@ -122,7 +121,7 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 is_met(program),
                 as_expected(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in shown for text in remedies_of(program, each)[:1])),
+                " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause or "",
             )
@@ -184,12 +183,6 @@ def weight(each: FindingAt) -> tuple[int, float]:
 def moment_of(each: FindingAt) -> tuple[float, int]:
     """By which findings stand in the order of what is carried out: the player's time, then their line."""
     return np.inf if each.program_s is None else each.program_s, each.line
-
-
-def remedies_of(program: ProgramSummary, found: FindingAt) -> list[str]:
-    """What to do about a finding and others at its line."""
-    here = [each for each in program.findings if (each.file, each.line) == (found.file, found.line)]
-    return remedies(here)
 
 
 def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:
