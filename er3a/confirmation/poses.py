@@ -29,9 +29,11 @@ NEAR_TURN, LONGEST_M = 6.4, 20.0
 """Angles without a unit that are all below are rad; positions without one m."""
 UNIT = re.compile(r"[\s_\[(./]+(deg|degrees?|°|rad|radians?|mm|m|cm|in|inch)\s*[\])]?$")
 SIZES = {"mm": 1e-3, "m": 1.0, "cm": 1e-2, "in": 0.0254, "inch": 0.0254, "rad": 1.0, "radian": 1.0, "radians": 1.0}
+LENGTHS = ("mm", "m", "cm", "in")
 NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 TARGETS = re.compile(r"\[\s*\[([^\[\]]*)\]\s*,\s*\[([^\[\]]*)\]|\{([^{}]*)\}|\bE?POINT([JC])\s*\(([^()]*)")
 """Of ABB in brackets, of KRL and Fanuc in braces, of EFORT's RPL."""
+OF_POSES: tuple[tuple[str, ...], ...] = (("a", "b", "c"), ("w", "p", "r"), ("qw", "qx", "qy", "qz"))
 NO_POSITIONS = re.compile(
     r"vel|qd|dq|tau|torque|effort|curr|temp|volt|moment|force|target|cmd|command|des|tcp|pose|cart|ee|acc|limit|o_t|tool"
 )
@@ -78,9 +80,11 @@ def read_pairs(
     InputError
         naming file, row or columns, and the remedy
     """
+    if units is not None and units not in LENGTHS:
+        raise ArgumentError("units", units, f"one of {', '.join(LENGTHS)}")
     path = Path(source)
     content = read_text(path, MAX_BYTES) if text is None else text
-    written = _lines_of_pendant(content, robot.joints)
+    written = _lines_of_pendant(path, content, robot.joints)
     header, rows, lines = written or _table(path, content, robot.joints)
     pairs = _pairs(path, robot, header, rows, lines, units)
     if angles is None:
@@ -91,43 +95,41 @@ def read_pairs(
     return replace(pairs, turns=turns, named=1)
 
 
-def _lines_of_pendant(text: str, joints: int) -> tuple[list[str], list[list[str]], list[int]] | None:
+def _lines_of_pendant(path: Path, text: str, joints: int) -> tuple[list[str], list[list[str]], list[int]] | None:
     """Joint values and poses out of targets in brackets or braces, in the order in which they come."""
     q: list[tuple[list[str], int]] = []
-    poses: list[tuple[list[str], int]] = []
-    names = ["x", "y", "z"]
+    poses: list[list[str]] = []
+    header: list[str] = []
+    line, seen = 1, 0
     for found in TARGETS.finditer(text):
-        line = text.count("\n", 0, found.start()) + 1
-        if found[4]:
-            numbers = re.findall(NUMBER, found[5])
-            if found[4] == "J":
-                q.append((numbers[:joints], line))
-            else:
-                poses.append((numbers[:6], line))
-                names = ["x", "y", "z", "a", "b", "c"]
-            continue
-        if found[3] is None:
-            first, second = (re.findall(NUMBER, part) for part in found.group(1, 2))
-            if len(first) == 3 and len(second) == 4:
-                poses.append(([*first, *second], line))
-                names = ["x", "y", "z", "qw", "qx", "qy", "qz"]
-            elif len(first) == joints:
-                q.append((first, line))
-            continue
-        values = {key.lower(): value for key, value in re.findall(rf"([A-Za-z]\w*)\s*[=:]?\s*({NUMBER})", found[3])}
-        for letter in "aj":
-            if own := [values[f"{letter}{k + 1}"] for k in range(joints) if f"{letter}{k + 1}" in values]:
-                q.append((own, line))
-        for triple in (("a", "b", "c"), ("w", "p", "r"), ()):
-            if {"x", "y", "z", *triple} <= values.keys():
-                names = ["x", "y", "z", *triple]
-                poses.append(([values[name] for name in names], line))
-                break
+        line, seen = line + text.count("\n", seen, found.start()), found.start()
+        values = _values_of(found, joints)
+        for names in [[f"{letter}{k + 1}" for k in range(joints)] for letter in "aj"]:
+            if values.keys() >= set(names):
+                q.append(([values[name] for name in names], line))
+        if values.keys() >= {"x", "y", "z"}:
+            turn = next((turn for turn in OF_POSES if values.keys() >= set(turn)), ())
+            header = [*(f"j{k + 1}_deg" for k in range(joints)), "x_mm", "y_mm", "z_mm", *turn]
+            poses.append([values[name] for name in ("x", "y", "z", *turn)])
     if not (q and poses):
         return None
-    header = [*(f"j{k + 1}_deg" for k in range(joints)), *(f"{name}_mm" if name in "xyz" else name for name in names)]
-    rows = [[*a, *b] for (a, _), (b, _) in zip(q, poses)]
-    return header, rows, [line for _, line in q[: len(rows)]]
+    if len(q) != len(poses):
+        problem = f"{len(q)} targets of joints and {len(poses)} of poses"
+        raise InputError(path, None, problem, "Give one pose for each joint target, in the same order")
+    return header, [[*a, *b] for (a, _), b in zip(q, poses)], [line for _, line in q]
+
+
+def _values_of(target: re.Match[str], joints: int) -> dict[str, str]:
+    """Numbers of a target by the names that KRL and Fanuc give them; of ABB those of a jointtarget or robtarget."""
+    own = [f"j{k + 1}" for k in range(joints)]
+    if target[3] is not None:
+        return {key.lower(): value for key, value in re.findall(rf"([A-Za-z]\w*)\s*[=:]?\s*({NUMBER})", target[3])}
+    if target[4]:
+        return dict(zip(own if target[4] == "J" else "xyzabc", re.findall(NUMBER, target[5])))
+    first, second = (re.findall(NUMBER, part) for part in target.group(1, 2))
+    if len(first) == 3 and len(second) == 4:
+        return dict(zip(("x", "y", "z", "qw", "qx", "qy", "qz"), (*first, *second)))
+    return dict(zip(own, first)) if len(first) == joints else {}
 
 
 def _table(path: Path, text: str, joints: int) -> tuple[list[str], list[list[str]], list[int]]:
@@ -219,7 +221,7 @@ class _Columns:
 
 
 def _pairs(
-    path: Path, robot: Robot, header: list[str], rows: list[list[str]], lines: list[int], units: str | None
+    path: Path, robot: Robot, header: list[str], rows: list[list[str]], lines: list[int], lengths: str | None
 ) -> Pairs:
     columns = _Columns(path, header, rows, lines)
     families = columns.families()
@@ -243,17 +245,16 @@ def _pairs(
         columns.rows, columns.lines = [rows[n] for n in kept], [lines[n] for n in kept]
     if not columns.rows:
         raise InputError(path, None, "no row has both joint values and a position", REMEDY)
-    sliding = robot.slides
-    q, q_unit = columns.values(joints), columns.units[joints[0]]
-    if not q_unit:
-        turning = np.abs(q[:, ~sliding]).max(initial=0.0) > NEAR_TURN
-        q_unit = "deg" if turning else "rad"
-        notes.append(("joints_taken_in", q_unit))
-    size = np.full(robot.joints, SIZES.get(q_unit, np.pi / 180))
-    size[sliding] = [
-        SIZES[columns.units[joints[k]] or ("m" if q_unit == "rad" else "mm")] for k in np.flatnonzero(sliding)
-    ]
-    xyz, unit = columns.values(place), units or columns.units[place[0]]
+    q, size = columns.values(joints), np.empty(robot.joints)
+    units = [columns.units[name] for name in joints]
+    turning = ~robot.slides
+    angle = next((unit for unit, turns in zip(units, turning) if turns), "")
+    if not angle and turning.any():
+        angle = "deg" if np.abs(q[:, turning]).max() > NEAR_TURN else "rad"
+        notes.append(("joints_taken_in", angle))
+    size[turning] = SIZES.get(angle, np.pi / 180)
+    size[~turning] = [SIZES.get(unit, 1e-3) for unit in np.array(units)[~turning].tolist()]
+    xyz, unit = columns.values(place), lengths or columns.units[place[0]]
     if not unit:
         unit = "m" if np.abs(xyz).max() < LONGEST_M else "mm"
         notes.append(("positions_taken_in", unit))

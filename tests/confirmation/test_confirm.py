@@ -195,6 +195,13 @@ def test_what_cannot_be_read_is_named(text, field, tmp_path):
     assert field in str(error.value.field or "None")
 
 
+def test_targets_that_make_no_pairs_are_refused(tmp_path):
+    path = tmp_path / "points.dat"
+    path.write_text("{A1 1, A2 2, A3 3, A4 4, A5 5, A6 6}\n{X 1, Y 2, Z 3}\n{X 4, Y 5, Z 6}\n")
+    with pytest.raises(InputError, match="1 targets of joints and 2 of poses"):
+        read_pairs(path, arm())
+
+
 def test_a_plan_is_safe_and_settles_more_than_chance():
     from er3a.confirmation.plan import _effects, plan
 
