@@ -12,6 +12,7 @@ from er3a.finding import Finding, plain
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import as_text
+from er3a.pipeline.messages.numbers import number
 from er3a.pipeline.messages.say import by, joined, say, say_as, says, sentence, texts
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -35,22 +36,19 @@ TEXTS = texts(
     {
         "confirmed": by(
             "verdict",
-            agrees="AGREES: the model is the controller's; at most {mm:.2g} mm and {deg:.2g} deg off",
-            reading="READING: the model agrees once the file is read otherwise; at most {mm:.2g} mm and "
-            "{deg:.2g} deg off",
-            frames="FRAMES: the arm agrees; controller and model have another base or tool; at most {mm:.2g} mm and "
-            "{deg:.2g} deg off",
-            joints="JOINTS: the arm agrees once its joints are counted as the controller does; at most {mm:.2g} mm and "
-            "{deg:.2g} deg off",
-            small="SMALL: the arm is of this type, but not nominal; small corrections leave at most {mm:.2g} mm and "
-            "{deg:.2g} deg",
-            another="ANOTHER ARM: entries of the table are other; with these, at most {mm:.2g} mm and "
-            "{deg:.2g} deg off",
-            open="OPEN: nothing explains the difference; at least {mm:.3g} mm and {deg:.3g} deg are left",
+            agrees="AGREES: the model is the controller's; at most {off} off",
+            reading="READING: the model agrees once the file is read otherwise; at most {off} off",
+            frames="FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
+            joints="JOINTS: the arm agrees once its joints are counted as the controller does; at most {off} off",
+            small="SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
+            another="ANOTHER ARM: entries of the table are other; with these, at most {off} off",
+            open="OPEN: nothing explains the difference; at least {off} are left",
         ),
-        "confirm.read": "{poses} poses; orientations read as {form}; rounding explains {mm:.2g} mm and {deg:.2g} deg",
-        "confirm.read_positions": "{poses} poses without orientations; rounding explains {mm:.2g} mm",
-        "confirm.before": "as it is, the model is up to {mm:.3g} mm and {deg:.3g} deg off",
+        "confirm.off": "{mm} mm and {deg} deg",
+        "confirm.off_mm": "{mm} mm",
+        "confirm.read": "{poses} poses; orientations read as {form}; rounding explains {off}",
+        "confirm.read_positions": "{poses} poses without orientations; rounding explains {off}",
+        "confirm.before": "as it is, the model is up to {off} off",
         "confirm.noted": by(
             "note",
             joints_taken_in="joint values without a unit were taken in {value}",
@@ -124,12 +122,13 @@ def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: boo
     robot : as it is; nearest : the name of the arm that the corrected table is, if one is
     every : whether each pose is listed
     """
-    worst = {"mm": float(found.left_mm[found.fits].max()), "deg": float(found.left_deg[found.fits].max())}
-    lines = [_read_line(found), sentence(f"confirmed#{found.verdict}", **worst)]
+    fits = found.fits
+    off = _off(found, float(found.left_mm[fits].max()), float(found.left_deg[fits].max()))
+    lines = [_read_line(found), sentence(f"confirmed#{found.verdict}", off=off)]
     lines += [f"  {line}" for line in _found_lines(found, nearest)]
     if found.verdict != "agrees":
-        before = {"mm": float(found.before_mm.max()), "deg": float(found.before_deg.max())}
-        lines.append("  " + sentence("confirm.before", **before))
+        before = _off(found, float(found.before_mm.max()), float(found.before_deg.max()))
+        lines.append("  " + sentence("confirm.before", off=before))
     if found.noise > 1:
         lines.append("  " + sentence("confirm.noise", times=found.noise))
     lines += [f"  {say(each)}" for each in found.alike]
@@ -140,11 +139,16 @@ def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: boo
     return [*lines, sentence("confirm.accuracy")]
 
 
+def _off(found: Confirmation, mm: float, deg: float) -> str:
+    parts = {"mm": number(mm, 3), "deg": number(deg, 3)}
+    return sentence("confirm.off" if found.oriented else "confirm.off_mm", **parts)
+
+
 def _read_line(found: Confirmation) -> str:
-    parts = {"poses": len(found.lines), "mm": found.digits_mm, "deg": found.digits_deg}
+    off = _off(found, found.digits_mm, found.digits_deg)
     if not found.oriented:
-        return sentence("confirm.read_positions", **parts)
-    return sentence("confirm.read", form=FORMS[found.form], **parts)
+        return sentence("confirm.read_positions", poses=len(found.lines), off=off)
+    return sentence("confirm.read", poses=len(found.lines), form=FORMS[found.form], off=off)
 
 
 def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
