@@ -13,7 +13,7 @@ from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.numbers import number
-from er3a.pipeline.messages.say import by, joined, say, say_as, says, sentence, texts
+from er3a.pipeline.messages.say import joined, say, say_as, says, sentence, texts
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -34,29 +34,23 @@ UNITS_BY_FACTOR = {25.4: "in", 1e3: "m", 1e-3: "mm", 10.0: "cm", 304.8: "ft"}
 
 TEXTS = texts(
     {
-        "confirmed": by(
-            "verdict",
-            agrees="AGREES: the model is the controller's; at most {off} off",
-            reading="READING: the model agrees once the file is read otherwise; at most {off} off",
-            frames="FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
-            joints="JOINTS: the arm agrees once its joints are counted as the controller does; at most {off} off",
-            small="SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
-            another="ANOTHER ARM: entries of the table are other; with these, at most {off} off",
-            open="OPEN: nothing explains the difference; at least {off} are left",
-        ),
+        "confirmed#agrees": "AGREES: the model is the controller's; at most {off} off",
+        "confirmed#reading": "READING: the model agrees once the file is read otherwise; at most {off} off",
+        "confirmed#frames": "FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
+        "confirmed#joints": "JOINTS: the arm agrees once joints are counted as the controller does; at most {off} off",
+        "confirmed#small": "SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
+        "confirmed#another": "ANOTHER ARM: entries of the table are other; with these, at most {off} off",
+        "confirmed#open": "OPEN: nothing explains the difference; at least {off} are left",
         "confirm.off": "{mm} mm and {deg} deg",
         "confirm.off_mm": "{mm} mm",
         "confirm.read": "{poses} poses; orientations read as {form}; rounding explains {off}",
         "confirm.read_positions": "{poses} poses without orientations; rounding explains {off}",
         "confirm.before": "as it is, the model is up to {off} off",
-        "confirm.noted": by(
-            "note",
-            joints_taken_in="joint values without a unit were taken in {value}",
-            positions_taken_in="positions without a unit were taken in {value}",
-            blank_rows="rows without joints or pose, or of another point, left out: {value}",
-            rows_at_rest="rows at rest, one for each stop: {value}",
-            rows_once="rows, each pose once: {value}",
-        ),
+        "confirm.noted#joints_taken_in": "joint values without a unit were taken in {value}",
+        "confirm.noted#positions_taken_in": "positions without a unit were taken in {value}",
+        "confirm.noted#blank_rows": "rows without joints or pose, or of another point, left out: {value}",
+        "confirm.noted#rows_at_rest": "rows at rest, one for each stop: {value}",
+        "confirm.noted#rows_once": "rows, each pose once: {value}",
         "confirm.form": "orientations are {form}, not what the columns' names say; rename them, or --angles {key}",
         "confirm.unit": "positions are in {unit}; --units {unit}",
         "confirm.factor": "positions are {factor:.4g} times as large as the model's; check their unit",
@@ -64,17 +58,14 @@ TEXTS = texts(
         "confirm.rows": "lines that do not fit: {lines}; up to {mm:.3g} mm off. Check what was typed there",
         "confirm.tool": "tool of the controller: {place}; or select the flange and read again",
         "confirm.base": "base of the controller: {place}; or select base 0 and read again",
-        "confirm.place": "{{xyz_mm: [{xyz}], rpy_deg: [{rpy}]}} (+-{mm:.2g} mm, {deg:.2g} deg)",
-        "confirm.point": "{{xyz_mm: [{xyz}]}} (+-{mm:.2g} mm)",
+        "confirm.place": "{{xyz_mm: {xyz}, rpy_deg: {rpy}}} (+-{mm:.2g} mm, {deg:.2g} deg)",
+        "confirm.point": "{{xyz_mm: {xyz}}} (+-{mm:.2g} mm)",
         "confirm.zero": (
             "zero of J{joint} is {change:+.3f} deg off (+-{half_width:.2g}); offset_deg of row {joint}: {given:.3f} -> "
             "{value:.3f}. Zero is defined otherwise, or the joint was mastered wrong: compare its marks"
         ),
         "turns_other_way": "J{joint} turns the other way at the controller; direction of row {joint} changes its sign",
-        "counted_from": (
-            "J{joint} of the pendant is counted with J{by}; coupling: rows: [{{row: {joint}, joints: [{by}, {joint}], "
-            "factors: [{sign}1, 1]}}]"
-        ),
+        "counted_from": "J{joint} of the pendant is counted with J{by}; coupling: rows: {rows}",
         "columns_swapped": "the columns of J{first} and J{second} are swapped",
         "zero_elsewhere": "zero of J{joint} is {deg:.0f} deg elsewhere; add this to offset_deg of row {joint}",
         "confirm.entry": "{name}: {given:.3f} -> {value:.3f} {unit} (+-{half_width:.2g})",
@@ -91,7 +82,8 @@ TEXTS = texts(
         "confirm.noise": "{times:.0f} times what rounding explains is left: did the arm still move?",
         "explains_too": "alike: {what:, }",
         "confirm.zero_alike": "zero of J{joint}",
-        "confirm.place_alike": by("place", base="another base", tool="another tool"),
+        "confirm.place_alike#base": "another base",
+        "confirm.place_alike#tool": "another tool",
         "confirm.not_settled": "not settled by these poses: {entries}; er3a confirm ROBOT --plan gives poses that do",
         "confirm.taken_up": "not separated from base and tool: {entries}",
         "confirm.all_settled": "not settled by these poses: nothing",
@@ -101,11 +93,8 @@ TEXTS = texts(
             "robot's own base; below each pose what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
         ),
         "confirm.shown": "the pendant shows: {blanks}",
-        "confirm.plan_safe": by(
-            "known",
-            shapes="within limits, clear of the arm itself, above its base, away from singular poses; cell unknown",
-            none="within limits, above the arm's base, away from singular poses; shapes of arm and cell unknown",
-        ),
+        "confirm.plan_safe#shapes": "within limits, clear of arm and base, away from singular poses; cell unknown",
+        "confirm.plan_safe#none": "within limits, above the base, away from singular poses; shapes and cell unknown",
         "confirm.accuracy": (
             "A controller repeats its own model, so agreement says nothing about the arm's accuracy; that takes a "
             "tracker and er3a calibrate."
@@ -200,7 +189,7 @@ def _place(place: Placed, *, turned: bool) -> str:
 
 def _for_a_file(values: Reals, decimals: int) -> str:
     """Numbers as a study or robot file takes them."""
-    return ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)
+    return "[" + ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values) + "]"
 
 
 def _change(each: FoundEntry) -> str:
@@ -214,7 +203,8 @@ def _listed(lines: Integers) -> str:
 
 @says("counted_from")
 def _(found: Finding) -> str:
-    return say_as(found, sign="-" if found.factor < 0 else "")
+    factors = f"joints: [{found.by}, {found.joint}], factors: [{found.factor:.0f}, 1]"
+    return say_as(found, rows=f"[{{row: {found.joint}, {factors}}}]")
 
 
 @says("explains_too")

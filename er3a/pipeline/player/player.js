@@ -164,6 +164,7 @@ function tell() {
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const text = now.map((event) => event.text).join(words.between) || motion.text;
   show(nowShown, text);
+  nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   for (const { dataset, classList } of stretches) {
@@ -317,7 +318,7 @@ if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   dock();
   tell();
   listed();
-}
+} else if (data.opened && location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

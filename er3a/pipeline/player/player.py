@@ -57,7 +57,7 @@ WORDS = {
     "next": N_("Next event"),
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
-    "clock": N_("t = {t} s of {end} s"),
+    "clock": N_("{t} of {end} s"),
     "joints": N_(
         "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
         "then, with what they would need."
@@ -72,10 +72,7 @@ WORDS = {
     "start_and_end": N_("start and end"),
     "undock": N_("return the player to its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
-    "help": N_(
-        "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
-        "on the time bar are events."
-    ),
+    "joint_values": N_("Joints"),
     "no_script": N_("The player needs JavaScript; recordings show the same in the Rerun viewer."),
 }
 
@@ -86,11 +83,13 @@ def player(
     scene: Scene | None = None,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
+    opened: tuple[str, float] | None = None,
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
     Parameters
     ----------
+    opened : the motion and the time (s) that it opens at
     beside : further arms, which move at the same time; their bases say where they stand
     signs : what is written below the base of each arm, the first included; nothing if empty
     """
@@ -103,7 +102,7 @@ def player(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
-            data=_data(robot, shown, scene, words, beside, signs),
+            data=_data(robot, shown, scene, words, beside, signs) | {"opened": opened},
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
