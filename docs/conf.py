@@ -58,7 +58,7 @@ ROOMS = {
     "Paths": ("planning", "collision"),
     "Choosing solutions": ("selection",),
     "Comparing arms": ("comparison",),
-    "References, diagnosis, calibration": ("references", "identifiability", "diagnosis", "calibration"),
+    "References, diagnosis, calibration": ("references", "identifiability", "diagnosis", "calibration", "confirmation"),
     "Robot programs": ("programs", "program_check"),
     "What the motors feel": ("dynamics",),
     "Cameras": ("vision",),

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from er3a.collision.along import clearance as clearance
     from er3a.comparison.compare import Comparison as Comparison
     from er3a.comparison.compare import compare as compare
+    from er3a.confirmation.confirm import Confirmation as Confirmation
+    from er3a.confirmation.confirm import confirm as confirm
     from er3a.dynamics.torques import gravity as gravity
     from er3a.dynamics.torques import mass_matrix as mass_matrix
     from er3a.dynamics.torques import torques as torques
@@ -102,6 +104,8 @@ _PUBLIC = {
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",
+    "confirm": "er3a.confirmation.confirm",
+    "Confirmation": "er3a.confirmation.confirm",
     "calibrate_hand_eye": "er3a.vision.hand_eye",
     "compare": "er3a.comparison.compare",
     "Comparison": "er3a.comparison.compare",

@@ -45,6 +45,7 @@ STANDS_FOR = {
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
     "program": {},
     "calibrate": {"ROBOT": "er3a_c60", "MEASUREMENTS.csv": "measured.csv", "FILE.csv": "measured.csv"},
+    "confirm": {"ROBOT": "er3a_c60", "POSES": "filled.csv"},
     "predict": {"ROBOT": "er3a_c60", "JOINTS.csv": "measured.csv", "mine_model.json": "corrected_model.json"},
     "import-calibration": {"ROBOT": "ur5e"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
@@ -211,6 +212,7 @@ def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(call, tm
     )  # where a study has its own; all else comes with er3a
     trimesh.creation.box((80, 60, 200)).export(tmp_path / "upper_arm.stl")
     write_measured(tmp_path / "measured.csv")
+    write_typed(tmp_path / "filled.csv")
     deltas = (f"delta_{key} = [0, 0, 0, 0, 0, 0]" for key in ("theta", "a", "d", "alpha"))
     (tmp_path / "calibration.conf").write_text("\n".join(deltas), encoding="utf-8")
     for verb, stands_for in STANDS_FOR.items():
@@ -234,6 +236,15 @@ def write_measured(file: Path) -> None:
     lines = [f"{','.join(map(str, row[:6]))},flange,{','.join(map(str, row[6:]))},0.05" for row in rows]
     head = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,point,x_mm,y_mm,z_mm,standard_deviation_mm"
     file.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+
+
+def write_typed(file: Path) -> None:
+    """What the pendant of an er3a_c60 shows, to 0.01."""
+    q = np.random.default_rng(1).uniform(-0.7, 0.7, (6, 6))
+    T = er3a.forward(er3a.load_robot("er3a_c60"), q)
+    rows = np.c_[np.degrees(q), 1000 * T[:, :3, 3], np.degrees(er3a.rpy(T))[:, ::-1]].round(2)
+    text = "A1;A2;A3;A4;A5;A6;X;Y;Z;A;B;C\n" + "\n".join(";".join(map(str, row)) for row in rows)
+    file.write_text(text, encoding="utf-8")
 
 
 def test_links_between_documents_lead_somewhere():

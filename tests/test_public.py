@@ -69,6 +69,7 @@ CALLS: dict[str, Callable[[Any, np.ndarray], Any]] = {
     "load_targets": lambda robot, T: er3a.load_targets("data/targets/er3_600.yaml", robot),
     "diagnose": lambda robot, T: er3a.diagnose(robot, "er3_600"),
     "evidence": lambda robot, T: er3a.evidence(robot, load_references("er3_600").references[:1]),
+    "confirm": lambda robot, T: er3a.confirm(robot, np.tile(Q, (4, 1)), np.tile(T, (4, 1, 1))),
     "calibrate": lambda robot, T: er3a.calibrate(robot, ROWS),
     "load_calibration": lambda robot, T: er3a.load_calibration("mine.json", robot),
     "to_modified": lambda robot, T: er3a.to_modified(robot),

@@ -26,6 +26,7 @@ for _room in (
     "studies",
     "compare_arms",
     "known_arms",
+    "confirm",
     "robot_files",
     "programs",
     "single_jobs",

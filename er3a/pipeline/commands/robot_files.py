@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from er3a.pipeline.progress import shown_work
 
 if TYPE_CHECKING:
     from er3a.calibration.calibrate import Calibration
+    from er3a.calibration.observations import Measurement
     from er3a.files.pieces_file import PiecesFile
     from er3a.robots.robot import Robot
 
@@ -146,6 +148,25 @@ def _check_options(output: Path | None, words: str) -> None:
         raise InputError(output, "--output", problem, "Use a to z, 0 to 9, - and _, 64 at most, as in mine.yaml")
 
 
+def _measured(path: Path, arm: Robot) -> Sequence[Measurement]:
+    """Measured positions; of another table than er3a's own, those of the controller's poses in it."""
+    from er3a.calibration.observations import Measurement
+    from er3a.confirmation.poses import read_pairs
+    from er3a.files.by_name import load_measurements
+    from er3a.files.csv_file import read_header
+    from er3a.files.units import JOINT_COLUMN
+    from er3a.robots.joint_limits import shown
+
+    rows: Sequence[Measurement]
+    if any(map(JOINT_COLUMN.fullmatch, read_header(path))):
+        rows = load_measurements(path, arm)
+    else:
+        pairs = read_pairs(path, arm)
+        values = zip(pairs.lines.tolist(), shown(arm, pairs.q).tolist(), (1000 * pairs.xyz).tolist())
+        rows = [Measurement(line, tuple(q), "tool", (xyz[0], xyz[1], xyz[2])) for line, q, xyz in values]
+    return rows
+
+
 def _renamed(found: Calibration, name: str) -> Robot:
     """The corrected robot as it is written."""
     alone = " (without terms beyond a robot file)" if found.beyond else ""
@@ -185,23 +206,27 @@ def calibrate(
     The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
     best without such errors, and ratios and couplings as its coupling.
 
+    Poses that a controller shows can be given too, as er3a confirm reads them; their positions count. They repeat the
+    controller's model, so er3a confirm answers first what is between both.
+
     Exit code 1 if measurements and table don't fit (what remains or is corrected is far beyond errors of arms and of
     measuring), or positions held back contradict the result. It is written all the same.
     """
+    from er3a.calibration.observations import check_poses
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
-    from er3a.files.by_name import load_measurements
     from er3a.files.robot_library import load_robot
     from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
     _check_options(output, words)
     arm = load_robot(robot)
-    rows = load_measurements(measurements, arm)
-    others = load_measurements(held_back, arm) if held_back else ()
+    rows = _measured(measurements, arm)
+    others = _measured(held_back, arm) if held_back else ()
+    check_poses(rows, arm, measurements)
     try:
         with shown_work(f"{robot}: estimating corrections"):
-            found = calibrate_robot(arm, measurements, [each.value for each in fixed or ()])
+            found = calibrate_robot(arm, rows, [each.value for each in fixed or ()])
     except CalibrationError as error:
         raise Er3aError(say(error.finding)) from None
     corrected = _renamed(found, output.stem if output else f"{arm.name}_calibrated")

@@ -1,0 +1,379 @@
+"""Does a model agree with its controller? The answer, from joint values and the poses that the controller shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from er3a.by_value import ByValue, Displayed, Sheet
+from er3a.calibration.parameters import corrected
+from er3a.comparison.entries import Entry
+from er3a.confirmation.fit import Fitter, Solution
+from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
+from er3a.confirmation.pairs import Pairs
+from er3a.confirmation.poses import read_pairs
+from er3a.errors import ArgumentError, Er3aError
+from er3a.finding import Finding, fact
+from er3a.geometry.transforms import check_poses, rpy_of
+from er3a.kinematics.chain import row_values
+from er3a.kinematics.forward import checked_joints
+from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.references.quantities import MM
+from er3a.references.reference import INTERVAL_95
+from er3a.robots.robot import Robot, Source
+
+Layer = Literal["reading", "frames", "joints", "small", "another"]
+Verdict = Literal["agrees", "reading", "frames", "joints", "small", "another", "open"]
+LAYERS: tuple[Layer, ...] = ("reading", "frames", "joints", "small", "another")
+SEARCHED, FITTED = 40, 300  # rows with which explanations are sought, and with which the chosen one is fitted
+LEAST, LEAST_POSITIONS = 4, 8  # distinct poses with orientations, and without
+ALIKE = 45.0  # squares and price by which another explanation may be worse and is named
+MOST_NOISE, NOISE_SHARE = 5e-4, 0.2  # m that an arm that moved a little may leave, and share of what was before
+OPEN_M, OPEN_RAD = 1e-3, float(np.radians(0.1))
+FOLDS, HELD_OUT = 5, 8
+DIGIT_M, DIGIT_RAD = 1e-9, 1e-9  # of poses that are given as arrays
+
+
+@dataclass(frozen=True)
+class FoundEntry:
+    """An entry of the table that is other: mm or deg, with half its 95 % interval."""
+
+    entry: Entry
+    given: float
+    found: float
+    half_width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Placed(ByValue):
+    """Base or tool of the controller, (4, 4), m, with half of its 95 % intervals, mm and deg."""
+
+    T: Reals
+    half_width_mm: float
+    half_width_deg: float
+
+    @property
+    def xyz_mm(self) -> Reals:
+        """(3,), mm."""
+        return MM * self.T[:3, 3]
+
+    @property
+    def rpy_deg(self) -> Reals:
+        """(3,), roll, pitch and yaw, deg."""
+        return np.degrees(rpy_of(self.T))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Confirmation(ByValue, Displayed):
+    """Whether a model agrees with its controller, and what is between them.
+
+    Attributes
+    ----------
+    verdict : the heaviest of ``layers``; ``agrees`` without any, ``open`` if nothing explains the poses
+    layers : what was found between model and controller, of ``LAYERS``
+    form, factor : the orientations' form that fits, and by how much positions are larger than the model's
+    renamed : whether the columns' names say another form
+    joints : what is other in the joints, as findings
+    base, tool : of the controller, where they are other than the robot file's
+    entries : of the table that are other; small : corrections of all others, mm or deg, the largest first
+    corrected : the robot as the controller has it
+    left_mm, left_deg : (N,), what is left of each pose; before_mm, before_deg : by the model as it is
+    digits_mm, digits_deg : what rounding explains of these, one standard deviation
+    fits : (N,) bool, whether a row fits; lines : (N,), where it was read
+    noise : how many times more than digits is left, 1 if they explain it
+    held_out_mm : root mean square at poses left out of the fit, for small corrections
+    alike : other explanations that fit as well, as findings
+    not_settled : entries that could be off by 1 mm or 0.1 deg without a trace in these poses
+    taken_up : entries that act as the base or tool does that was found
+    notes : what was assumed in reading
+    oriented : whether orientations were given
+    """
+
+    verdict: Verdict
+    layers: tuple[Layer, ...]
+    form: str
+    renamed: bool
+    factor: float
+    joints: tuple[Finding, ...]
+    base: Placed | None
+    tool: Placed | None
+    entries: tuple[FoundEntry, ...]
+    small: tuple[FoundEntry, ...]
+    corrected: Robot
+    left_mm: Reals
+    left_deg: Reals
+    before_mm: Reals
+    before_deg: Reals
+    digits_mm: float
+    digits_deg: float
+    fits: Flags
+    lines: Integers
+    noise: float
+    held_out_mm: float | None
+    alike: tuple[Finding, ...]
+    not_settled: tuple[str, ...]
+    taken_up: tuple[str, ...]
+    notes: tuple[tuple[str, str], ...]
+    oriented: bool
+
+    def sheet(self) -> Sheet:
+        """Verdict and what is left at each pose, for printing.
+
+        Returns
+        -------
+        sheet : one row for each pose
+        """
+        columns = ("line", "mm before", "mm", "deg")
+        rows = zip(self.lines.tolist(), self.before_mm, self.left_mm, self.left_deg)
+        return Sheet.of_table(f"Confirmation: {self.verdict}", columns, rows, len(self.lines), self.layers)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a confirmation is neither true nor false; read its verdict")
+
+
+def confirm(
+    robot: Robot,
+    poses: str | Path | Reals | Pairs,
+    T: Reals | None = None,
+    *,
+    angles: str | None = None,
+    units: str | None = None,
+) -> Confirmation:
+    """Whether a model agrees with its controller, and if not, the least that explains the difference.
+
+    Agreement says nothing about the arm's accuracy: a controller's poses repeat the controller's own model.
+
+    Parameters
+    ----------
+    poses : a file of joint values and poses (:mod:`er3a.confirmation.poses`), or joint values (N, n), rad or m
+    T : (N, 4, 4), m, the controller's poses for joint values
+    angles : the form of orientations, if columns leave it open: ``rpy``, ``abc``, ``zyz``, ``xyz``, ``rotation_vector``
+    units : of positions without one: ``mm``, ``m``, ``in``, ``cm``
+
+    Returns
+    -------
+    found : verdict, what is between model and controller, and what is left
+
+    Raises
+    ------
+    InputError
+        for a file that can't be read, and for too few poses
+    """
+    if isinstance(poses, str | Path):
+        pairs = read_pairs(poses, robot, angles=angles, units=units)
+    elif isinstance(poses, Pairs):
+        pairs = poses
+    elif T is None:
+        raise ArgumentError("T", T, "the controller's poses, (N, 4, 4) in m")
+    else:
+        q, T = np.atleast_2d(checked_joints(robot, poses)), check_poses(T).reshape(-1, 4, 4)
+        digits = np.full(robot.joints, DIGIT_RAD), np.full(3, DIGIT_M), DIGIT_RAD
+        pairs = Pairs(q, T[:, :3, 3], {"matrix": T[:, :3, :3]}, 1, *digits, np.arange(1, len(q) + 1))
+    least = LEAST if pairs.turns else LEAST_POSITIONS
+    if len(pairs) < least:
+        without = "" if pairs.turns else " without orientations"
+        raise Er3aError(f"{len(pairs)} distinct poses{without}; {least} at least are needed")
+    return _answer(robot, pairs)
+
+
+def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
+    some = np.unique(np.linspace(0, len(pairs) - 1, SEARCHED).astype(np.int64))
+    found = search(Fitter(robot, pairs.some(some)))
+    chosen, noise = _chosen(found)
+    more = np.unique(np.linspace(0, len(pairs) - 1, FITTED).astype(np.int64))
+    fitter = Fitter(robot, pairs.some(more))
+    fitter.widen = noise
+    final = _on_more(fitter, chosen)
+    whole = Fitter(robot, pairs)
+    at_all = whole.at(final)
+    before = whole.at(found.found[0])
+    explained = final.per_freedom <= EXPLAINED
+    layers = _layers(final, found.named) if explained else ()
+    misread = (at_all.by_row > 9.0 * noise**2 * whole.dimensions) & explained
+    if misread.any() and "reading" not in layers:
+        layers = ("reading", *layers)
+    sd = whole.expected(final)
+    places, (entries, small) = _places(final), _entries(robot, final)
+    unseen, taken_up = _unseen(fitter, final) if explained else ((), ())
+    return Confirmation(
+        verdict=(layers[-1] if layers else "agrees") if explained else "open",
+        layers=layers,
+        form=final.explanation.form,
+        renamed=final.explanation.form not in found.named,
+        factor=final.explanation.factor,
+        joints=final.explanation.joints.faults,
+        base=places["base"],
+        tool=places["tool"],
+        entries=entries,
+        small=small,
+        corrected=_corrected(robot, final, len(pairs)),
+        left_mm=MM * np.linalg.norm(at_all.off[:, :3], axis=1),
+        left_deg=np.degrees(np.linalg.norm(at_all.off[:, 3:], axis=1)),
+        before_mm=MM * np.linalg.norm(before.off[:, :3], axis=1),
+        before_deg=np.degrees(np.linalg.norm(before.off[:, 3:], axis=1)),
+        digits_mm=MM * sd[0],
+        digits_deg=float(np.degrees(sd[1])),
+        fits=~misread,
+        lines=pairs.lines,
+        noise=noise,
+        held_out_mm=_held_out(fitter, final) if final.explanation.small else None,
+        alike=_alike(found, chosen) if explained else (),
+        not_settled=unseen,
+        taken_up=taken_up,
+        notes=pairs.notes,
+        oriented=bool(pairs.turns),
+    )  # fmt: skip
+
+
+def _chosen(found: Attempts) -> tuple[Solution, float]:
+    """What explains best, and how many times the digits it leaves; of nothing that explains, what leaves least."""
+    if explained := found.explained():
+        return explained[0], 1.0
+    best = min(found.found, key=lambda each: each.per_freedom)
+    if best.rms < min(MOST_NOISE, NOISE_SHARE * found.found[0].rms):
+        noise = best.per_freedom**0.5
+        near = [each for each in found.found if each.per_freedom <= EXPLAINED * noise**2]
+        return min(near, key=lambda each: each.chi2 / noise**2 + PRICE * cost(each, found.named)), noise
+    return min(found.found, key=lambda each: each.chi2**0.5 * 1.1 ** cost(each, found.named)), 1.0
+
+
+def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
+    """The chosen explanation fitted to more rows, without those that don't fit."""
+    start = chosen.Y, chosen.X, chosen.amounts
+    solution = fitter.fit(chosen.explanation, start)
+    bad = fitter.at(chosen).by_row > 9.0 * fitter.dimensions
+    if solution.per_freedom > EXPLAINED and 0 < bad.sum() <= 0.2 * len(bad):
+        solution = fitter.fit(chosen.explanation, start, np.where(bad, 0.0, 1.0))
+    return solution
+
+
+def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
+    found = solution.explanation
+    of_units = [each for each in found.joints.faults if each.code == "joints_in"]
+    columns = [each.column for each in found.entries]
+    holds: dict[Layer, bool] = {
+        "reading": found.form not in named or found.factor != 1 or bool(of_units) or not solution.rows.all(),
+        "frames": bool(found.free),
+        "joints": len(found.joints.faults) > len(of_units) or "offset" in columns,
+        "small": found.small,
+        "another": any(column != "offset" for column in columns),
+    }
+    return tuple(layer for layer in LAYERS if holds[layer])
+
+
+def _places(solution: Solution) -> dict[str, Placed | None]:
+    """Base and tool with their intervals, as far as they were fitted."""
+    errors, found = INTERVAL_95 * solution.errors, solution.explanation
+    placed: dict[str, Placed | None] = {"base": None, "tool": None}
+    for name, T in (("base", solution.Y), ("tool", solution.X)):
+        if name in found.free:
+            size = min(6, len(errors) - len(solution.entries)) if name == "tool" else 6
+            own, errors = errors[:size], errors[size:]
+            placed[name] = Placed(
+                T, float(MM * own[:3].max()), float(np.degrees(own[3:].max())) if size == 6 else np.inf
+            )
+    return placed
+
+
+def _entries(robot: Robot, solution: Solution) -> tuple[tuple[FoundEntry, ...], tuple[FoundEntry, ...]]:
+    """Entries that are other, and small corrections, the largest first."""
+    errors = INTERVAL_95 * solution.errors[len(solution.errors) - len(solution.entries) :]
+    every = [
+        FoundEntry(
+            each, each.value(robot), each.value(robot) + float(amount) * each.in_unit, float(error) * each.in_unit
+        )
+        for each, amount, error in zip(solution.entries, solution.amounts, errors)
+    ]
+    own = len(solution.explanation.entries)
+    by_size = sorted(
+        every[own:], key=lambda each: -abs(each.found - each.given) / (each.entry.scale * each.entry.in_unit)
+    )
+    return tuple(every[:own]), tuple(by_size)
+
+
+def _corrected(robot: Robot, solution: Solution, count: int) -> Robot:
+    """The robot as the controller has it: table, joints, base and tool."""
+    found = corrected(robot, solution.entries, solution.amounts)
+    factors, shift = solution.explanation.joints.factors, solution.explanation.joints.shift
+    if solution.explanation.joints.faults:
+        sizes = np.abs(factors).max(axis=1)
+        factors = factors / np.where(np.abs(sizes - 1) > 0.01, sizes, 1.0)[:, None]
+        moved = robot.direction * row_values(robot, shift)
+        found = found.replace(
+            offset=found.offset + np.where(robot.sliding, 0.0, moved), d=found.d + np.where(robot.sliding, moved, 0.0)
+        )
+        if robot.coupling is None and np.array_equal(np.abs(factors), np.eye(robot.joints)):
+            sign = np.diag(factors)
+            ends = np.sort(np.stack([sign * (robot.lower - shift), sign * (robot.upper - shift)]), axis=0)
+            found = found.replace(direction=found.direction * sign, lower=ends[0], upper=ends[1])
+        else:
+            own = np.eye(robot.joints) if robot.coupling is None else robot.coupling
+            found = found.replace(coupling=own @ factors)
+    if solution.explanation.free:
+        found = found.replace(base=solution.Y, tool=solution.X)
+    if not (solution.entries or solution.explanation.free or solution.explanation.joints.faults):
+        return found
+    source = Source(f"Fitted to {count} poses of the controller, starting from {robot.name}", "inferred")
+    named = ("dh", "zero", *solution.explanation.free)
+    return found.replace(sources={**robot.sources, **dict.fromkeys(named, source)})
+
+
+def _held_out(fitter: Fitter, solution: Solution) -> float | None:
+    """Root mean square of positions (mm) at poses that were left out, in turns."""
+    rows = np.flatnonzero(solution.rows)
+    if len(rows) < HELD_OUT:
+        return None
+    squares = []
+    for fold in range(FOLDS):
+        out = rows[fold::FOLDS]
+        weights = solution.rows.astype(float)
+        weights[out] = 0.0
+        left = fitter.fit(solution.explanation, (solution.Y, solution.X, solution.amounts), weights)
+        squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
+    return float(MM * np.sqrt(np.mean(squares)))
+
+
+def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
+    """Other explanations that fit as well, and are none with more of the same."""
+    seen, named = [_parts(chosen)], []
+    for each in found.explained():
+        parts = _parts(each)
+        if found.total(each) > found.total(chosen) + ALIKE or any(before <= parts for before in seen):
+            continue
+        seen.append(parts)
+        entries = tuple(entry.name for entry in each.explanation.entries)
+        named.append(
+            fact("explains_too", joints=each.explanation.joints.faults, places=each.explanation.free, entries=entries)
+        )
+    return tuple(named)
+
+
+def _parts(solution: Solution) -> frozenset[object]:
+    found = solution.explanation
+    row = ["row"] if not solution.rows.all() else []
+    own = [(each.code, tuple(sorted(each.params.items()))) for each in found.joints.faults]
+    units = [found.factor] if found.factor != 1 else []
+    return frozenset(
+        [*own, *found.free, *(each.name for each in found.entries), *["small"] * found.small, *row, *units, found.form]
+    )
+
+
+def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Entries that could be off by 1 mm or 0.1 deg: without a trace, and because base or tool acts alike."""
+    every = [each for each in fitter.every if each not in solution.entries]
+    explanation = replace(solution.explanation, entries=(*solution.entries, *every), small=False)
+    J, _ = fitter.linear(
+        explanation, (solution.Y, solution.X, np.concatenate([solution.amounts, np.zeros(len(every))]))
+    )
+    first = J.shape[1] - len(every)
+    least = INTERVAL_95 / np.array([OPEN_M if each.unit == "mm" else OPEN_RAD for each in every])
+    Q = np.linalg.qr(J[:, :first])[0]
+    rest = J[:, first:] - Q @ (Q.T @ J[:, first:])
+    unseen = np.linalg.norm(J[:, first:], axis=0) < least
+    taken = ~unseen & (np.linalg.norm(rest, axis=0) < least)
+    by_kind = [tuple(each.name for each, holds in zip(every, flags) if holds) for flags in (unseen, taken)]
+    return by_kind[0], by_kind[1]

@@ -1,0 +1,302 @@
+"""The least that explains what is between a model and its controller.
+
+Explanations are fitted in order of what they ask for: nothing; orientations, units or joints read otherwise; a tool or
+a base; rows misread; one or two entries of the table; small corrections of all. What leaves no more than digits
+explains.
+Of several, the one is chosen whose squares plus ``PRICE`` times its cost are least.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from er3a.comparison.entries import Entry
+from er3a.confirmation.fit import Explanation, Fitter, Place, Solution
+from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
+from er3a.geometry.transforms import inverted, posed
+from er3a.numerics.arrays import Reals
+
+EXPLAINED = 4.0
+"""Squares per degree of freedom: what is left is less than twice what digits explain."""
+PRICE = 20.0  # squares that a fault has to save: 1 in 10 000 do by chance
+COST = {"joints_in": 1.0, "zero_elsewhere": 3.2}
+OTHER_FORM, OTHER_UNIT, OF_JOINTS, OF_PLACE, OF_ZERO, OF_ENTRY, OF_ALL, OF_ROW = 1.0, 1.0, 3.0, 2.0, 3.0, 4.0, 9.0, 1.5
+UNITS = {"m": 1e3, "km": 1e6, "um": 1e-3, "in": 25.4, "cm": 10.0, "m_as_in": 1e3 / 25.4, "in_as_m": 0.0254, "ft": 304.8}
+UNIT_NEAR, UNIT_RIGHT = 0.3, 0.3
+FAR_TURN, FAR_AWAY = 0.01, 0.01  # rad and m, beyond which pairs of ways of reading are tried
+CANDIDATES, BY_TURN, TRIED = 5, 3, 3
+SINGLES, PAIRS, STATES, MOST = 6, 8, 3, 4
+INDEPENDENT = 1e-3
+MOST_ROWS, ROW_OFF, ROUNDS = 0.2, 9.0, 12  # share of rows that may be misread; squares of one of its numbers
+PLACES: tuple[tuple[Place, ...], ...] = ((), ("tool",), ("base",), ("base", "tool"))
+BOTH: tuple[Place, ...] = ("base", "tool")
+
+
+def cost(solution: Solution, named: Sequence[str]) -> float:
+    """What an explanation asks for.
+
+    Parameters
+    ----------
+    named : forms of orientation that the columns' names allow
+    """
+    found = solution.explanation
+    return (
+        OTHER_FORM * (found.form not in named)
+        + OTHER_UNIT * (found.factor != 1)
+        + sum(COST.get(each.code, OF_JOINTS) for each in found.joints.faults)
+        + OF_PLACE * len(found.free)
+        + sum(OF_ZERO if each.column == "offset" else OF_ENTRY for each in found.entries)
+        + OF_ALL * found.small
+        + OF_ROW * int((~solution.rows).sum())
+    )
+
+
+@dataclass
+class Attempts:
+    """What was fitted, and what is chosen of it."""
+
+    fitter: Fitter
+    found: list[Solution]
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Forms of orientation that the columns' names allow."""
+        return self.fitter.pairs.forms[: self.fitter.pairs.named]
+
+    def total(self, solution: Solution) -> float:
+        """What decides between solutions, the lower the better."""
+        return solution.chi2 + PRICE * cost(solution, self.named)
+
+    def explained(self) -> list[Solution]:
+        """Solutions that leave no more than digits, the best first."""
+        every = (each for each in self.found if each.per_freedom <= EXPLAINED and each.plausible)
+        return sorted(every, key=self.total)
+
+    def add(self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
+            ) -> Solution:  # fmt: skip
+        """Fit an explanation and keep it."""
+        self.found.append(self.fitter.fit(explanation, start, weights))
+        return self.found[-1]
+
+
+def search(fitter: Fitter) -> Attempts:
+    """Fit explanations until one explains.
+
+    Parameters
+    ----------
+    fitter : with the pairs that are to be explained, some dozens
+
+    Returns
+    -------
+    search : with all that was fitted
+    """
+    robot, found = fitter.robot, Attempts(fitter, [])
+    for form in found.named:
+        found.add(Explanation(plain(robot), form), (robot.base, robot.tool, None))
+    if found.explained():
+        return found
+    candidates = _candidates(fitter, found)
+    for near in candidates:
+        _with_frames(found, near)
+    if found.explained():
+        return found
+    for solution in _nearest_of(found, 2 * TRIED):
+        _without_rows(found, solution)
+    if found.explained():
+        return found
+    states: list[Solution] = []
+    for starts in _starts(found):
+        here = [state for start in starts for state in _with_entries(found, [start])]
+        _with_small(found, starts, here)
+        if found.explained():
+            return found
+        states += here
+    _with_entries(found, sorted(states, key=lambda each: each.chi2)[:STATES])
+    for solution in _nearest_of(found, TRIED) if not found.explained() else []:
+        _without_rows(found, solution)
+    return found
+
+
+def _candidates(fitter: Fitter, found: Attempts) -> list[Near]:
+    """Ways of reading joints and orientations that come near."""
+    readings = [plain(fitter.robot), *single_readings(fitter.robot)]
+    near = nearest(fitter, readings, fitter.pairs.forms)
+    if near[0].turned > FAR_TURN or near[0].away > FAR_AWAY:
+        two = [joined(a, b) for a, b in combinations(readings[1:], 2) if a.faults[0].code != "zero_elsewhere"]
+        near += nearest(fitter, two, found.named)
+
+    def asked(each: Near) -> float:
+        return 0.1 * (
+            sum(COST.get(fault.code, OF_JOINTS) for fault in each.joints.faults) + (each.form not in found.named)
+        )
+
+    by_score = sorted(near, key=lambda each: each.score + asked(each))
+    by_turn = sorted(near, key=lambda each: np.log10(max(each.turned, 2e-4)) + asked(each))
+    chosen = {id(each): each for each in (*by_score[:CANDIDATES], *by_turn[:BY_TURN])}
+    return list(chosen.values())
+
+
+def _factors(near: Near) -> list[float]:
+    """Units of positions that could be meant: their size, and that which brings them near."""
+    right = [1.0] if abs(near.factor - 1) < UNIT_RIGHT else []
+    other = [size for size in UNITS.values() if abs(near.factor / size - 1) < UNIT_NEAR]
+    return right or other[:1] or [1.0]
+
+
+def _with_frames(found: Attempts, near: Near) -> None:
+    """Fit a way of reading with no frame, a tool, a base, and both."""
+    fitter = found.fitter
+    robot, pairs = fitter.robot, fitter.pairs
+    F = fitter.flanges((), np.zeros((1, 0)), np.asarray(near.joints.of(pairs.q)) @ _coupling(fitter).T)[0]
+    for factor in _factors(near):
+        for free in PLACES:
+            Y, X = near.Y, near.X
+            if pairs.turns:
+                C = posed(pairs.turns[near.form], factor * pairs.xyz)
+                if free == ("tool",):
+                    X = _middle(inverted(robot.base @ F) @ C)
+                if free == ("base",):
+                    Y = _middle(C @ inverted(F @ robot.tool))
+            explanation = Explanation(near.joints, near.form, factor, free)
+            start = Y if "base" in free else robot.base, X if "tool" in free else robot.tool, None
+            found.add(explanation, start)
+
+
+def _coupling(fitter: Fitter) -> Reals:
+    return np.eye(fitter.robot.rows) if fitter.robot.coupling is None else fitter.robot.coupling
+
+
+def _middle(T: Reals) -> Reals:
+    """The transform in the middle of some (N, 4, 4), medians of positions."""
+    U, _, Vt = np.linalg.svd(T[:, :3, :3].mean(axis=0))
+    return posed(U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt, np.median(T[:, :3, 3], axis=0))
+
+
+def _nearest_of(found: Attempts, most: int) -> list[Solution]:
+    """Solutions that leave least for what they ask."""
+    robust = sorted(found.found, key=lambda each: float(np.median(each.by_row)) + PRICE * cost(each, found.named))
+    return robust[:most]
+
+
+def _start_of(solution: Solution) -> tuple[Reals, Reals, Reals]:
+    return solution.Y, solution.X, solution.amounts
+
+
+def _without_rows(found: Attempts, solution: Solution) -> None:
+    """The same explanation without the rows that don't fit, if these are few."""
+    count = len(solution.by_row)
+    most, numbers = int(max(1, MOST_ROWS * count)), found.fitter.dimensions
+    if count < 5:
+        return
+    for _ in range(ROUNDS):
+        size = max(float(np.median(solution.by_row)), 2.0 * numbers)
+        weights = 1 / np.sqrt(1 + solution.by_row / size)
+        last, solution = solution, found.fitter.fit(solution.explanation, _start_of(solution), weights)
+        if (np.abs(last.by_row - solution.by_row) < 0.1 + 0.01 * solution.by_row).all():
+            break
+    bad = solution.by_row > ROW_OFF * numbers
+    if 0 < bad.sum() <= most:
+        found.add(solution.explanation, _start_of(solution), np.where(bad, 0.0, 1.0))
+
+
+def _starts(found: Attempts) -> list[list[Solution]]:
+    """Solutions to which entries are added: of the nearest ways of reading, without frames and with both."""
+    both = [each for each in found.found if each.explanation.free == BOTH]
+    both = sorted(both, key=lambda each: each.chi2**0.5 * 1.2 ** cost(each, found.named))[:TRIED]
+    alone = [each for each in found.found if not each.explanation.free and each.rows.all()]
+    return [[*[other for other in alone if _same_reading(other, each)][:1], each] for each in both]
+
+
+def _same_reading(first: Solution, second: Solution) -> bool:
+    a, b = first.explanation, second.explanation
+    return a.joints is b.joints and a.form == b.form and a.factor == b.factor and not (a.entries or b.entries)
+
+
+def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]:
+    """Solutions with one or two entries more, the nearest first."""
+    reached = []
+    for state in states:
+        for more in _promising(found.fitter, state):
+            entries = (*state.explanation.entries, *more)
+            if len(entries) <= MOST:
+                explanation = replace(state.explanation, entries=entries)
+                amounts = np.concatenate([state.amounts[: len(state.explanation.entries)], np.zeros(len(more))])
+                reached.append(_with_fewer_frames(found, found.add(explanation, (state.Y, state.X, amounts))))
+    return sorted(reached, key=lambda each: each.chi2)[:STATES]
+
+
+def _with_fewer_frames(found: Attempts, solution: Solution) -> Solution:
+    """A solution that explains, with one frame less if it still does."""
+    robot = found.fitter.robot
+    if solution.per_freedom > EXPLAINED:
+        return solution
+    for free in PLACES[: 3 if solution.explanation.free == BOTH else 0]:
+        Y, X = solution.Y if "base" in free else robot.base, solution.X if "tool" in free else robot.tool
+        found.add(replace(solution.explanation, free=free), (Y, X, solution.amounts))
+    return solution
+
+
+def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
+    """Entries, alone and in pairs, that reduce the squares most, to first order."""
+    own = set(state.explanation.entries)
+    every = [each for each in fitter.every if each not in own and each.column != "beta"]
+    explanation = replace(state.explanation, entries=(*state.explanation.entries, *every))
+    amounts = np.concatenate([state.amounts, np.zeros(len(every))])
+    J, left = fitter.linear(explanation, (state.Y, state.X, amounts))
+    first = J.shape[1] - len(every)
+    Q = np.linalg.qr(J[:, :first])[0] if first else np.zeros((len(J), 0))
+    own_size = np.linalg.norm(J[:, first:], axis=0)
+    E = J[:, first:] - Q @ (Q.T @ J[:, first:])
+    size = np.linalg.norm(E, axis=0)
+    seen = size > INDEPENDENT * np.maximum(own_size, 1e-12)
+    E, numbers = E[:, seen] / size[seen], np.flatnonzero(seen)
+    b, G = E.T @ left, E.T @ E
+    singles = [(every[numbers[k]],) for k in np.argsort(-(b**2), kind="stable")[:SINGLES]]
+    i, j = np.triu_indices(len(b), 1)
+    rest_of_two = 1 - G[i, j] ** 2
+    gain = np.where(
+        rest_of_two > INDEPENDENT**2,
+        (b[i] ** 2 - 2 * G[i, j] * b[i] * b[j] + b[j] ** 2) / np.maximum(rest_of_two, 1e-9),
+        0,
+    )
+    two = [(every[numbers[i[k]]], every[numbers[j[k]]]) for k in np.argsort(-gain, kind="stable")[:PAIRS]]
+    return [*singles, *two]
+
+
+def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[Solution]) -> None:
+    """Small corrections of all entries, with the entries that are off by more free."""
+    for start in [*starts, *sorted(states, key=lambda each: each.chi2)[: 2 * STATES]]:
+        solution = found.add(replace(start.explanation, small=True), _start_of(start))
+        for _ in range(MOST):
+            own = len(solution.explanation.entries)
+            if solution.plausible:
+                break
+            solution = _released(found, solution, own + int(np.abs(solution.amounts[own:]).argmax()))
+        if solution.per_freedom <= EXPLAINED:
+            _with_fewer_frames(found, solution)
+            _with_fewer_entries(found, solution)
+
+
+def _released(found: Attempts, solution: Solution, k: int) -> Solution:
+    """The solution with one more entry that may be off by any amount."""
+    own = solution.explanation.entries
+    order = [*range(len(own)), k, *(i for i in range(len(own), len(solution.amounts)) if i != k)]
+    explanation = replace(solution.explanation, entries=(*own, solution.entries[k]))
+    return found.add(explanation, (solution.Y, solution.X, solution.amounts[order]))
+
+
+def _with_fewer_entries(found: Attempts, solution: Solution) -> None:
+    """The solution with its large corrections alone, and with one of them small as the others."""
+    own = solution.explanation.entries
+    if not own:
+        return
+    alone = replace(solution.explanation, small=False)
+    _with_fewer_frames(found, found.add(alone, (solution.Y, solution.X, solution.amounts[: len(own)])))
+    for entry in own:
+        kept = [k for k in range(len(own)) if own[k] != entry]
+        explanation = replace(solution.explanation, entries=tuple(own[k] for k in kept))
+        found.add(explanation, (solution.Y, solution.X, solution.amounts[kept]))

@@ -1,0 +1,58 @@
+"""Joint values and the poses that a controller shows for them, as arrays, with the digits that they were written to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from er3a.by_value import ByValue
+from er3a.numerics.arrays import Flags, Integers, Reals
+
+ROUNDED = 12**-0.5  # standard deviation of rounding, in last digits
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs(ByValue):
+    """N poses of a controller.
+
+    Attributes
+    ----------
+    q : (N, n), rad or m, as the columns say
+    xyz : (N, 3), m, as the columns say
+    turns : rotations (N, 3, 3) by the form of orientation that they were read in, the likeliest first; empty if the
+        controller's orientations are not given
+    named : how many of these forms the columns' names allow; the others are tried because names can be wrong
+    q_digit, xyz_digit : (n,) and (3,), rad or m, the last digits; turn_digit : of orientations, rad
+    lines : (N,), where each pose was read
+    notes : what was assumed, as (code, word)
+    """
+
+    q: Reals
+    xyz: Reals
+    turns: Mapping[str, Reals] = field(default_factory=dict)
+    named: int = 1
+    q_digit: Reals = field(default_factory=lambda: np.zeros(1))
+    xyz_digit: Reals = field(default_factory=lambda: np.zeros(3))
+    turn_digit: float = 0.0
+    lines: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    notes: tuple[tuple[str, str], ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        """The forms of orientation, the likeliest first; one empty name without orientations."""
+        return tuple(self.turns) or ("",)
+
+    def some(self, rows: Integers | Flags | slice) -> Pairs:
+        """Some of the poses.
+
+        Parameters
+        ----------
+        rows : numbers from 0, or (N,) bool
+        """
+        turns = {form: R[rows] for form, R in self.turns.items()}
+        return replace(self, q=self.q[rows], xyz=self.xyz[rows], turns=turns, lines=self.lines[rows])
