@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.by_value import Coded
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import texts
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
@@ -21,25 +21,13 @@ from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 ROBOT = "er3_600"
 
 
-class Hollow(Coded, code="made.hollow"):
-    """A finding of the stage below."""
-
-    volume_m3: float
-
-
-class Solid(Coded, code="made.solid"):
-    """Another, which may hold one."""
-
-    apart_from: Hollow | None
-
-
 TEXTS = texts({"made.hollow": "A hollow (空洞) of {volume_m3:.2f} m³.", "made.solid": "All is solid."})
 
 
 class MadeSummary(Summary):
     """With a key of its own."""
 
-    verdict: Verdict[Hollow | Solid]
+    verdict: Verdict[Finding]
     reach_m: tuple[float, ...]
 
 
@@ -80,7 +68,7 @@ ROWS = Rows(
 )
 KEY_FIGURES = {"hull_volume": "Volume of the hull", "reach": "Reach", "solved": "Targets that are solved"}
 SUMMARY = MadeSummary(
-    Verdict("fail", Hollow(0.25)),
+    Verdict("fail", fact("made.hollow", volume_m3=0.25)),
     (Figure("hull_volume", 1.25, "m³", 0.01), Figure("reach", None, "mm"), Figure("solved", 2, "", of=3)),
     (0.5, 1.0),
 )

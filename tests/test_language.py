@@ -9,14 +9,14 @@ import pytest
 from er3a.pipeline import language
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages import say as say_module
-from er3a.pipeline.messages.say import Plural, joined, sentence, texts, word
+from er3a.pipeline.messages.say import joined, sentence, texts, word
 
 GERMAN = {
     "off": "{angle} deg daneben: {joint}",
     "elbow": "Ellbogen",
-    "joined#; ": "{first} | {rest}",
+    "; ": " | ",
     "{count} faults": "{count} Fehler",
-    "f": "{count} Fehler von {size} mm",
+    "f": "[{sure:!}vielleicht ]{names}: {size} mm[ ({why})]",
 }
 
 
@@ -24,14 +24,8 @@ class German(gettext.NullTranslations):
     def gettext(self, message: str) -> str:
         return GERMAN.get(message, message)
 
-    def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
-        return GERMAN[msgid1 if n == 1 else msgid2]
-
     def pgettext(self, context: str, message: str) -> str:
         return self.gettext(message)
-
-    def npgettext(self, context: str, msgid1: str, msgid2: str, n: int) -> str:
-        return self.ngettext(msgid1, msgid2, n)
 
 
 @pytest.fixture
@@ -45,7 +39,7 @@ def made(monkeypatch):
     texts(
         {
             "off": "the {joint} is {angle:.1f} deg off",
-            "f": Plural("count", "{count} fault of {size:.2f} mm", "{count} faults of {size:.2f} mm"),
+            "f": "[{sure:!}maybe ]{names:2, } by {size:.2f} mm[ ({why})]",
         }
     )
 
@@ -54,8 +48,13 @@ def test_a_translation_is_filled_in_with_the_formats_of_the_english_text(german,
     off = sentence("off", joint=word("joint", {"j3": "elbow"}, "j3"), angle=2.04)
     assert off == "2.0 deg daneben: Ellbogen"
     assert joined([off, "", "x"]) == "2.0 deg daneben: Ellbogen | x"
-    for count in (1, 2):
-        assert sentence("f", count=count, size=0.5) == f"{count} Fehler von 0.50 mm"
+
+
+def test_a_part_in_brackets_is_there_only_with_what_it_names(german, made):
+    names, parts = ("a", "b", "c"), {"size": 0.5, "sure": False, "why": ""}
+    assert sentence("f", names=names, **parts) == "vielleicht a, b, 1 more: 0.50 mm"
+    assert sentence("f", names=names[:1], **parts | {"sure": True, "why": "d"}) == "a: 0.50 mm (d)"
+    assert sentence("f", names=names[:1], **parts | {"why": None}) == "vielleicht a: 0.50 mm"
 
 
 def test_parts_are_no_words(german):

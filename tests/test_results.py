@@ -39,7 +39,7 @@ from er3a.pipeline.results import (
 )
 from er3a.pipeline.study import load_study
 from er3a.pipeline.tables import Table, Texts, column, lists
-from testing.made_stage import ROWS, STAGE, SUMMARY, Hollow, MadeResults, Rows, Solid, write
+from testing.made_stage import ROWS, STAGE, SUMMARY, MadeResults, Rows, write
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -87,10 +87,14 @@ def test_shape_of_a_summary(tmp_path, study):
 
 
 def test_results_come_back_as_written(tmp_path, study):
-    write(tmp_path, study, replace(SUMMARY, verdict=Verdict("pass", Solid(Hollow(1.5)))))
+    write(
+        tmp_path,
+        study,
+        replace(SUMMARY, verdict=Verdict("pass", fact("made.solid", apart_from=fact("made.hollow", volume_m3=1.5)))),
+    )
     stored = read_results(tmp_path, MadeResults)
     assert (stored.robot, stored.stage, stored.status) == ("er3_600", "workspace", "pass")
-    assert stored.results.summary.verdict.finding == Solid(Hollow(1.5))
+    assert stored.results.summary.verdict.finding == fact("made.solid", apart_from=fact("made.hollow", volume_m3=1.5))
     assert stored.results.summary.figures == SUMMARY.figures
     pd.testing.assert_frame_equal(stored.results.rows.frame(), ROWS.frame())
     assert np.signbit(stored.results.rows.x_m[2])
@@ -174,7 +178,7 @@ def test_a_number_that_is_none_is_refused_and_the_old_file_stays(tmp_path, study
     summary = {
         "own key": replace(SUMMARY, reach_m=(bad,)),
         "figure": replace(SUMMARY, figures=(Figure("x", bad, "m"),)),
-        "params": replace(SUMMARY, verdict=Verdict("fail", Hollow(bad))),
+        "params": replace(SUMMARY, verdict=Verdict("fail", fact("made.hollow", volume_m3=bad))),
     }[where]
     with pytest.raises(ValueError, match="not JSON compliant"):
         write(tmp_path, study, summary)

@@ -21,10 +21,11 @@ from er3a.collision.distances import (
     which_overlap,
 )
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
-from er3a.collision.pairs import BASE, CarriedAndLink, CarriedAndSolid, LinkAndSolid, LinkPair, Pair, link_label
+from er3a.collision.pairs import BASE, Pair, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside, layout_of, link_frames, solid_bodies
 from er3a.errors import Er3aError
+from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns
 from er3a.robots.robot import Robot
@@ -70,9 +71,9 @@ class Bodies:
         numbers = {link_label(k): k for k in range(robot.rows + 1)}
         self.in_error, self.guessed = (
             tuple[Pair, ...](
-                LinkPair(numbers[row.first], numbers[row.second])
+                fact("link_pair", first=numbers[row.first], second=numbers[row.second])
                 if row.second in numbers
-                else CarriedAndLink(row.second, numbers[row.first])
+                else fact("carried_and_link", carried=row.second, link=numbers[row.first])
                 for row in self.matrix
                 if row.state == state and frozenset((row.first, row.second)) not in allowed
             )
@@ -298,8 +299,16 @@ def named_pair(first: Body, second: Body) -> Pair:
     """
     is_link = [body.name == link_label(body.link) for body in (first, second)]
     if second.link < 0:
-        return LinkAndSolid(first.link, second.name) if is_link[0] else CarriedAndSolid(first.name, second.name)
-    return LinkPair(first.link, second.link) if is_link[1] else CarriedAndLink(second.name, first.link)
+        return (
+            fact("link_and_solid", link=first.link, solid=second.name)
+            if is_link[0]
+            else fact("carried_and_solid", carried=first.name, solid=second.name)
+        )
+    return (
+        fact("link_pair", first=first.link, second=second.link)
+        if is_link[1]
+        else fact("carried_and_link", carried=second.name, link=first.link)
+    )
 
 
 def _apart_by(layout: Layout, margin: float) -> tuple[Layout, Layout]:

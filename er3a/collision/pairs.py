@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
-from er3a.by_value import Coded
+from er3a.finding import Finding
 
 BASE = 0  # number of the fixed link
 TRIED = 1024  # joint vectors, spread over the limits, in which each pair is tried
@@ -12,69 +10,60 @@ PENETRATION_TOLERANCE = 0.001  # m; no deeper overlap goes unnoticed, unless set
 ASSUMED_MARGIN = 0.02  # m, within this distance of assumed shapes nothing is settled, unless set otherwise
 
 
-class TwoBodies(ABC):
-    """Two bodies that can meet."""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, str]:
-        """Names of both bodies."""
-
-    @property
-    def label(self) -> str:
-        """Both names with a slash between, for columns of text."""
-        return "/".join(self.names)
+Pair = Finding
+"""Two bodies that can meet: ``link_pair`` (``first``, ``second``: 0 for the base, 1..6 for the link that joint 1..6
+turns), ``link_and_solid`` (``link``, ``solid`` of the scene by its name), ``carried_and_link`` (``carried``: what the
+tool carries, by its name), ``carried_and_solid``."""
+_BODIES = {
+    "link_pair": ("first", "second"),
+    "link_and_solid": ("link", "solid"),
+    "carried_and_link": ("link", "carried"),
+    "carried_and_solid": ("carried", "solid"),
+}
 
 
-class LinkPair(TwoBodies, Coded):
-    """Two links: 0 for the base, 1..6 for the link that joint 1..6 turns."""
+def bodies_of(pair: Pair) -> tuple[int | str, int | str]:
+    """Two bodies, a link first.
 
-    first: int
-    second: int
+    Parameters
+    ----------
+    pair : of bodies that can meet
 
-    @property
-    def names(self) -> tuple[str, str]:
-        """Such as ``base`` and ``link_3``."""
-        return link_label(self.first), link_label(self.second)
-
-
-class LinkAndSolid(TwoBodies, Coded):
-    """A link and a solid of the scene, by its name."""
-
-    link: int
-    solid: str
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """The link's label and the solid's name."""
-        return link_label(self.link), self.solid
+    Returns
+    -------
+    bodies : links by number, others by name
+    """
+    first, second = (pair.params[name] for name in _BODIES[pair.code])
+    return first, second
 
 
-class CarriedAndLink(TwoBodies, Coded):
-    """What the tool carries, by its name, and a link."""
+def names_of(pair: Pair) -> tuple[str, str]:
+    """Names of two bodies.
 
-    carried: str
-    link: int
+    Parameters
+    ----------
+    pair : of bodies that can meet
 
-    @property
-    def names(self) -> tuple[str, str]:
-        """The link's label and the name of what is carried."""
-        return link_label(self.link), self.carried
-
-
-class CarriedAndSolid(TwoBodies, Coded):
-    """What the tool carries and a solid of the scene, by their names."""
-
-    carried: str
-    solid: str
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """The name of what is carried and the solid's name."""
-        return self.carried, self.solid
+    Returns
+    -------
+    names : such as ``base`` and ``link_3``, a link first
+    """
+    first, second = (link_label(body) if isinstance(body, int) else body for body in bodies_of(pair))
+    return first, second
 
 
-Pair = LinkPair | LinkAndSolid | CarriedAndLink | CarriedAndSolid
+def label_of(pair: Pair) -> str:
+    """Names of two bodies as one.
+
+    Parameters
+    ----------
+    pair : of bodies that can meet
+
+    Returns
+    -------
+    label : both names with a slash between, for columns of text
+    """
+    return "/".join(names_of(pair))
 
 
 def link_label(number: int) -> str:

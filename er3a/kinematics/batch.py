@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
+from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, misses, slots_of_class, task_mask
@@ -19,7 +20,7 @@ from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.inverse import SAME_MEMBER, SOLVES, is_complete, missed_row, missing_class, starts_of
 from er3a.kinematics.numerical import all_found
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.solutions import ByClass, Iteration, Method, Solutions, in_doubt, slot_labels
+from er3a.kinematics.solutions import Method, Solutions, in_doubt, slot_labels
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots, wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import parallel_for
@@ -152,7 +153,7 @@ def _by_class(
         q = _found_by_starts(robot, T, own)
         inside = within(robot, q)
         _confirm(robot, T, q, inside, threads)
-        method = Iteration(starts_of(robot), missing_class(robot))
+        method = fact("iteration", starts=starts_of(robot), lacking=missing_class(robot))
     else:
         values = checked_parameters(robot, redundancy, reference, count)
         found = slots_of_class(robot, T, reference, values, threads)
@@ -163,7 +164,7 @@ def _by_class(
             if near.solved:
                 q[n, 0], inside[n, 0] = near.q, within(robot, near.q)
         certain = is_complete(robot, found.certainty) & ~_confirm(robot, T, q, inside, threads)
-        method = ByClass(solver.code, bool(certain.all()), bool(slot_labels(robot)))
+        method = fact("by_class", arm_class=solver.code, certain=bool(certain.all()), named=bool(slot_labels(robot)))
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
     turn_range = _turn_range(robot, q) if turns else None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
-from er3a.finding import fact
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
@@ -115,7 +115,7 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
         if family.within_limits and _distance(rows, family.q0) > SAME_MEMBER:
             slots.append(family.branches[0])
             rows.append(family.q0[None])
-    return _Found(*_stacked(slots, rows, 6), solutions.ClosedForm(), _unsolved(robot, fault, gap), continua)
+    return _Found(*_stacked(slots, rows, 6), solutions.CLOSED_FORM, _unsolved(robot, fault, gap), continua)
 
 
 def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> solutions.Solutions:
@@ -132,7 +132,7 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
         nearest = fact(
             "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
         )
-        unsolved = (solutions.PoseUnsolved(0, fact("no_solution_of_class", miss=nearest)),)
+        unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=nearest)),)
     q, branch = rows[kept], branch[kept]
     if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
         away = max_joint_move(q, own)
@@ -140,7 +140,7 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
             certain = certain and bool(away.min(initial=np.inf) <= MISSED)
             branch = np.append(branch, branch[away.argmin()] if len(q) else 0)
             q = np.concatenate([q, own[None]])
-            unsolved = tuple(each for each in unsolved if not isinstance(each, solutions.PoseUnsolved))
+            unsolved = tuple(each for each in unsolved if not is_one(each, "pose_unsolved"))
     freed = None if task_mask(robot).all() else misses(robot, T, q)[2]
     order = np.arange(len(q)) if freed is None else np.argsort(np.where(freed <= CONFIRMS, 0.0, freed), kind="stable")
     if isinstance(motions, tuple):
@@ -205,8 +205,8 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = fact("nearest_miss", position_mm=position * 1000, rotation_deg=float(np.degrees(rotation)))
-            unsolved = (solutions.PoseUnsolved(0, fact("no_solution_of_class", miss=miss)),)
-    method = solutions.ByClass(solver.code, certain, bool(solutions.slot_labels(robot)))
+            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
+    method = fact("by_class", arm_class=solver.code, certain=bool(certain), named=bool(solutions.slot_labels(robot)))
     return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
 
 
@@ -276,7 +276,7 @@ def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     arms = all_found(robot, T, starts_of(robot))
     rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    return _Found(*rows, solutions.Iteration(starts_of(robot), missing_class(robot)), unsolved)
+    return _Found(*rows, fact("iteration", starts=starts_of(robot), lacking=missing_class(robot)), unsolved)
 
 
 def starts_of(robot: Robot) -> int:
@@ -289,7 +289,7 @@ def starts_of(robot: Robot) -> int:
     return STARTS_OF_DEPENDENT if by_class.arm_solver(robot).chain.code == "dependent" else STARTS
 
 
-def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints | None:
+def missing_class(robot: Robot) -> ClosedFormMissing | None:
     """Why the arm is solved by iteration.
 
     Parameters
@@ -301,7 +301,7 @@ def missing_class(robot: Robot) -> ClosedFormMissing | solutions.DependentJoints
     why : dependent joints, or what a spherical wrist lacks
     """
     return (
-        solutions.DependentJoints()
+        fact("dependent_joints")
         if by_class.arm_solver(robot).chain.code == "dependent"
         else wrist_partition_missing(robot)
     )
@@ -357,7 +357,7 @@ def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
-def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.SideUnsolved, ...]:
+def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:
     """Why a shoulder side has no branch: by that of its four slots which misses least."""
     found = []
     for shoulder in (0, 1):
@@ -366,8 +366,10 @@ def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[soluti
             continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
         found.append(
-            solutions.SideUnsolved(
-                solutions.side_of(robot, best), _out_of_reach(robot, int(fault[best]), float(gap[best]))
+            fact(
+                "side_unsolved",
+                side=solutions.side_of(robot, best),
+                why=_out_of_reach(robot, int(fault[best]), float(gap[best])),
             )
         )
     return tuple(found)

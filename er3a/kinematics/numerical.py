@@ -36,7 +36,7 @@ from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts, rows_at
 from er3a.kinematics.forward import checked_joints, jacobian
-from er3a.kinematics.solutions import Iteration, NotFound, PoseUnsolved, Solutions
+from er3a.kinematics.solutions import NotFound, Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel, parallel_for
@@ -625,7 +625,7 @@ class _Search:
         starts_at = np.broadcast_to(q0, (*shape, robot.joints)).reshape(-1, robot.joints)
         q, error, starts = self.run(poses, starts_at, respect, restarts, threads)
         unsolved = tuple(
-            PoseUnsolved(int(n), self.explain(poses[n], q[n], error[n], respect, restarts))
+            fact("pose_unsolved", pose=int(n), why=self.explain(poses[n], q[n], error[n], respect, restarts))
             for n in (np.flatnonzero(starts == 0) if explained else ())
         )
         q = q.reshape(*shape, robot.joints)
@@ -635,7 +635,7 @@ class _Search:
             solved=(starts > 0).reshape(shape),
             within_limits=(starts > 0).reshape(shape) & within(robot, q),
             branch=np.full(shape, -1),
-            method=Iteration(1 + restarts),
+            method=fact("iteration", starts=1 + restarts, lacking=None),
             unsolved=unsolved,
             position_error=error[:, 0].reshape(shape),
             rotation_error=error[:, 1].reshape(shape),

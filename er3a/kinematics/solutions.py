@@ -18,18 +18,17 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import ByValue, Coded, Displayed, Sheet, shortly
-from er3a.finding import Finding
+from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
-from er3a.kinematics.classes.class_solvers import ArmClassCode, BranchLabel, SlotName
+from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.families import Family
 from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import (
-    ClosedFormMissing,
     parallel_axes_arm,
     wrist_partition_missing,
     wrist_partitioned_arm,
@@ -112,41 +111,12 @@ def _outward(slot: int) -> float:
 Label = BranchLabel | SlotName | Literal["found_arm"]
 
 
-class ClosedForm(Coded):
-    """All solutions, by the closed form."""
-
-    arm_class: Literal["spherical_wrist"] = "spherical_wrist"
-
-
-class DependentJoints(Coded):
-    """The arm has fewer degrees of freedom than joints (six at most), for example two parallel slides.
-
-    Each pose within reach has infinitely many solutions.
-    """
-
-
-class Iteration(Coded):
-    """Solutions by iteration from random starts, which may miss some; ``lacking`` where the arm has no closed form."""
-
-    starts: int
-    lacking: ClosedFormMissing | DependentJoints | None = None
-
-
-class ByClass(Coded):
-    """All solutions of an arm without spherical wrist, by the solver of its class.
-
-    Attributes
-    ----------
-    certain : whether the solver left no doubt that these are all
-    named : whether signs of factors separate the solutions, so that branches have names; else they are numbered
-    """
-
-    arm_class: ArmClassCode
-    certain: bool
-    named: bool
-
-
-Method = ClosedForm | ByClass | Iteration
+Method = Finding
+"""How solutions were found: ``closed_form`` (all of them), ``by_class`` (``arm_class``; ``certain``: whether the solver
+left no doubt that these are all; ``named``: whether signs of factors separate them, so that branches have names, else
+they are numbered), or ``iteration`` from random ``starts``, which may miss some; ``lacking``: why the arm has no closed
+form."""
+CLOSED_FORM = fact("closed_form", arm_class="spherical_wrist")
 
 
 def in_doubt(method: Method) -> Method:
@@ -160,30 +130,19 @@ def in_doubt(method: Method) -> Method:
     -------
     method : a closed form becomes its class, not certain; iteration stays, as it never is
     """
-    if isinstance(method, ClosedForm):
-        return ByClass(method.arm_class, certain=False, named=True)
-    return replace(method, certain=False) if isinstance(method, ByClass) else method
+    if is_one(method, "closed_form"):
+        return fact("by_class", arm_class=method.arm_class, certain=False, named=True)
+    return method.but(certain=False) if is_one(method, "by_class") else method
 
 
 OutOfReach = Finding
 NotFound = Finding
 
 
-class SideUnsolved(Coded):
-    """Why no branch exists with the wrist in front of axis 1, or reached over the head (back)."""
-
-    side: Literal["front", "back"]
-    why: OutOfReach
-
-
-class PoseUnsolved(Coded):
-    """Why a pose has no solution by the arm's class, or iteration found none; numbered as the poses lie in memory."""
-
-    pose: int
-    why: NotFound
-
-
-Unsolved = SideUnsolved | PoseUnsolved
+Unsolved = Finding
+"""``side_unsolved``: why no branch exists with the wrist in front of axis 1, or reached over the head (back).
+``pose_unsolved``: why a pose has no solution by the arm's class, or iteration found none; numbered as the poses lie in
+memory."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -220,7 +179,7 @@ class Solutions(ByValue, Displayed):
     solved: Flags
     within_limits: Flags
     branch: Integers
-    method: Method = ClosedForm()
+    method: Method = CLOSED_FORM
     unsolved: tuple[Unsolved, ...] = ()
     families: Sequence[Family | SelfMotionCurve] = ()
     turn_range: NDArray[np.int8] | None = None
@@ -239,7 +198,7 @@ class Solutions(ByValue, Displayed):
     @cached_property
     def label(self) -> NDArray[np.object_]:
         """(...,), each branch's code (``configuration.BranchLabel``), or ``found_arm`` where they are numbered."""
-        names = slot_labels(self.robot) if not isinstance(self.method, Iteration) else ()
+        names = slot_labels(self.robot) if not is_one(self.method, "iteration") else ()
         if not names:
             return np.full(self.branch.shape, "found_arm", dtype=object)
         padded = [*names, *["found_arm"] * max(0, int(self.branch.max(initial=0)) + 1 - len(names))]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import gettext
 import io
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
@@ -168,7 +169,9 @@ def as_text(part: Any, spec: str = "") -> str:
     spec : its format, as of ``format``
     """
     text = format(part, spec)
-    return as_number(text) if isinstance(part, Real) else text
+    if not isinstance(part, Real):
+        return text
+    return as_number(text if re.search("[1-9n]", text) else text.replace("-", ""))
 
 
 def as_number(text: str) -> str:
@@ -259,17 +262,15 @@ def translated(context: str, text: str) -> str:
     return found if found != text else _catalogue.gettext(text)
 
 
-def by_key(key: str, english: str, count: int | None = None) -> str:
+def by_key(key: str, english: str) -> str:
     """A text in the language in use, looked up by its key.
 
     Parameters
     ----------
     key : under which the catalogue has it
     english : returned where the catalogue has none
-    count : chooses between singular and plural; None for texts without
     """
-    catalogue = _catalogue
-    found = catalogue.pgettext(KEYED, key) if count is None else catalogue.npgettext(KEYED, key, key, count)
+    found = _catalogue.pgettext(KEYED, key)
     return english if found == key else found
 
 
@@ -282,3 +283,18 @@ def _load(file: Path) -> gettext.NullTranslations:
         write_mo(compiled, read_po(source))
     compiled.seek(0)
     return gettext.GNUTranslations(compiled)
+
+
+def first_sentence(text: str) -> tuple[str, str]:
+    """A text up to the end of its first sentence, and the rest.
+
+    Parameters
+    ----------
+    text : in English or Chinese
+
+    Returns
+    -------
+    first, rest : the rest is empty for a single sentence
+    """
+    end = re.search(r"\.(?= )|。", text)
+    return (text[: end.end()], text[end.end() :].strip()) if end else (text, "")

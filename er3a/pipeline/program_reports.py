@@ -27,14 +27,14 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import fact, is_one
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.language import as_text
-from er3a.pipeline.messages.programs import remedy, say
-from er3a.pipeline.messages.say import excerpt
-from er3a.pipeline.messages.scope import gap_text
+from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.say import excerpt, say
+from er3a.pipeline.messages.scope import gap_text, not_checked
 from er3a.pipeline.progress import TimeOverError, time_limit
-from er3a.pipeline.results import NotChecked, plain
+from er3a.pipeline.results import plain
 from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
 from er3a.pipeline.scope import Check as Checked
 from er3a.pipeline.stages.covered import covered_units, gaps_of_program
@@ -349,7 +349,7 @@ def missed_line(missed: tuple[Open, ...]) -> str:
     -------
     line : one sentence; empty where nothing is missing
     """
-    return say(NotChecked(missed_checks(missed))) if missed else ""
+    return not_checked(missed_checks(missed)) if missed else ""
 
 
 def missed_checks(missed: tuple[Open, ...]) -> tuple[Coverage, ...]:
@@ -423,9 +423,7 @@ def _place_record(place: Place) -> dict[str, Any]:
 
 
 def _finding_record(each: LocatedFinding) -> dict[str, Any]:
-    record = plain(each.finding)
-    own = record["params"] if isinstance(each.finding, Finding) else record
-    params = {key: value for key, value in own.items() if key not in ("place", "code")}
+    params = {key: value for key, value in plain(each.finding.params).items() if key != "place"}
     return {
         **_place_record(each.place),
         "level": each.level,

@@ -26,11 +26,11 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform
 
 from pydantic import ValidationError
 
-from er3a.by_value import KINDS, ByValue, Coded
+from er3a.by_value import KINDS, ByValue
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
-from er3a.finding import AnyFinding, Finding, plain
+from er3a.finding import AnyFinding, Finding, fact, plain
 from er3a.finding import Finding as Found
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.language import N_
@@ -39,7 +39,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 9
+FORMAT_VERSION = 10
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
@@ -68,10 +68,10 @@ class Verdict(Generic[FindingT]):
     missed: tuple[Coverage, ...] = ()
 
     @property
-    def findings(self) -> tuple[FindingT | NotChecked | Finding, ...]:
-        """What it found, then what was not checked and what was assumed, each a sentence."""
+    def findings(self) -> tuple[FindingT | Finding, ...]:
+        """What it found, what was not checked (``not_checked``: no verdict passes with it), and what was assumed."""
         named = tuple(each for each in self.missed if each.gaps)
-        missed = (NotChecked(named),) if named and self.status == "caution" else ()
+        missed = (fact("not_checked", checks=named),) if named and self.status == "caution" else ()
         return (self.finding, *missed, *((self.shapes,) if self.shapes else ()))
 
     def covering_less(self, missed: tuple[Coverage, ...]) -> Verdict[FindingT]:
@@ -120,12 +120,6 @@ class Figure:
     unit: str
     uncertainty: float | None = None
     of: int | None = None
-
-
-class NotChecked(Coded):
-    """What was to be checked and was not, or not all of it: no verdict passes without it."""
-
-    checks: tuple[Coverage, ...]
 
 
 @dataclass_transform(frozen_default=True)

@@ -37,12 +37,12 @@ from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRules, MotionPath
+from er3a.program_check.program_check_findings import with_touches_of
 from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
-from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.syntax import Fixed, Move, Program
 from er3a.robots.robot import Robot
 
@@ -294,7 +294,7 @@ def _located(
         if isinstance(what := step.instruction, Unknown):
             reason: found_in.NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
             text = (
-                NotUnderstood(what.text, step.place)
+                fact("program_not_understood", text=what.text, place=step.place)
                 if what.stops
                 else fact("not_followed", text=what.text, reason=reason)
             )
@@ -330,9 +330,9 @@ def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     level = max((each.level for each in same), key=found_in.RANKS.__getitem__)
     grave = [each for each in same if each.level == level]
     first, found = grave[0], max((each.finding for each in grave), key=found_in.gravity)
-    if isinstance(first.finding, found_in.MotionCollides):
-        others = [each.finding for each in same if isinstance(each.finding, found_in.MotionCollides)]
-        found = first.finding.with_touches_of(others)
+    if is_one(first.finding, "motion_collides"):
+        others = [each.finding for each in same if is_one(each.finding, "motion_collides")]
+        found = with_touches_of(first.finding, others)
     elif (at_mm := getattr(first.finding, "at_mm", None)) is not None:
         found = found.but(at_mm=at_mm)
     return replace(first, finding=found, times=len(same))

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Literal
 
-from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.finding import Amount, Finding, is_one
 from er3a.programs.instructions import Unresolved
-from er3a.programs.program_findings import ProgramFinding
 
 Level = Literal["pass", "note", "caution", "fail"]
 RANKS: dict[Level, int] = {"pass": 0, "note": 1, "caution": 2, "fail": 3}
@@ -34,58 +31,40 @@ NotFollowedReason = Literal[
 ]
 
 
-class BodiesTouch(Coded):
-    """Two bodies that overlap on the way, from a time (s) of the motion on, and a place of a line; how deep at most.
+def is_certain(touch: Finding) -> bool:
+    """Whether two bodies overlap by more than their shapes are too large.
 
-    ``at_target``: whether they overlap at the motion's end. ``enlarged_mm``: by how much their shapes are larger than
-    the meshes in them; an overlap by less is no contact for sure.
+    Parameters
+    ----------
+    touch : ``bodies_touch``: of ``pair``, from a time (``t_s``) of the motion on, and a place of a line (``at_mm``);
+        ``depth_mm`` at most. ``at_target``: whether they overlap at the motion's end. ``enlarged_mm``: by how much
+        their shapes are larger than the meshes in them; an overlap by less is no contact for sure
     """
-
-    pair: Pair
-    t_s: float
-    at_mm: float | None
-    depth_mm: float
-    at_target: bool = False
-    enlarged_mm: float = 0.0
-
-    @property
-    def is_certain(self) -> bool:
-        """Whether the bodies overlap by more than their shapes are too large."""
-        return self.depth_mm > self.enlarged_mm
+    return bool(touch.depth_mm > touch.enlarged_mm)
 
 
-class MotionCollides(Coded):
-    """Bodies overlap during the motion, in the order of first contact; ``assumed``: by shapes of the arm that no
-    document gives, and by none of what is carried."""
+def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
+    """A collision, together with what was found for other ways to the same motion.
 
-    touches: tuple[BodiesTouch, ...]
-    assumed: bool = False
+    Parameters
+    ----------
+    found : ``motion_collides``: ``touches`` in the order of first contact; ``assumed``: by shapes of the arm that no
+        document gives, and by none of what is carried
+    others : findings of the same instruction
 
-    @property
-    def at_mm(self) -> float | None:
-        """How far the tool has come when the first bodies touch; None of a joint move."""
-        return self.touches[0].at_mm
-
-    def with_touches_of(self, others: Iterable[MotionCollides]) -> MotionCollides:
-        """The same collision, together with what was found for other ways to the same motion.
-
-        Parameters
-        ----------
-        others : findings of the same instruction
-
-        Returns
-        -------
-        finding : each pair with its greatest depth; pairs that touch only in the others follow
-        """
-        deepest: dict[Pair, BodiesTouch] = {touch.pair: touch for touch in self.touches}
-        for touch in (touch for other in others for touch in other.touches):
-            first = deepest.setdefault(touch.pair, touch)
-            depth, at_target = max(first.depth_mm, touch.depth_mm), first.at_target or touch.at_target
-            deepest[touch.pair] = replace(first, depth_mm=depth, at_target=at_target)
-        return MotionCollides(tuple(deepest.values()), self.assumed)
+    Returns
+    -------
+    finding : each pair with its greatest depth; pairs that touch only in the others follow
+    """
+    deepest: dict[Pair, Finding] = {touch.pair: touch for touch in found.touches}
+    for touch in (touch for other in others for touch in other.touches):
+        first = deepest.setdefault(touch.pair, touch)
+        depth, at_target = max(first.depth_mm, touch.depth_mm), first.at_target or touch.at_target
+        deepest[touch.pair] = first.but(depth_mm=depth, at_target=at_target)
+    return found.but(touches=tuple(deepest.values()))
 
 
-CheckFinding = ProgramFinding | Finding | MotionCollides
+CheckFinding = Finding
 
 FAILS = frozenset(
     (
@@ -118,8 +97,8 @@ def level_of(finding: CheckFinding) -> Level:
             return "fail" if refused else "caution" if word else "note"
         case Finding(code="suspect_number", kind="impossible_speed" | "mm" | "mm/s"):
             return "fail"
-        case MotionCollides(touches=touches, assumed=assumed):
-            return "fail" if not assumed and any(touch.is_certain for touch in touches) else "caution"
+        case Finding(code="motion_collides", touches=touches, assumed=assumed):
+            return "fail" if not assumed and any(map(is_certain, touches)) else "caution"
     if finding.code in FAILS:
         return "caution" if getattr(finding, "basis", "") == "assumed" else "fail"
     return "note" if finding.code in NOTES else "caution"

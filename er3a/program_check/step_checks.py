@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import CarriedAndSolid, Pair
+from er3a.collision.pairs import Pair, names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by
 from er3a.errors import PoseError
-from er3a.finding import Amount, fact, is_one
+from er3a.finding import Amount, Finding, fact, is_one
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import forward
@@ -434,22 +434,23 @@ class Obstacles(ByValue):
             touches_there = self.bodies.min_distance(path.at(np.array([middle])))[0][0] < 0
             clear, first = (clear, middle) if touches_there else (middle, first)
         every = np.arange(len(self.bodies.pairs))
-        touches: dict[Pair, found_in.BodiesTouch] = {}
+        touches: dict[Pair, Finding] = {}
         shares = np.linspace(first, share[int(rows[-1])], MOST_TOUCHING)
         for at, joints in zip(shares.tolist(), path.at(shares)):
             depths = -1000 * self.bodies.distances(joints, every)
             for k in np.flatnonzero(depths > 0).tolist():
                 name = self.bodies.pairs[k]
                 when, where = float(path.law.times(np.array(at))), path.along_mm(at) if path.of_tool else None
-                enlarged = 1000 * enlarged_by(self.robot, self.scene, name.names)
-                before = touches.get(name, found_in.BodiesTouch(name, when, where, 0.0, False, enlarged))
-                touches[name] = found_in.BodiesTouch(
-                    name, before.t_s, before.at_mm, max(before.depth_mm, float(depths[k])), at > 1 - 1e-9, enlarged
-                )
+                enlarged = 1000 * enlarged_by(self.robot, self.scene, names_of(name))
+                touch = {"pair": name, "t_s": when, "at_mm": where, "enlarged_mm": enlarged}
+                before = touches.get(name, fact("bodies_touch", depth_mm=0.0, **touch))
+                depth = max(before.depth_mm, float(depths[k]))
+                touches[name] = before.but(depth_mm=depth, at_target=at > 1 - 1e-9)
         if not touches:
             return {}
-        given = any(isinstance(each.pair, CarriedAndSolid) for each in touches.values())  # by the scene, not the arm
-        hit = found_in.MotionCollides(tuple(touches.values()), arm_shapes(self.robot).assumed and not given)
+        given = any(is_one(each.pair, "carried_and_solid") for each in touches.values())  # by the scene, not the arm
+        assumed = arm_shapes(self.robot).assumed and not given
+        hit = fact("motion_collides", touches=tuple(touches.values()), assumed=assumed)
         return {hit: float(first)}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:

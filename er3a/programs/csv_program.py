@@ -26,7 +26,7 @@ from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import NotUnderstood, ProgramFinding
+from er3a.programs.program_findings import ProgramFinding
 from er3a.programs.program_language import Language
 from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
@@ -122,7 +122,10 @@ def read_csv_program(source: ProgramText) -> Program:
     if table and not _units_checked(head, rows[1:]):
         _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
     other = [name for name in head if name not in (*names, TIME, *POSE_COLUMNS, UNITS_CHECKED)]
-    unread = [NotUnderstood(f"the column {name[:40]}", Place(source.path, kept[0][0])) for name in other]
+    unread = [
+        fact("program_not_understood", text=f"the column {name[:40]}", place=Place(source.path, kept[0][0]))
+        for name in other
+    ]
     findings: tuple[ProgramFinding, ...] = (
         *unread,
         *(() if table else (fact("program_nothing_moves"),)),

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from er3a.by_value import Coded
 from er3a.finding import Finding
-from er3a.programs.instructions import Place
 
-
-class NotUnderstood(Coded, code="program_not_understood"):
-    """A piece of text that is kept, but not understood."""
-
-    text: str
-    place: Place
-
-
-ProgramFinding = NotUnderstood | Finding
+ProgramFinding = Finding
+"""``program_not_understood``: a piece of ``text`` at a ``place`` that is kept, but not understood."""
 
 
 WriteFinding = Finding

@@ -135,7 +135,7 @@ def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
         return fact("other_branch", branch=int(solutions.branch[other]), label=solutions.label[other])
     turns = solutions.turn[other] - solutions.turn[chosen]
     turned = tuple(fact("joint_turned", joint=int(j) + 1, turn_deg=int(360 * turns[j])) for j in np.flatnonzero(turns))
-    return fact("other_turns", joints=turned) if turned else fact("other_free_joint")
+    return fact("other_turns", joints=turned)
 
 
 def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:

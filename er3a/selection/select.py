@@ -27,7 +27,7 @@ from er3a.collision.along import bodies_of, clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.scene import Scene
 from er3a.errors import Er3aError, ShapeError
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Amount, Finding, fact, is_one
 from er3a.kinematics.inverse import checked_reference
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.kinematics.solutions import Solutions
@@ -315,7 +315,7 @@ def select(
     order = _ordered(robot, solutions, list(weights), cost, allowed, q_ref)
     place = {int(row): rank + 1 for rank, row in enumerate(order)}
     measures = [
-        tuple(fact("measure", rule=name, value=float(measured[name][row]), unit=units[name]) for name in weights)
+        tuple(fact("measure", rule=name, value=Amount(float(measured[name][row]), units[name])) for name in weights)
         for row in range(len(solutions.q))
     ]
     reason = tuple(why or fact("placed", place=place[row], measures=measures[row]) for row, why in enumerate(refused))

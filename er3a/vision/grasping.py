@@ -244,16 +244,16 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
         margins = np.minimum(margins, _ratio(clear.distance, needs.clearance))
         free = clear.distance >= needs.clearance
         if not free.any():
-            best = int(clear.distance.argmax())
+            best = clear.distance.argmax()
             pair = clear.pair[best]
             if pair is not None:
-                wanted = 1000 * needs.clearance
                 return [], fact(
                     "grasp_collides",
+                    part=None,
                     solutions=len(regular),
                     pair=pair,
                     clearance_mm=float(1000 * clear.distance[best]),
-                    needed_mm=wanted,
+                    needed_mm=1000 * needs.clearance,
                 )
         regular, margins = regular[free], margins[free]
     far = np.abs(q[regular] - task.home).max(axis=1)

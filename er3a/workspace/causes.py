@@ -10,13 +10,12 @@ references do.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from er3a.by_value import Coded
+from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.arcs import FULL_TURN
@@ -36,54 +35,35 @@ Side = Literal["lower", "upper"]
 _SIDES: tuple[Side, Side] = ("lower", "upper")
 
 
-@dataclass(frozen=True)
-class Relaxed:
+Relaxed = Finding
+VoidCause = Finding
+"""``void_disappears``: one limit alone makes the void, or each of two (``limits``, each a :func:`relaxed_limit`).
+``void_of_several_limits``: only several limits together make it. ``void_of_geometry``: part of it, ``remaining_ratio``,
+stays without any limit. ``most`` is the limit that shrinks it most, if one does, else None."""
+
+
+def relaxed_limit(
+    joints: tuple[int, ...], factors: tuple[float, ...], side: Side, unit: Unit, limit: float, step: tuple[float, float]
+) -> Relaxed:
     """One limit widened: of a joint, or of a sum of joints.
 
-    Attributes
+    Parameters
     ----------
     joints, factors : from 1, and what they count in the sum; of a joint's own limit this joint, and 1
     unit : "mm" where the joints slide; of a sum of revolute and prismatic joints "deg", as its limits are
     limit : as it is, in ``unit``
-    by : by how much it is widened: the smallest of ``STEPS[unit]`` that fills the void, or the largest; of a
-        sum that this leaves in force at some joints, by as much as takes it away, in whole ``unit``
-    filled : ratio of the void that is then reached
+    step : by how much it is widened: the smallest of ``STEPS[unit]`` that fills the void, or the largest; of a
+        sum that this leaves in force at some joints, by as much as takes it away, in whole ``unit``; and the ratio of
+        the void that is then reached
+
+    Returns
+    -------
+    finding : with ``by``, ``filled`` and ``extended``, the limit as it would be
     """
-
-    joints: tuple[int, ...]
-    factors: tuple[float, ...]
-    side: Side
-    unit: Unit
-    limit: float
-    by: float
-    filled: float
-
-    @property
-    def extended(self) -> float:
-        """The limit as it would be."""
-        return self.limit + (self.by if self.side == "upper" else -self.by)
-
-
-class Disappears(Coded, code="void_disappears"):
-    """One limit alone makes the void, or each of two."""
-
-    limits: tuple[Relaxed, ...]
-
-
-class SeveralLimits(Coded, code="void_of_several_limits"):
-    """Only several limits together make the void; ``most`` is the one that shrinks it most, if one does."""
-
-    most: Relaxed | None
-
-
-class Geometry(Coded, code="void_of_geometry"):
-    """Part of the void stays without any limit; ``most`` is the limit that shrinks it most, if one does."""
-
-    remaining_ratio: float
-    most: Relaxed | None
-
-
-VoidCause = Disappears | SeveralLimits | Geometry
+    by, filled = step
+    extended = limit + (by if side == "upper" else -by)
+    named = {"joints": joints, "factors": factors, "side": side, "unit": unit}
+    return fact("relaxed_limit", limit=limit, by=by, filled=filled, extended=extended, **named)
 
 
 def relaxations(robot: Robot, cavity: Cavity) -> tuple[list[Relaxed], float]:
@@ -163,7 +143,7 @@ def _relaxed(limit: _Limit, filled: Callable[[Robot], float]) -> Relaxed:
         steps = (*steps, float(np.ceil(limit.idle / scale)))
 
     def widened_by(step: float) -> Relaxed:
-        return Relaxed(*limit[:4], limit.value / scale, step, filled(limit.widened(step * scale)))
+        return relaxed_limit(*limit[:4], limit.value / scale, (step, filled(limit.widened(step * scale))))
 
     most = widened_by(steps[-1])
     if most.filled < _GONE:
@@ -203,12 +183,13 @@ def cause_of(single: list[Relaxed], unlimited: float) -> VoidCause:
     """
     gone = [limit for limit in single if limit.filled >= _GONE]
     if gone:
-        return Disappears(tuple(each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by))[:2])
+        alike = [each for each in gone if (each.unit, each.by) == (gone[0].unit, gone[0].by)]
+        return fact("void_disappears", limits=tuple(alike[:2]))
     strongest = max(single, key=lambda limit: limit.filled, default=None)
     most = strongest if strongest is not None and strongest.filled >= _SHRUNK else None
     if unlimited >= _GONE:
-        return SeveralLimits(most)
-    return Geometry(1 - unlimited, most)
+        return fact("void_of_several_limits", most=most)
+    return fact("void_of_geometry", remaining_ratio=1 - unlimited, most=most)
 
 
 def _widened(robot: Robot, joint: int, side: Side, by: float) -> Robot:
@@ -257,30 +238,10 @@ UNITS: dict[Column, EntryUnit] = {
 IN_SI: dict[EntryUnit, float] = {"deg": np.pi / 180, "mm": 1e-3, "": 1.0}
 
 
-@dataclass(frozen=True)
-class SingleChange:
-    """One entry changed.
-
-    Attributes
-    ----------
-    column : of the table; "lower" and "upper" are limits
-    joint : 1 to 6
-    given, tried : in ``unit``
-    left_litres : bounds of the changed arm's enclosed voids together, as far as a coarse proof finds them; None where
-        it leaves too much undecided, which joins voids to the outside
-    """
-
-    column: Column
-    joint: int
-    unit: EntryUnit
-    given: float
-    tried: float
-    left_litres: tuple[float, float] | None
-
-    @property
-    def entry(self) -> str:
-        """Column and joint, as "offset2"."""
-        return f"{self.column}{self.joint}"
+SingleChange = Finding
+"""One entry changed: ``column`` of the table ("lower" and "upper" are limits), ``joint`` 1 to 6, ``given`` and
+``tried`` in ``unit``. ``left_litres``: bounds of the changed arm's enclosed voids together, as far as a coarse
+proof finds them; None where it leaves too much undecided, which joins voids to the outside."""
 
 
 def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleChange, ...]:
@@ -300,8 +261,11 @@ def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleCha
         proof = prove_general(general_arm(with_entry(robot, column, joint, tried))[0], TARGET, CELLS, seed)
         enclosed = cavities(SectionMap(proof))[0] if proof.width <= SETTLED else None
         left = None if enclosed is None else (_litres(enclosed, "lower"), _litres(enclosed, "upper"))
-        found.append(SingleChange(column, joint, UNITS[column], given, tried, left))
-    return tuple(sorted(found, key=lambda each: ((each.left_litres or (0, np.inf))[1], each.entry, each.tried)))
+        change = {"given": given, "tried": tried, "left_litres": left}
+        found.append(fact("single_change", column=column, joint=joint, unit=UNITS[column], **change))
+    return tuple(
+        sorted(found, key=lambda each: ((each.left_litres or (0, np.inf))[1], each.column, each.joint, each.tried))
+    )
 
 
 def _litres(voids: Sequence[Cavity], bound: Literal["lower", "upper"]) -> float:
@@ -355,6 +319,6 @@ def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
 
 def _named(cause: VoidCause) -> Sequence[Relaxed]:
     """The limits that a cause names."""
-    if isinstance(cause, Disappears):
-        return cause.limits
+    if is_one(cause, "void_disappears"):
+        return tuple(cause.limits)
     return () if cause.most is None else (cause.most,)

@@ -7,10 +7,11 @@ import pytest
 
 from er3a.collision.along import STEP, _Motion, clearance, clearance_along, first_overlap
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import LinkAndSolid, LinkPair
+from er3a.collision.pairs import label_of
 from er3a.collision.scene import Cylinder, Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import SceneFile
+from er3a.finding import fact, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.planning.moves import JointMove, line
@@ -53,7 +54,7 @@ def test_thin_obstacle_between_two_points_is_found(robot, obstacle):
     found = along(robot, scene, move)
     assert (clearance(robot, move.joints(ENDS)[0], scene).distance > 0.05).all()
     (contact,) = found.contacts
-    assert LinkAndSolid(6, solid["name"]) in contact.pairs
+    assert fact("link_and_solid", link=6, solid=solid["name"]) in contact.pairs
     assert 0 < contact.start < 0.5 < contact.end < 1
     edges = clearance(robot, move.joints(np.array([contact.start, contact.end]))[0], scene)
     np.testing.assert_allclose(edges.distance, 0, atol=1e-6)
@@ -142,7 +143,7 @@ def test_arm_that_folds_into_itself_is_found():
     followed, curve = follow_as_curve(robot, path, t)
     found = clearance_along(Bodies(robot, None), followed.joints, curve.rate_bounds, followed.t, t, DEPTH)
     (contact,) = found.contacts
-    assert all(isinstance(pair, LinkPair) for pair in contact.pairs)
+    assert all(is_one(pair, "link_pair") for pair in contact.pairs)
     edge = clearance(robot, followed.joints(np.array([contact.start])), None).distance
     np.testing.assert_allclose(edge, 0, atol=1e-6)
 
@@ -179,5 +180,5 @@ def test_a_stored_motion_is_compared_with_solids_between_its_rows():
     found = first_overlap(robot, scene, t, q)
     assert found is not None
     assert 0 <= found[0] - share[hit.argmax()] <= STEP / 3
-    assert found[1].label.endswith("post")
+    assert label_of(found[1]).endswith("post")
     assert first_overlap(robot, scene, t, np.where(np.arange(6) == 0, np.pi, q)) is None

@@ -8,7 +8,6 @@ import yaml
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import LinkAndSolid, LinkPair
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_bodies, arm_shapes, default_envelopes, link_frames
 from er3a.dynamics.arm_model import estimated_links
@@ -16,6 +15,7 @@ from er3a.errors import InputError, InputWarning
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile, load_scene
+from er3a.finding import fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.robots.robot import ConvexPiece, Envelope
 from testing.arms import joints_at_random, placement
@@ -70,7 +70,7 @@ def test_distances_from_solids_are_those_of_geometry(robot, random):
             least = min(
                 segment_distances(line[None], exact[kind]) - capsule.radius for line, capsule in zip(ends, capsules)
             )
-            if isinstance(pair, LinkAndSolid):
+            if is_one(pair, "link_and_solid"):
                 assert distance == pytest.approx(least, abs=1e-4)
             else:
                 assert distance <= least + 1e-4
@@ -97,7 +97,7 @@ def test_arm_that_reaches_into_its_base_collides_with_itself(random):
     q = joints_at_random(arm, random, 400)
     clear = clearance(arm, q, None)
     assert (clear.distance < 0).any()
-    assert LinkPair(0, 6) in clear.pair
+    assert fact("link_pair", first=0, second=6) in clear.pair
 
 
 def test_scene_file_is_used_as_written():

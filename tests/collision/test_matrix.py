@@ -11,13 +11,14 @@ import pytest
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
-from er3a.collision.pairs import CarriedAndLink, CarriedAndSolid, LinkPair
+from er3a.collision.pairs import label_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import InputError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.files.scene_file import SceneFile
+from er3a.finding import fact
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import ConvexPiece, Envelope, PairRule, Robot
 from testing.arms import OTHERS_LONG, made_of, make_arm
@@ -104,7 +105,7 @@ def test_bent_tool_that_enters_the_forearm_is_found():
     q[:, 4] = np.radians(np.linspace(0, 105, 43))
     clear = clearance(robot, q, None)
     assert clear.distance.min() == pytest.approx(-0.059, abs=1e-3)
-    assert clear.pair[int(clear.distance.argmin())] == LinkPair(4, 6)
+    assert clear.pair[int(clear.distance.argmin())] == fact("link_pair", first=4, second=6)
     tool = tuple(c for c in robot.envelopes if c.link == 4 or c.radius == 0.015)
     deepest = min(coal_distance(robot.replace(envelopes=tool), each, "link_4", "link_6") for each in q)
     assert clear.distance.min() == pytest.approx(deepest, abs=1e-6)
@@ -117,7 +118,7 @@ def test_forearm_that_folds_onto_the_upper_arm_is_seen():
     folded, straight = np.radians([[0, 0, -65, 0, 0, 0], [0, 0, 85, 0, 0, 0]])
     clear = clearance(robot, np.array([folded, straight]), None)
     assert clear.distance[0] < 0 < clear.distance[1]
-    assert clear.pair[0] == LinkPair(2, 4)
+    assert clear.pair[0] == fact("link_pair", first=2, second=4)
 
 
 def test_overlap_in_the_region_of_the_joint_is_all_that_is_left_out():
@@ -165,8 +166,8 @@ class TestFaultsOfOthers:
         rows = rows_of(again)
         assert (rows["link_2", "link_4"].state, rows["link_2", "link_4"].reason) == ("allowed", rules[0].reason)
         assert rows["base", "link_3"].state == "watched"
-        assert LinkPair(0, 3) in Bodies(again, None).pairs
-        assert LinkPair(2, 4) not in Bodies(again, None).pairs
+        assert fact("link_pair", first=0, second=3) in Bodies(again, None).pairs
+        assert fact("link_pair", first=2, second=4) not in Bodies(again, None).pairs
 
     def test_arm_without_shapes_has_a_matrix(self):
         """moveit#3351: empty without collision geometry."""
@@ -204,11 +205,11 @@ def test_what_the_tool_carries_is_looked_at_and_may_touch_what_is_allowed():
         return SceneFile.model_validate(scene | more).scene()
 
     bodies = Bodies(robot, made())
-    assert CarriedAndSolid("part", "table") in bodies.pairs
-    assert CarriedAndLink("part", 2) in bodies.pairs
-    assert not any("link_6/part" in pair.label for pair in bodies.pairs)  # a gripper's own
+    assert fact("carried_and_solid", carried="part", solid="table") in bodies.pairs
+    assert fact("carried_and_link", carried="part", link=2) in bodies.pairs
+    assert not any("link_6/part" in label_of(pair) for pair in bodies.pairs)  # a gripper's own
     allowed = {"allow": [{"pair": ["part", "table"], "reason": "it is picked up there"}]}
-    assert CarriedAndSolid("part", "table") not in Bodies(robot, made(collision=allowed)).pairs
+    assert fact("carried_and_solid", carried="part", solid="table") not in Bodies(robot, made(collision=allowed)).pairs
     q = np.radians([[0, -60, -30, 0, 60, 0]])
     assert clearance(robot, q, made()).distance[0] <= clearance(robot, q, made(carried={})).distance[0]
 
@@ -244,7 +245,7 @@ def test_a_guess_that_overlaps_at_many_poses_refuses_none_of_them_and_is_named()
     assert states["base", "link_2"] == states["link_2", "link_4"] == "guessed"
     q = quasi_random_points(arm.lower, arm.upper, 2000)
     assert np.array_equal(Bodies(bare, None).free(q), Bodies(arm, None).free(q))
-    assert Bodies(bare, None).guessed == (LinkPair(0, 2), LinkPair(2, 4))
+    assert Bodies(bare, None).guessed == (fact("link_pair", first=0, second=2), fact("link_pair", first=2, second=4))
     assert Bodies(bare, None).in_error == Bodies(arm, None).in_error == ()
     stated = bare.replace(envelopes=arm_shapes(bare).capsules)
     assert not Bodies(stated, None).free(np.radians([[0.0, 45.0, -30.0, 0.0, 60.0, 0.0]])).any()
@@ -284,20 +285,22 @@ def test_a_straight_tool_changes_nothing_across_a_wrist_of_guessed_shapes(name, 
     robot = bare_table(name, (0, 0, length_mm))
     bodies = Bodies(robot, None)
     found = bodies.overlaps(quasi_random_points(robot.lower, robot.upper, 2000))
-    assert not found[:, [k for k, pair in enumerate(bodies.pairs) if pair == LinkPair(4, 6)]].any()
+    assert not found[
+        :, [k for k, pair in enumerate(bodies.pairs) if pair == fact("link_pair", first=4, second=6)]
+    ].any()
 
 
 def test_a_bent_tool_is_watched_beyond_the_wrist_of_guessed_shapes():
     """Where it enters the forearm it refuses a pose."""
     bodies = Bodies(bare_table("irb120", (150, 0, 30)), None)
-    assert LinkPair(4, 6) in bodies.pairs
-    assert bodies.joined[bodies.pairs.index(LinkPair(4, 6))]
+    assert fact("link_pair", first=4, second=6) in bodies.pairs
+    assert bodies.joined[bodies.pairs.index(fact("link_pair", first=4, second=6))]
     q = np.zeros((2, 6))
     q[0, 4], q[1, 4] = np.radians(30), np.radians(-118)
-    found = [{pair.label for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
+    found = [{label_of(pair) for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
     assert "link_4/link_6" not in found[0]
     q[1, 5] = np.pi
-    turned = [{pair.label for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
+    turned = [{label_of(pair) for pair in np.array(bodies.pairs)[row]} for row in bodies.overlaps(q)]
     assert "link_4/link_6" in found[1] | turned[1]
 
 
@@ -321,7 +324,7 @@ def test_neighbours_between_three_parallel_axes_may_lie_side_by_side():
     assert states["link_3", "link_4"] == "joined"
     assert states["link_2", "link_4"] == "meets"
     bodies = Bodies(arm, None)
-    assert LinkPair(2, 3) in bodies.guessed
+    assert fact("link_pair", first=2, second=3) in bodies.guessed
     assert bodies.free(np.radians([[0.0, -90.0, 145.0, -90.0, -90.0, 0.0]])).all()
 
 
@@ -366,7 +369,11 @@ def test_what_overlaps_in_every_pose_without_a_joint_is_an_error_of_the_shapes()
     swollen = robot.replace(envelopes=(Envelope(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 3.0), *robot.envelopes[1:]))
     rows, bodies = rows_of(swollen), Bodies(swollen, None)
     assert {names[1] for names, row in rows.items() if row.state == "overlaps"} == {"link_3", "link_4", "link_6"}
-    assert bodies.in_error == (LinkPair(0, 3), LinkPair(0, 4), LinkPair(0, 6))
+    assert bodies.in_error == (
+        fact("link_pair", first=0, second=3),
+        fact("link_pair", first=0, second=4),
+        fact("link_pair", first=0, second=6),
+    )
     assert not {pair for pair in bodies.pairs if pair in bodies.in_error}
     q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (200, 6))
     alone = Bodies(robot.replace(envelopes=robot.envelopes[1:]), None)

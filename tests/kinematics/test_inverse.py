@@ -14,7 +14,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots
-from er3a.pipeline.messages.kinematics import say
+from er3a.pipeline.messages import kinematics  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent
 from testing.arms import (
     DEG,

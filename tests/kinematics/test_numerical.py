@@ -15,7 +15,8 @@ from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.numerical import _E, _ROWS, _TARGET, LANES, _evaluate, all_found, new_lanes, solve, uniform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
-from er3a.pipeline.messages.kinematics import say
+from er3a.pipeline.messages import kinematics  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import within
 from testing.arms import DEG, arms, joints_at_random, joints_within, make_arm, placement, pose_errors
 from testing.singular_poses import CLASSES, joints_near

@@ -7,10 +7,10 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from er3a.finding import fact
 from er3a.kinematics.classes.chain_solvers import chain_solver
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.solutions import DependentJoints, Iteration
 from er3a.robots.robot import Robot
 from testing.arms import links_of_rows
 
@@ -129,7 +129,7 @@ def test_slides_that_are_always_parallel_are_said_to_be_dependent(random):
     arm = robot((a, alpha, d, offset), sliding)
     q = random.uniform(-1, 1, 6)
     found = inverse(arm, poses((a, alpha, d, offset), sliding, q[None])[0], q)
-    assert found.method == Iteration(found.method.starts, DependentJoints())
+    assert found.method == fact("iteration", starts=found.method.starts, lacking=fact("dependent_joints"))
     assert away(found.q, q, sliding).min() < 1e-6
 
 

@@ -17,7 +17,8 @@ from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partition_missing, wrist_partitioned_arm
-from er3a.pipeline.messages.kinematics import say
+from er3a.pipeline.messages import kinematics  # noqa: F401
+from er3a.pipeline.messages.say import say
 from testing.arms import DEG, OTHERS_LONG, joints_at_random, make_arm, number, placement, pose_errors
 
 SIDEWAYS = {"a": [0, 0.4318, 0.0203, 0, 0, 0], "d": [0.66, 0, 0.15, 0.4318, 0, 0.05]}

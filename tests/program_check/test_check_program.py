@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from er3a.collision.pairs import label_of
 from er3a.collision.scene import Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import ShapeError
@@ -158,7 +159,7 @@ def test_what_a_line_meets_has_the_time_of_its_place(name, code):
     check = check_program(read_program(FAULTS / f"{name}.src"), ROBOT, CheckOptions(start=HOME, scene=scene))
     found = next(each for each in check.findings if each.finding.code == code)
     speed, acceleration = 0.2, 2.0  # m/s of the program's $VEL.CP; m/s^2 that are assumed
-    way = found.finding.at_mm / 1000
+    way = getattr(found.finding, "touches", [found.finding])[0].at_mm / 1000
     assert way > speed**2 / acceleration / 2  # behind the ramp up
     assert found.moment == pytest.approx(way / speed + speed / acceleration / 2, abs=1e-4)
     assert check.execution.steps[found.step].place.line == found.place.line
@@ -247,7 +248,7 @@ def test_a_loop_tells_each_pair_that_touches_in_any_round_as_deep_as_in_all(tmp_
     there = f"F.Y={y}+130*I\nLIN F\nF.Z={z}-90-50*I\nLIN F\nF.Z={z}\nLIN F"
     check = checked(f"{dips}{there}\nENDFOR", tmp_path, scene=scene)
     down = next(each for each in check.findings if each.finding.code == "motion_collides")
-    assert [touch.pair.label.split("/")[-1] for touch in down.finding.touches] == ["near", "aside"]
+    assert [label_of(touch.pair).split("/")[-1] for touch in down.finding.touches] == ["near", "aside"]
 
 
 def test_a_start_of_another_length_is_refused(tmp_path):

@@ -10,7 +10,8 @@ from er3a.finding import Amount, fact
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import Solutions
-from er3a.pipeline.messages.kinematics import say
+from er3a.pipeline.messages import kinematics  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import CombinedLimit
 from er3a.selection.nearest import nearest

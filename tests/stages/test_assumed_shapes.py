@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from er3a.collision.pairs import ASSUMED_MARGIN, LinkPair
+from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.collision.scene import Plane, Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
-from er3a.pipeline.messages.collision import say, solid_rows
+from er3a.finding import fact
+from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
-from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.trajectory.model import RESULTS, MinClearance, is_safe
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.stages.trajectory.page.record import runs_of_path
@@ -48,7 +49,7 @@ def test_shapes_that_a_document_gives_need_no_word():
 def test_what_comes_near_to_assumed_shapes_is_a_caution(least, near):
     shapes = shapes_assumed(load_robot("er3a_c60"), 0.02, {"a": least})
     assert shapes.near == near
-    verdict = Verdict("pass", FreeSpace(0.5, 10, 5, 5, 0)).with_assumed_shapes(shapes)
+    verdict = Verdict("pass", fact("collision.free_space")).with_assumed_shapes(shapes)
     assert verdict.status == ("caution" if near else "pass")
     assert say(verdict.findings[-1]).startswith("Link shapes are assumed")
     assert ("of assumed shapes: a." in say(shapes)) == bool(near)
@@ -102,7 +103,7 @@ def test_the_page_of_paths_says_once_that_shapes_are_assumed(small_results, tmp_
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
-    robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, LinkPair(1, 3), 5)
+    robot, least = load_robot("er3a_c60"), MinClearance(11.2, 0.4, fact("link_pair", first=1, second=3), 5)
     (near,) = near_assumed_shapes(robot, "a", least, 0.02)
     assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
     assert near_assumed_shapes(robot, "a", least, 0.01) == near_assumed_shapes(documented(), "a", least, 0.02) == ()

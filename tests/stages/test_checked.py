@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts, solids_met
-from er3a.collision.pairs import ASSUMED_MARGIN, link_label
+from er3a.collision.pairs import ASSUMED_MARGIN, label_of, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
 from er3a.files.path_file import load_paths
@@ -29,6 +29,7 @@ from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.files.target_file import load_targets
 from er3a.files.vision_file import load_vision
+from er3a.finding import fact
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
@@ -39,7 +40,6 @@ from er3a.pipeline.messages.scope import TEXTS, assumed_text, check_name, gap_te
 from er3a.pipeline.new_study.arms import arm_of
 from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import (
-    NotChecked,
     Results,
     Summary,
     Verdict,
@@ -49,7 +49,6 @@ from er3a.pipeline.results import (
 from er3a.pipeline.scope import GAPS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.collision.compute import compute as collision
-from er3a.pipeline.stages.collision.model import FreeSpace
 from er3a.pipeline.stages.covered import covered_collisions, gaps_in_solids, gaps_of_orientations
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
 from er3a.pipeline.stages.inverse.compute import compute as inverse
@@ -72,7 +71,7 @@ from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 
 ROBOT = "er3a_c60"
 CHECKS = get_args(Check)
-FREE = FreeSpace(0.5, 1, 1, 1, 0)
+FREE = fact("collision.free_space")
 
 
 @pytest.fixture(scope="module")
@@ -233,7 +232,7 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
     import_module(STAGES[stage].messages)
     assert verdict.status == "no_reference"
     assert len(verdict.finding.demonstrations) == len(content[listed])
-    assert "nothing else to judge" in say_all(verdict.findings)
+    assert "Expected to fail, and did" in say_all(verdict.findings)
 
 
 def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
@@ -329,7 +328,7 @@ def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     assert {each.name for each in doubtful} <= set(summary.verdict.finding.of_program)
     assert all(each.verdict == "safe" for each in summary.paths), "only the program is in doubt"
     assert summary.verdict.status == "caution"
-    assert code in say(NotChecked(summary.verdict.missed))
+    assert code in say(fact("not_checked", checks=summary.verdict.missed))
     assert {name: fault.status for name, fault in ((each.name, each) for each in faults(results))} == {
         each: "caution" for each in summary.verdict.finding.of_program
     }
@@ -517,7 +516,9 @@ def test_a_number_that_looks_like_another_unit_is_no_pass_where_it_is_read(
             study.section(DynamicsSettings)
         if stage == "vision":
             load_vision(files["vision"], robot)
-        return Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
+        return Results(
+            Summary(Verdict("pass", fact("not_checked", checks=())), (), checked=(Coverage("limits", 6, 6),))
+        )
 
     written = []
     monkeypatch.setattr(STAGES[stage].module("compute"), "compute", passing)
@@ -541,7 +542,7 @@ def test_limits_that_are_assumed_are_no_pass(tmp_path, monkeypatch, grade, statu
     study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")}}
     written = []
-    passing = Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
+    passing = Results(Summary(Verdict("pass", fact("not_checked", checks=())), (), checked=(Coverage("limits", 6, 6),)))
     monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary.verdict))
     for stage in ("trajectory", "validation"):
         monkeypatch.setattr(STAGES[stage].module("compute"), "compute", lambda study, name: passing)
@@ -794,9 +795,7 @@ def test_a_shape_that_covers_a_small_part_of_its_link_is_no_pass(link, end, shar
             assert left.names == (f"{link_label(link)}: {100 * covered / table:.0f} %",)
             assert "cover less than 75 % of their length" in gap_text(left)
             assert ("parts of links" in say(assumed)) == (grade == "official")
-            summary = Summary(
-                Verdict("pass", FreeSpace(0.5, 1, 1, 1, 0)), (), checked=coverages({"self_collision": 8}, [left])
-            )
+            summary = Summary(Verdict("pass", FREE), (), checked=coverages({"self_collision": 8}, [left]))
             assert summary.verdict.status == "caution"
 
 
@@ -829,7 +828,7 @@ def test_an_allowed_pair_that_overlaps_in_few_poses_hides_something():
     arm = arm.replace(envelopes=(*shapes, far))
     q = quasi_random_points(arm.lower, arm.upper, 1024)
     plain = Bodies(arm, None)
-    (pair,) = [k for k, each in enumerate(plain.pairs) if each.label == "link_1/link_2"]
+    (pair,) = [k for k, each in enumerate(plain.pairs) if label_of(each) == "link_1/link_2"]
     assert not plain.overlaps(q)[:, pair].any()
     allowing = arm.replace(pair_rules=(PairRule("link_1", "link_2", "allow", "a test"),))
     found = {each.reason: each.names for each in open_points(allowing, None)}
@@ -918,7 +917,7 @@ def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypa
     study = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
     study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(tmp_path / f"{ROBOT}.yaml")} | (given or {})}
     written = []
-    passing = Results(Summary(Verdict("pass", NotChecked(())), (), checked=(Coverage("limits", 6, 6),)))
+    passing = Results(Summary(Verdict("pass", fact("not_checked", checks=())), (), checked=(Coverage("limits", 6, 6),)))
     monkeypatch.setattr(run, "write_results", lambda *given: written.append(given[4].summary))
     monkeypatch.setattr(STAGES["trajectory"].module("compute"), "compute", lambda study, name: passing)
     run.compute("trajectory", Study.model_validate(study), ROBOT, tmp_path)
@@ -946,7 +945,7 @@ def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
     task = planning_of(robot, settings, None, 0)
     (listed,) = listed_motions(tmp_path / "paths.yaml", task, near_singular(settings), 1)
     assert tuple(listed.open) == named
-    summary = Summary(Verdict("pass", NotChecked(())), (), checked=coverages({"reach": 1}, listed.gaps))
+    summary = Summary(Verdict("pass", fact("not_checked", checks=())), (), checked=coverages({"reach": 1}, listed.gaps))
     assert summary.verdict.status == status
 
 

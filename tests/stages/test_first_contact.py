@@ -148,7 +148,7 @@ def test_the_program_of_a_path_touches_first_what_the_path_does(made, tmp_path, 
     (collision,) = (each.finding for each in found.findings if each.finding.code == "motion_collides")
     (part,) = next(each for each in results.summary.paths if each.name == "line").collisions
     assert [each.pair for each in collision.touches] == [each.pair for each in part.cause.touches]
-    assert collision.at_mm == pytest.approx(1000 * part.s0_m, abs=0.1)
+    assert collision.touches[0].at_mm == pytest.approx(1000 * part.s0_m, abs=0.1)
     for ours, theirs in zip(collision.touches, part.cause.touches):
         assert ours.depth_mm == pytest.approx(theirs.depth_mm, abs=0.1)
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import er3a.pipeline.messages.inverse  # noqa: F401
 from er3a.collision.along import clearance
+from er3a.collision.pairs import label_of
 from er3a.errors import InputError, ResultError
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
@@ -191,7 +192,7 @@ def test_unreachable_target_is_a_verdict(computed):
     assert (target.outcome, target.expect) == ("unreachable", "unreachable")
     assert (verdict.status, verdict.finding.code) == ("caution", "inverse.all_solved")  # no scene was looked at
     assert ("too_far", ("unreachable",)) in {(one.name, one.found) for one in verdict.finding.demonstrations}
-    assert "expected to fail, and did: " in say(verdict.finding)
+    assert "Expected to fail, and did: " in say(verdict.finding)
     arm, near = load_robot(name), target.neighbours
     assert np.linalg.norm(np.array(near.shifted_to_mm) - target.xyz_mm) == pytest.approx(near.least_shift_mm)
     assert [advice.code for advice in target.advice][1] == "shift_tool"
@@ -259,7 +260,7 @@ def test_each_branch_tells_what_its_clearance_is_of(computed):
         q = meant(robot, own.q_deg[own.first_of_branch & own.within_limits])
         found = clearance(robot, q, None)
         assert ranked.measure[k] == pytest.approx(1000 * found.distance[0])
-        assert ranked.between[k] == found.pair[0].label
+        assert ranked.between[k] == label_of(found.pair[0])
     assert set(results.rankings.between[results.rankings.rule != "clearance"]) == {""}
     for target in set(ranked.target):
         told = [row[-1] for row in rule_rows(results.rankings.take(results.rankings.target == target), ["clearance"])]

@@ -19,7 +19,8 @@ from er3a.finding import fact
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import using
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.programs import remedy, say
+from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.program_reports import checked_file
 from er3a.pipeline.results import Stored, read_results
 from er3a.pipeline.settings import TrajectorySettings

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from er3a.collision.pairs import LinkAndSolid
+from er3a.collision.pairs import label_of
 from er3a.errors import InputError
 from er3a.files.path_file import ProgramPath
 from er3a.files.program_file import load_programs
@@ -149,12 +149,12 @@ def test_collisions_are_told_with_what_is_met_and_where(results, name):
     (meeting,) = path.collisions
     assert 0 < meeting.t0_s < meeting.t1_s <= path.duration_s
     assert 0 < meeting.s0_m < meeting.s1_m
-    assert "post" in {pair.solid for pair in meeting.cause.pairs if isinstance(pair, LinkAndSolid)}
-    assert meeting.cause.depth_mm == -path.clearance.least_mm
+    assert "post" in {each.pair.params.get("solid") for each in meeting.cause.touches}
+    assert max(each.depth_mm for each in meeting.cause.touches) == -path.clearance.least_mm
     assert f"post overlap from t = {meeting.t0_s:.4g} s, up to" in path_text(path)
     rows = results[name].clearance.take(results[name].clearance.path == "line_collides")
     assert path.clearance.least_mm == rows.clearance_mm.min() < 0
-    assert path.clearance.between.label == rows.between[np.argmin(rows.clearance_mm)]
+    assert label_of(path.clearance.between) == rows.between[np.argmin(rows.clearance_mm)]
     inside = (rows.t_s >= meeting.t0_s) & (rows.t_s <= meeting.t1_s)
     assert (rows.clearance_mm[inside] < 1e-3).all()
     assert (rows.clearance_mm[~inside] > 0).all()
@@ -226,7 +226,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
         assert 0 < stop.motion.done_ratio < 1
     assert paths["line_out"].strategy is None
     out = paths["line_out"]
-    assert "; out of reach from t = " in advice(out)
+    assert "out of reach from t = " in advice(out)
     assert ("End it at t = " in advice(out)) == (out.sound_end is not None)
     last, met = paths["line_collides"].clear_until, paths["line_collides"].collisions[0]
     assert 0 < last.t_s < met.t0_s
@@ -665,7 +665,7 @@ def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, st
 
 def test_the_readme_tells_of_the_path_that_it_shows_as_the_stage_does(results):
     path = by_name(results["er3a_c60"])["line_collides"]
-    met = {pair for part in path.collisions for pair in part.cause.pairs}
+    met = {each.pair for part in path.collisions for each in part.cause.touches}
     assert {(pair.link, pair.solid) for pair in met} == {(4, "post"), (6, "post")}
     assert f"links 4 and 6 meet a post from {path.collisions[0].t0_s:.3f} s on" in answer("Is a path safe")
     assert f"{path.collisions[0].t0_s:.3f} s" in (README.parent / "README.zh-CN.md").read_text(encoding="utf-8")

@@ -21,7 +21,7 @@ from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline.messages.scope import assumed_text
 from er3a.pipeline.stages.workspace.compute import _assumed
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
-from er3a.pipeline.stages.workspace.model import CellLookup, ToolPointsElsewhere
+from er3a.pipeline.stages.workspace.model import CellLookup
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
 from er3a.pipeline.stages.workspace.page.tray import placing
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
@@ -134,7 +134,7 @@ def test_an_arm_without_a_known_inverse_is_told_so():
 def test_a_tool_that_points_elsewhere_is_told_so():
     robot = scara()
     found = tool_capability(robot, settings(placement={"tool_direction": [1, 0, 0]}), 0.15)
-    assert isinstance(found.placement, ToolPointsElsewhere)
+    assert is_one(found.placement, "workspace.tool_points_elsewhere")
     context = context_of(robot, found)
     assert context["nowhere"].startswith("Nowhere: the arm can't tilt its tool")
     assert context["tray_line"].startswith("Tray of")

@@ -7,13 +7,15 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.workspace import say
+from er3a.pipeline.messages import workspace  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.workspace.compute import judge
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
 from er3a.sampling.tally import search_reach
-from er3a.workspace.causes import Disappears, Relaxed
+from er3a.workspace.causes import relaxed_limit
 from er3a.workspace.proven import cavities, prove_robot
 from er3a.workspace.voids import Void, convex_hull, inside_hull
 from tests.stages.workspace_arms import SEED, extreme_points, tally_of, two_link_arm
@@ -81,7 +83,7 @@ def test_a_locked_arm_stays_on_its_sphere():
 
 
 def void_record(at_shoulder: bool) -> Void:
-    limit = Relaxed((3,), (1.0,), "upper", "deg", 75.0, 15.0, 1.0)
+    limit = relaxed_limit((3,), (1.0,), "upper", "deg", 75.0, (15.0, 1.0))
     return Void(
         kind="enclosed",
         lower=0.002,
@@ -89,7 +91,7 @@ def void_record(at_shoulder: bool) -> Void:
         centroid=np.array([0.1, -0.2, 0.0004]),
         low=np.full(3, -0.05),
         high=np.full(3, 0.05),
-        cause=Disappears((limit,)),
+        cause=fact("void_disappears", limits=(limit,)),
         holds_shoulder=at_shoulder,
         vertices=np.empty((0, 3)),
         triangles=np.empty((0, 3), dtype=np.int64),
@@ -114,7 +116,9 @@ def test_an_enclosed_void_away_from_the_shoulder_is_never_passed_over(voids, und
 
 def test_a_verdict_says_which_limit_makes_the_void():
     verdict = judge(1 / 6, [void_record(False)], 0.02)
-    assert verdict.finding.cause == Disappears((Relaxed((3,), (1.0,), "upper", "deg", 75.0, 15.0, 1.0),))
+    assert verdict.finding.cause == fact(
+        "void_disappears", limits=(relaxed_limit((3,), (1.0,), "upper", "deg", 75.0, (15.0, 1.0)),)
+    )
     assert "J3 ≤ 75 deg; it disappears at J3 ≤ 90 deg" in say(verdict.finding)
 
 

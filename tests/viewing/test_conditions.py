@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import er3a.pipeline.messages.dynamics  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
@@ -18,13 +19,11 @@ from er3a.identifiability.reactions import CheckCounts, CheckTally
 from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.pages import caveat
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import say_reserved
-from er3a.pipeline.messages.validation import how_far_off, settled_parts, unconfirmed
-from er3a.pipeline.messages.vision import say
-from er3a.pipeline.overview.index import condition, proposed
+from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
-from er3a.pipeline.stages.dynamics.model import NoLimits
 from er3a.pipeline.stages.inverse.model import RankingRows
 from er3a.pipeline.stages.inverse.page.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
@@ -39,7 +38,6 @@ from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, plac
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 
 TALLY = CheckTally(24)
-FILE = "data/robots/arm.yaml"
 TURNED = ToolOff(0.0, 180.0)
 FOUND = LeftOpen(
     CheckCounts(TALLY, TALLY, CheckTally()),
@@ -100,20 +98,8 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
     assert "If an open or weak entry is wrong" in how_far_off(weak)[1]  # one more is not settled, and has no name here
 
 
-def test_other_entries_are_to_be_checked_only_where_there_are_others():
-    only = replace(FOUND, parts=(PartFound("zero_and_directions", "open", 12, 11, 0, (), (), TURNED),))
-    only = replace(only, unbounded=("direction1",))
-    assert "Then check the other" not in proposed(only, FILE)["measurement"]
-    assert (
-        "Then check the other" in proposed(replace(only, unbounded=("direction1", "direction2")), FILE)["measurement"]
-    )
-    assert "Then check the other" in proposed(FOUND, FILE)["measurement"]
-    assert "at reduced speed (T1), jog +J1 a few degrees" in proposed(FOUND, FILE)["measurement"]
-    assert f"turn its sign in {FILE}" in proposed(FOUND, FILE)["measurement"]
-
-
 def test_a_verdict_says_what_it_is_not_to_be_taken_for():
-    torque = NoLimits(5, 2, 14.0, 4.1, "N m", "arc", (), 0, None)
+    torque = fact("dynamics.no_limits", torques=(), missing_links=(), doubts=0, grade=None)
     assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
     assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
 

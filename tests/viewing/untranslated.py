@@ -52,14 +52,9 @@ class Wide(gettext.NullTranslations):
 
     def pgettext(self, context: str, message: str) -> str:
         """As :meth:`gettext`; the English of a key."""
-        return self.npgettext(context, message, message, 1)
-
-    def npgettext(self, context: str, msgid1: str, msgid2: str, n: int) -> str:
-        """As :meth:`ngettext`; the English of a key, in its form for n."""
-        if context != language.KEYED or msgid1 not in self._texts:
-            return self.ngettext(msgid1, msgid2, n)
-        forms = english(msgid1)
-        return _wide(forms[0] if n == 1 else forms[-1])
+        if context != language.KEYED or message not in self._texts:
+            return self.gettext(message)
+        return _wide(english(message))
 
     def ngettext(self, msgid1: str, msgid2: str, n: int) -> str:
         """As :meth:`gettext`, of the form for n."""

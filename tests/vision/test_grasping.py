@@ -20,7 +20,8 @@ from er3a.files.vision_file import load_vision
 from er3a.finding import Amount, fact, is_one
 from er3a.geometry.transforms import moved, step_between, transform
 from er3a.kinematics.forward import forward
-from er3a.pipeline.messages.vision import say
+from er3a.pipeline.messages import vision  # noqa: F401
+from er3a.pipeline.messages.say import say
 from er3a.planning.timing import joint_limits
 from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS

@@ -8,11 +8,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from er3a.files.robot_library import load_robot
-from er3a.finding import fact
+from er3a.finding import fact, is_one
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
-from er3a.pipeline.stages.workspace.model import PlacementSummary, ToolPointsElsewhere
+from er3a.pipeline.stages.workspace.model import PlacementSummary
 from er3a.pipeline.stages.workspace.tool_capability import tool_capability
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.capability import map_capability
@@ -215,7 +215,7 @@ def test_a_scara_serves_the_boxes_it_is_said_to(random):
 def test_a_scara_that_points_down_serves_no_box_from_the_side():
     asked = CapabilitySettings.model_validate({"directions": 12, "placement": {"tool_direction": [1, 0, 0]}})
     done = tool_capability(scara(), asked, 0.05)
-    assert isinstance(done.placement, ToolPointsElsewhere)
+    assert is_one(done.placement, "workspace.tool_points_elsewhere")
     assert done.placement.direction == pytest.approx((0, 0, -1))
     assert len(done.places) == 0
 

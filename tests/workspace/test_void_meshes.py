@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from er3a.files.robot_library import load_robot
+from er3a.finding import fact
 from er3a.geometry.vectors import TURN
-from er3a.workspace.causes import Disappears, Relaxed, single_changes
+from er3a.workspace.causes import relaxed_limit, single_changes
 from er3a.workspace.voids import Blocks, mesh
 
 AROUND = 36
@@ -47,8 +48,8 @@ def test_a_sector_s_mesh_and_a_bar_s_are_closed():
 
 @pytest.mark.long
 def test_single_changes_of_the_article_s_table():
-    upper_2 = Relaxed((2,), (1.0,), "upper", "deg", 155.0, 60.0, 1.0)
-    found = single_changes(load_robot("er3a_c60_article"), Disappears((upper_2,)), 1)
+    upper_2 = relaxed_limit((2,), (1.0,), "upper", "deg", 155.0, (60.0, 1.0))
+    found = single_changes(load_robot("er3a_c60_article"), fact("void_disappears", limits=(upper_2,)), 1)
     left = {(change.entry, change.tried): change.left_litres for change in found if change.left_litres}
     assert left["offset2", -90.0][1] < 1 < 150 < left["offset2", 180.0][0]
     assert left["upper2", 215.0][1] < 1

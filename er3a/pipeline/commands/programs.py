@@ -170,13 +170,12 @@ def write(
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.expectations import outcome_word
-    from er3a.pipeline.messages.programs import say
     from er3a.pipeline.program_reports import missed_checks, missed_line, programs_of, shapes_line
     from er3a.pipeline.progress import shown_work
     from er3a.pipeline.scope import by_reason
     from er3a.pipeline.stages.covered import assumed_tool, covered_units, gaps_of_program
     from er3a.pipeline.viewing.conditions import program_head
-    from er3a.programs.writing import with_head_lines
+    from er3a.programs.writing import head_line, with_head_lines
 
     with noted_doubts() as doubts, shown_work(f"{paths}: checking each path"):
         arm, around = load_robot(robot), load_scene(scene) if scene else None
@@ -195,7 +194,7 @@ def write(
             _write(file, with_head_lines(text, head))
             print(f"{file}: written")
         for finding in made.findings:
-            print_note(f"{made.name}: {say(finding)}")
+            print_note(f"{made.name}: {head_line(finding)}")
         refused += bool(made.open) or any(is_one(finding, "written_targets_left_out") for finding in made.findings)
     missed = by_reason(each for made in programs for each in made.open)
     for line in filter(None, (shapes_line(arm), missed_line((*alone, *missed)))):

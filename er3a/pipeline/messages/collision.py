@@ -8,17 +8,15 @@ from typing import assert_never
 import numpy as np
 
 from er3a.collision.matrix import PairState
-from er3a.collision.pairs import BASE, TRIED, CarriedAndLink, Pair
+from er3a.collision.pairs import BASE, TRIED, bodies_of
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
-from er3a.finding import AnyFinding, Finding
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages import expectations, scope  # noqa: F401
-from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import joined, listed, say, say_as, says, sentence, texts, word
-from er3a.pipeline.stages.collision.model import FreeSpace, HomeCollides
+from er3a.pipeline.messages.numbers import at_least
+from er3a.pipeline.messages.say import FORMATS, WORDS, same_text, say_as, says, sentence, texts, word
 
-NAMED = 3
 KEY_FIGURES = {
     "free_of_collisions": N_("Collision-free joint space"),
     "free_of_itself": N_("Free of self-collision"),
@@ -43,122 +41,68 @@ STATES: dict[PairState, str] = {
 
 TEXTS = texts(
     {
-        "pair": "{first} and {second}",
+        "pair": "{bodies:body and }",
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
         "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; to keep: {margin_mm:g} mm",
-        "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs}.",
-        "shapes_assumed": "Link shapes are assumed: real collisions may differ.",
-        "shapes_assumed#partial": "Shapes are missing for parts of links: real collisions may differ.",
-        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes: {names}.",
-        "collision.never_free": "No joint vector within the limits is free of collisions: {pairs} always overlap.",
+        "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs:3, }.",
+        "shapes_assumed": "{partial:shapes_missing}: real collisions may differ.[ {near}]",
+        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes: {names:, }.",
+        "collision.never_free": "No joint vector within the limits is free of collisions: {pairs:3, } always overlap.",
         "collision.shapes_overlap": (
-            "Shapes in error: {pairs} overlap in all {count} joint vectors tried. Correct their size, unit or "
-            "placement in the robot's file, or allow the pair there. Of the rest, {percent:.1f} % of the joint space "
+            "Shapes in error: {pairs:3, } overlap in all {count} joint vectors tried. Correct their size, unit or "
+            "placement in the robot's file, or allow the pair there. Of the rest, {free_ratio:.1%} of the joint space "
             "is collision-free."
         ),
         "collision.base_in_solid": (
-            "The base is always inside {own_name}: correct the scene or the position of the base."
+            "The base is always inside {solids:own, }: correct the scene or the position of the base."
         ),
         "collision.home_collides": (
-            "At home {pair} overlap by {depth_mm:.1f} mm, so what can be reached from there is unknown. Of the joint "
-            "space {percent:.1f} % is collision-free."
+            "{found} At home {pair} overlap by {depth_mm:.1f} mm, so what can be reached from there is unknown."
         ),
         "collision.free_space": (
-            "{percent:.1f} % of the joint space is collision-free. Of {places} cells {clear} are reached without "
-            "collision, {joined} of these from home; at most {lost} % are lost."
+            "[Targets that collide in every solution: {blocked:3, }.][{targets:?} Targets solved: {targets}; the "
+            "nearest is clear by {nearest}.][ Paths that collide: {colliding:, }.] {free_ratio:.1%} of the joint "
+            "space is collision-free. Of {places} cells {clear} are reached without collision.[ From home: "
+            "{joined}.][{undecided:?} Pairs undecided, and therefore checked: {undecided}.]"
         ),
-        "collision.doubt": "Pairs undecided, and therefore checked: {undecided}.",
-        "collision.targets": "Targets solved: {targets}; the nearest is clear by {nearest}.",
         "nearest_target": "{clearance_mm:.1f} mm ({name}, {pair})",
-        "colliding": "{name} ({pair})",
-        "collision.paths": "Paths that collide: {colliding}.",
-        "collision.blocked": "Targets that collide in every solution: {blocked}.",
-        "collision.none": "No collision-free configuration was found.",
+        "colliding": "{name} ({pair}[; as expected{expected:?}])",
     }
 )
-
-
-@say.register
-def _(found: Pair) -> str:
-    first, second = (value for key, value in vars(found).items() if key != "code")
-    if isinstance(found, CarriedAndLink):
-        first, second = second, first
-    return sentence("pair", first=_body(first), second=_body(second))
+WORDS["shapes_missing"] = {
+    False: N_("Link shapes are assumed"),
+    True: N_("Shapes are missing for parts of links"),
+}
 
 
 def _body(body: int | str) -> str:
-    return own_title(body) if isinstance(body, str) else _link(body)
+    return own_title(body) if isinstance(body, str) else sentence("link", base=body == BASE, number=body)
 
 
-@says("pairs_unexamined")
+FORMATS["body"] = _body
+
+
+@says("link_pair", "link_and_solid", "carried_and_link", "carried_and_solid")
 def _(found: Finding) -> str:
-    return say_as(found, pairs=_first_of(found.pairs))
-
-
-def _first_of(findings: Sequence[AnyFinding]) -> str:
-    """The first few, and how many more there are."""
-    more = [sentence("more", count=len(findings) - NAMED)] if len(findings) > NAMED else []
-    return joined([*listed(findings[:NAMED]), *more], ", ")
+    return sentence("pair", bodies=bodies_of(found))
 
 
 @says("shapes_assumed")
 def _(found: Finding) -> str:
-    rests = say_as(found, "partial" if found.partial else "")
-    return joined([rests, near_shapes(found.margin_mm, found.near)], " ")
+    return say_as(found, near=near_shapes(found.margin_mm, found.near))
 
 
 def near_shapes(margin_mm: float, names: Sequence[str]) -> str:
     """What comes so near to assumed shapes that it is not settled; empty where nothing does."""
-    return sentence("shapes_assumed.near", margin_mm=margin_mm, names=", ".join(names)) if names else ""
+    return sentence("shapes_assumed.near", margin_mm=margin_mm, names=names) if names else ""
 
 
-def _link(number: int) -> str:
-    return sentence("link#base") if number == BASE else sentence("link#number", number=number)
+same_text("colliding", "colliding_path", "colliding_target")
 
 
-@says("collision.never_free")
+@says("collision.home_collides")
 def _(found: Finding) -> str:
-    return say_as(found, pairs=joined(listed(found.pairs[:NAMED]), ", "))
-
-
-@says("collision.shapes_overlap")
-def _(found: Finding) -> str:
-    return say_as(found, count=TRIED, pairs=joined(listed(found.pairs[:NAMED]), ", "), percent=100 * found.free_ratio)
-
-
-@says("collision.base_in_solid")
-def _(found: Finding) -> str:
-    return say_as(found, own_name=", ".join(found.solids[:NAMED]))
-
-
-@says("colliding_path", "colliding_target")
-def _(found: Finding) -> str:
-    expected = sentence("as_expected") if found.expected else ""
-    return sentence("colliding", name=found.name, pair=joined([say(found.pair), expected]))
-
-
-@say.register
-def _(found: HomeCollides) -> str:
-    home = say_as(found, percent=100 * found.found.free_ratio)
-    return joined([*_asked(found.found), home], " ")
-
-
-@say.register
-def _(found: FreeSpace) -> str:
-    free = sentence("collision.none")
-    if found.clear:
-        lost = at_most(100 * (1 - found.clear / found.places), 1)
-        free = say_as(found, percent=100 * found.free_ratio, lost=lost)
-    doubt = sentence("collision.doubt", undecided=found.undecided) if found.undecided else ""
-    return joined([*_asked(found), free, doubt], " ")
-
-
-def _asked(found: FreeSpace) -> list[str]:
-    """What targets and paths come to, a sentence each."""
-    targets = sentence("collision.targets", targets=found.targets, nearest=found.nearest) if found.nearest else ""
-    paths = sentence("collision.paths", colliding=joined(listed(found.colliding), ", ")) if found.colliding else ""
-    blocked = sentence("collision.blocked", blocked=_first_of(found.blocked)) if found.blocked else ""
-    return [blocked, targets, paths]
+    return say_as(found, found=sentence("collision.free_space", **found.params))
 
 
 def solid_rows(scene: Scene | None) -> list[list[str]]:

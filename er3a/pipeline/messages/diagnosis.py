@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_, as_text, tr, with_unit
+from er3a.pipeline.language import N_, as_text, with_unit
+from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.pages import SIDES
-from er3a.pipeline.messages.say import bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, WORDS, joined, listed, say_as, says, sentence, texts, word
 
 ENTRIES = {
     "rows": N_("all rows"),
@@ -41,7 +40,6 @@ TOUCHED = {
     "pair": N_("pairs"),
 }
 MIN_SHOWN, MIN_FITTED = 0.005, 5e-5
-MAX_LISTED = 24
 LEVELS = {
     "lengths": N_("lengths"),
     "lengths_and_offsets": N_("lengths and joint offsets"),
@@ -55,31 +53,36 @@ TEXTS = texts(
         "alike": "{faults} (or {more} others that fit alike)",
         "swapped_rows": "rows {first} and {second} are swapped",
         "swapped_limits": "limits of J{first} and J{second} are swapped",
-        "shifted_rows": "{entries} shifted {toward} by one joint",
-        "wrong_convention": "the table is not {read_as} D-H",
+        "shifted_rows": "{entries:entries} shifted {toward:toward} by one joint",
+        "wrong_convention": "the table is not {read_as:dh_convention} D-H",
         "wrong_value": "{entry} is {given}, {fits} fits",
         "wrong_scale": "wrong scale of all lengths: a factor of {factor:.6g} fits",
         "reversed_direction": "direction of J{joint} reversed",
         "base_elsewhere": "base defined elsewhere: arm at ({shift_mm:, }) mm from there, turned {turn_deg:g} deg",
         "flange_elsewhere": "flange defined elsewhere: ({shift_mm:, }) mm from there, turned {turn_deg:g} deg",
         "counted_from_ground": "counted from the ground: the table's J{joint} is the references' {sum}",
-        "fault_at": "{place}: {fault}",
+        "wrong_unit": "{entries:entries}: {misread:misread}",
+        "swapped_entries": "[J{joint}][every joint{joint:!}]: a and d are swapped",
+        "wrong_limits": "[J{joint}][every joint{joint:!}]: {fault:limit_fault}",
         "no_reference": "There are no data for a diagnosis.",
         "no_fault_stands_out": (
             "References missed: {missed} of {references}, by up to {half_widths:.3g} times their uncertainty. None of "
             "{tried} faults and pairs of faults fits better."
         ),
         "met": "Nothing to explain: {references} of {references} references about poses, axes and limits are met.",
-        "named": "Most likely fault: {faults}. Residual: {before} {unit}, corrected {after} {unit}.",
+        "named": (
+            "Most likely fault: {faults: and }. Residual: {residual_before:residual} {unit}, corrected "
+            "{residual_after:residual} {unit}."
+        ),
         "mostly": (
-            "Best fault tried, still beyond the references' uncertainty: {faults}. Residual: {before} {unit}, "
-            "corrected {after} {unit}."
+            "Best fault tried, still beyond the references' uncertainty: {faults: and }. Residual: "
+            "{residual_before:residual} {unit}, corrected {residual_after:residual} {unit}."
         ),
         "unexplained": (
-            "None of {tried} hypotheses of one fault or two explains the data: of {before} {unit} at least {least} "
-            "{unit} stay. It is another arm, has more faults, or a reference is wrong."
+            "None of {tried} hypotheses of one fault or two explains the data: of {residual_before:residual} {unit} at "
+            "least {least:residual} {unit} stay. It is another arm, has more faults, or a reference is wrong."
         ),
-        "one_of": "one of {count} that fit alike ({candidates})",
+        "one_of": "one of {count} that fit alike ({candidates:24; })",
         "moves_nothing": "{entry} has no effect on the measured points",
         "sets_scale": "no length was measured: {entry} sets the scale of all others",
         "no_positions": "there are no positions of single points to calibrate from",
@@ -88,13 +91,14 @@ TEXTS = texts(
             "belong to which point; er3a.diagnose finds single faults"
         ),
         "corrections_found": "Corrections found, with 95 % intervals that exclude 0: {entries:, }.",
-        "no_correction_found": "95 % intervals that contain 0: all {intervals}.",
-        "not_settled": "Not determined by these positions: {entries}.",
-        "not_told_apart": "{entries:, } can't be identified separately",
-        "parallel": "axes {joints:, } are parallel",
+        "no_correction_found": (
+            "95 % intervals that exclude 0: none of {intervals}.[ Not determined by these positions: {open:, }.]"
+        ),
+        "not_told_apart": "{entries:, } can't be identified separately[ (axes {parallel_joints:, } are parallel)]",
         "more_positions": (
-            "{coordinates} coordinates at {poses} poses determine {determined} of {determinable} entries ({fitted}). "
-            "Positions needed besides: at least {missing}, spread over the range of all joints."
+            "{coordinates} coordinates at {poses} poses determine {determined} of {determinable} entries "
+            "({fitted:level}). Positions needed besides: at least {missing}, spread over the range of all joints.[ Not "
+            "determined by these positions: {entries:, }.]"
         ),
         "more_touches": (
             "Poses: {poses} ({numbers} independent coordinates); they determine {determined} of {determinable} "
@@ -102,22 +106,32 @@ TEXTS = texts(
         ),
         "touches": "at least {count} {what}",
         "misfit": (
-            "Correcting {fitted} leaves {rms_after_mm:.3g} mm of {rms_before_mm:.3g} mm (root mean square): no "
+            "Correcting {fitted:level} leaves {rms_after_mm:.3g} mm of {rms_before_mm:.3g} mm (root mean square): no "
             "calibration can repair this table."
         ),
         "far_from_table": (
-            "Measurements and table don't belong together (far off: {why}). Check the order, signs and zeros of the "
-            "joints, and whose table it is."
+            "[Measurements and table belong together after one correction: {shown:; }.][Measurements and table don't "
+            "belong together (far off: {why}). Check the order, signs and zeros of the joints, and whose table it is."
+            "{shown:!}]"
         ),
-        "one_correction": "Measurements and table belong together after one correction: {faults}.",
         "swapped_columns": "swap columns J{first} and J{second}",
+    }
+)
+WORDS.update(
+    {
+        "entries": ENTRIES,
+        "misread": MISREAD,
+        "toward": TOWARD,
+        "dh_convention": CONVENTIONS,
+        "limit_fault": LIMIT_FAULTS,
+        "level": LEVELS,
     }
 )
 
 
 def both(faults: Faults) -> str:
     """Faults as one text."""
-    return tr(" and ").join(map(say, faults))
+    return joined(listed(faults), " and ")
 
 
 def shown(value: float) -> str:
@@ -125,6 +139,9 @@ def shown(value: float) -> str:
     if MIN_SHOWN <= value < 1:
         return f"{value:.2f}"
     return f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+FORMATS["residual"] = shown
 
 
 def fitted(given: float, fits: float) -> str:
@@ -147,84 +164,23 @@ def _(found: Finding) -> str:
     return sentence("wrong_value", entry=entry, given=shown_values[0], fits=shown_values[1])
 
 
-@says("no_correction_found")
-def _(found: Finding) -> str:
-    none = say_as(found) if len(found.open) < found.intervals else ""
-    return joined([none, _undetermined(found.open)], " ")
-
-
-def _undetermined(entries: Sequence[str]) -> str:
-    return sentence("not_settled", entries=joined(entries, ", ")) if entries else ""
-
-
-@says("wrong_unit")
-def _(found: Finding) -> str:
-    fault = word(found.code, MISREAD, found.misread)
-    return sentence("fault_at", place=word(found.code, ENTRIES, found.entries), fault=fault)
-
-
-@says("swapped_entries")
-def _(found: Finding) -> str:
-    return _at_joint(found.joint, tr("a and d are swapped"))
-
-
-@says("wrong_limits")
-def _(found: Finding) -> str:
-    return _at_joint(found.joint, word(found.code, LIMIT_FAULTS, found.fault))
-
-
-def _at_joint(joint: int | None, fault: str) -> str:
-    return sentence("fault_at", place=f"J{joint}" if joint else tr("every joint"), fault=fault)
-
-
-@says("shifted_rows")
-def _(found: Finding) -> str:
-    toward = word(found.code, TOWARD, found.toward)
-    return say_as(found, entries=word(found.code, ENTRIES, found.entries), toward=toward)
-
-
-@says("wrong_convention")
-def _(found: Finding) -> str:
-    return say_as(found, read_as=word(found.code, CONVENTIONS, found.read_as))
-
-
 @says("counted_from_ground")
 def _(found: Finding) -> str:
-    sign = "+" if found.sign > 0 else "−"
-    return say_as(found, sum="".join([f"J{found.joint}", *(f" {sign} J{joint}" for joint in found.along)]))
+    factors = (1, *[found.sign] * len(found.along))
+    return say_as(found, sum=sum_of_joints((found.joint, *found.along), factors))
 
 
 @says("named", "mostly")
 def _(found: Finding) -> str:
-    faults = both(found.faults)
-    if found.alternatives:
-        members = (found.faults, *found.alternatives)
-        candidates = [both(each) for each in members[:MAX_LISTED]]
-        if more := len(members) - len(candidates):
-            candidates.append(sentence("more", count=more))
-        faults = sentence("one_of", count=len(members), candidates=joined(candidates))
-    return say_as(found, faults=faults, before=shown(found.residual_before), after=shown(found.residual_after))
-
-
-@says("unexplained")
-def _(found: Finding) -> str:
-    return say_as(found, before=shown(found.residual_before), least=shown(found.least))
+    if not found.alternatives:
+        return say_as(found)
+    candidates = [both(each) for each in (found.faults, *found.alternatives)]
+    return say_as(found, faults=(sentence("one_of", count=len(candidates), candidates=candidates),))
 
 
 def level(name: str) -> str:
     """Which entries were estimated, in words."""
     return word("level", LEVELS, name)
-
-
-@says("not_told_apart")
-def _(found: Finding) -> str:
-    parallel = sentence("parallel", joints=found.parallel_joints) if found.parallel_joints else ""
-    return bracketed(say_as(found), parallel)
-
-
-@says("more_positions")
-def _(found: Finding) -> str:
-    return joined([say_as(found, fitted=level(found.fitted)), _undetermined(found.entries)], " ")
 
 
 @says("more_touches")
@@ -236,17 +192,10 @@ def _(found: Finding) -> str:
     return say_as(found, each=joined(each, ", "))
 
 
-@says("misfit")
-def _(found: Finding) -> str:
-    return say_as(found, fitted=level(found.fitted))
-
-
 @says("far_from_table")
 def _(found: Finding) -> str:
+    shown = listed(found.faults or ())
     if found.swapped:
-        faults = sentence("swapped_columns", first=found.swapped[0], second=found.swapped[1])
-        return sentence("one_correction", faults=faults)
-    if found.faults:
-        return sentence("one_correction", faults=joined(map(say, found.faults)))
+        shown = [sentence("swapped_columns", first=found.swapped[0], second=found.swapped[1])]
     why = joined(found.entries, ", ") or with_unit(as_text(found.rest_mm, ".3g"), "mm")
-    return say_as(found, why=why)
+    return say_as(found, shown=shown, why=why)

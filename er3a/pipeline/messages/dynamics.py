@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, own_title
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import body_word, names_in_words
@@ -72,18 +72,20 @@ WHY: dict[NoBody, str] = {
 
 TEXTS = texts(
     {
-        "dynamics.use": "{what}: {asked:.3g} of {allowed:.3g} {unit} ({percent:.0f} %)",
-        "dynamics.no_data": "Torques need data: {needs:, }.",
-        "dynamics.no_limits": "Motors not judged: no drive's limits known. Greatest torque: {torques:; }.",
+        "dynamics.use": "{what}: {asked:.3g} of {allowed:.3g} {unit} ({ratio:.0%})",
+        "dynamics.no_data": "Torques need data: {named:dynamics.need, }.",
+        "dynamics.no_limits": "Motors not judged: no drive's limits known. Greatest torque: {torques:; }.{rest}",
         "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
-        "dynamics.fits": "Within all stated limits; highest utilisation: {use}.",
-        "dynamics.marginal": "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {use}.",
-        "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {use}.",
-        "dynamics.unlimited": "Unknown, wholly or in part: {unknown:, }.",
-        "dynamics.massless": "Links without mass in the file, counted as massless: {links:, }.",
-        "dynamics.doubts": "Doubts about the masses: {doubts}.",
-        "dynamics.graded": "Masses {grade:dynamics.graded_as}: torques are as uncertain.",
-        "dynamics.not_run": "Paths that may not be run, not counted: {names:, }.",
+        "dynamics.fits": "Within all stated limits; highest utilisation: {tightest}.{rest}",
+        "dynamics.marginal": (
+            "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {tightest}.{rest}"
+        ),
+        "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
+        "dynamics.rest": (
+            "[Unknown, wholly or in part: {unknown:dynamics.need, }.][ Paths that may not be run, not counted: "
+            "{not_run:, }.][ Links without mass in the file, counted as massless: {missing_links:, }.][{doubts:?} "
+            "Doubts about the masses: {doubts}.][ Masses {grade:dynamics.graded_as}: torques are as uncertain.]"
+        ),
         "missing_link": "link {link}: no mass given; {singular:dynamics.massless}",
         "point_mass": "link {link}: mass without inertia",
         "inertia_without_mass": "link {link}: inertia without mass, used as given",
@@ -100,14 +102,12 @@ TEXTS = texts(
             "{about_centre_kg_m2:.3g}, by its shape {shape_kg_m2:.3g}"
         ),
         "sum_off_weight": "links' masses: {sum_kg:.4g} kg; the manufacturer's weight: {weight_kg:.4g} kg",
-        "payload.bounded": "At most {kg} kg, limited by torques: {by:, }.",
-        "payload.unknown": "Quantities not known: {count}.",
-        "payload.guessed": "It rests on guesses: {what:; }.",
-        "payload.guessed_masses": "the masses of the links",
-        "payload.left_out": "Left out, because not known: {what:; }.",
-        "payload.ask": "Ask for: {what:; }.",
-        "payload.not_examined": "Not examined.",
-        "payload.none": "Mount nothing until the manufacturer gives the rated payload.",
+        "payload": (
+            "[At most {kg} kg, limited by torques: {by:, }.][ It rests on guesses: {guesses:; }.][{unknown:?} "
+            "Quantities not known: {unknown}.][{unexamined:?} Not examined.][{none:?} Mount nothing until the "
+            "manufacturer gives the rated payload.][ {rated}]"
+        ),
+        "payload.ask": "[{bounded:?}Left out, because not known: {what:; }.][{bounded:!}Ask for: {what:; }.]",
         "payload.rated": "Rated payload: {kg:.3g} kg ({source:payload.source}); {doubt:payload.doubt}.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why:dynamics.why})",
     }
@@ -144,30 +144,25 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
     open_of = getattr(summary, "unknown", ())
-    missing = [say(each) for each in open_of if each.what not in get_args(model.Guess)]
+    missing = [each for each in open_of if each.what not in get_args(model.Guess)]
     official = _rated(robot, official=True)
-    unknown = sentence("payload.unknown", count=len(missing)) if missing else ""
+    parts: dict[str, Any] = {"kg": None, "by": (), "guesses": ()}
     if bounds:
         value, path = min(bounds, key=lambda bound: bound[0])
         most = path.payload
         by = word("dynamics.binding", BINDING, most.by) if most and most.by else ""
         of_joint = [bracketed(f"J{most.joint}", by)] if most and most.joint else []
-        known = sentence("payload.bounded", kg=at_least(value, "kg"), by=[*of_joint, path.name])
-        known = joined([known, _guesses(summary), unknown], " ")
-        rest = sentence("payload.left_out", what=missing) if missing else ""
-    else:
-        none = "" if official else sentence("payload.none")
-        known = joined([unknown or sentence("payload.not_examined"), none], " ")
-        rest = sentence("payload.ask", what=missing) if missing else ""
-    return joined([known, official or _rated(robot)], " "), rest
+        parts = {"kg": at_least(value, "kg"), "by": [*of_joint, path.name], "guesses": _guesses(summary)}
+    parts |= {"unknown": len(missing), "unexamined": not (bounds or missing), "none": not (bounds or official)}
+    known = sentence("payload", rated=official or _rated(robot), **parts)
+    return known, sentence("payload.ask", bounded=bool(bounds), what=missing) if missing else ""
 
 
-def _guesses(summary: Summary | None) -> str:
-    """On which guesses the torques and their limits rest; empty where they rest on none."""
+def _guesses(summary: Summary | None) -> list[str]:
+    """On which guesses the torques and their limits rest."""
     masses = getattr(summary, "masses", None)
-    found = [sentence("payload.guessed_masses")] if masses and masses.grade == "inferred" else []
-    found += [say(each) for each in getattr(summary, "unknown", ()) if each.what in get_args(model.Guess)]
-    return sentence("payload.guessed", what=found) if found else ""
+    found = [tr("the masses of the links")] if masses and masses.grade == "inferred" else []
+    return found + [say(each) for each in getattr(summary, "unknown", ()) if each.what in get_args(model.Guess)]
 
 
 def _rated(robot: Robot, *, official: bool = False) -> str:
@@ -192,45 +187,26 @@ def quantity_word(quantity: model.Quantity) -> str:
     return word("dynamics.quantity", QUANTITIES, quantity)
 
 
-def use_text(use: model.Use) -> str:
+@says("dynamics.use")
+def use_text(use: model.Use | Finding) -> str:
     """What is asked for and allowed, where."""
     joint = f"J{use.joint}" if use.joint else ""
     what = joined([quantity_word(use.quantity), joint, use.path or ""], ", ")
-    parts = {"asked": use.asked, "allowed": use.allowed, "unit": use.unit, "percent": 100 * use.ratio}
+    parts = {"asked": use.asked, "allowed": use.allowed, "unit": use.unit, "ratio": use.asked / use.allowed}
     return sentence("dynamics.use", what=what, **parts)
 
 
 @says("dynamics.no_data")
 def _(found: Finding) -> str:
-    needs: list[model.Need] = [each.what for each in found.needs if each.what in ("masses", "peak", "load")]
-    return say_as(found, needs=[*map(need_word, needs)])
+    return say_as(found, named=[each.what for each in found.needs if each.what in ("masses", "peak", "load")])
 
 
-@say.register
-def _(found: model.NoLimits) -> str:
-    held = [vars(found.held) | {"torque": abs(found.held.torque), "path": None}] if found.held else []
-    torques = [sentence("dynamics.torque", **each) for each in (vars(found), *held)]
-    return joined([say_as(found, torques=torques), *_reservations(found)], " ")
-
-
-@say.register
-def _(found: model.Compared) -> str:
-    masses = bool(found.unsettled or found.doubts or found.grade == "inferred")
-    unknown = [*map(need_word, found.unknown)]
-    sentences = [
-        say_as(found, use=use_text(found.tightest), masses=masses),  # type: ignore[arg-type]
-        sentence("dynamics.unlimited", unknown=unknown) if unknown else "",
-        sentence("dynamics.not_run", names=found.not_run) if found.not_run else "",
-    ]
-    return joined([*sentences, *_reservations(found)], " ")
-
-
-def _reservations(found: model.Compared | model.NoLimits) -> list[str]:
-    return [
-        sentence("dynamics.massless", links=found.missing_links) if found.missing_links else "",
-        sentence("dynamics.doubts", doubts=found.doubts) if found.doubts else "",
-        sentence("dynamics.graded", grade=found.grade) if found.grade else "",
-    ]
+@says("dynamics.no_limits", "dynamics.fits", "dynamics.marginal", "dynamics.overload")
+def _(found: Finding) -> str:
+    parts: dict[str, Any] = {"unknown": (), "not_run": (), **found.params}
+    rest = sentence("dynamics.rest", **parts)
+    masses = bool(found.params.get("unsettled") or found.doubts or found.grade == "inferred")
+    return say_as(found, masses=masses, rest=f" {rest}" if rest else "")
 
 
 @says("dynamics.unknown")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from er3a.finding import Finding
 from er3a.pipeline.language import N_
-from er3a.pipeline.messages.say import joined, listed, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, sentence, texts, word
 from er3a.pipeline.stages.expectations import Judged, Outcome, came_to, expected_of, is_met
 
 OUTCOMES: dict[Outcome, str] = {
@@ -31,59 +28,26 @@ OUTCOMES: dict[Outcome, str] = {
 
 TEXTS = texts(
     {
-        "expectations_unmet": "Expectations not met: {count} of {expectations}: {unmet:; }.",
-        "expectations_unmet.others": "Of what expects nothing: {named}.",
-        "demonstrations": "{count} expected to fail, and did: {named}",
-        "nothing_else": "nothing else to judge",
-        "demonstration": "{name} ({outcome})",
-        "as_expected": "as expected",
-        "as_expected#partly": "{expected}: as expected; {other}: not expected",
-        "as_expected#not": "not as expected",
-        "unmet_expectation": "{name} ({found}; expected: {expected})",
+        "expectations_unmet": (
+            "Expectations not met: {count} of {expectations}: {unmet:; }.[ Of what expects nothing: {others:, }.]"
+        ),
+        "demonstration": "{name} ({found:outcome, })",
+        "as_expected": "[not {wrong:?}]as expected[; not expected: {others:outcome, }]",
+        "unmet_expectation": "{name} ({found:outcome, }; expected: {expected:outcome, })",
     }
 )
+WORDS["outcome"] = OUTCOMES
 
 
 def outcome_word(outcome: Outcome) -> str:
     """What a target or a path came to, in words."""
-    return word("trajectory.path", OUTCOMES, outcome)
-
-
-def outcome_words(outcomes: Iterable[Outcome]) -> str:
-    """All that one came to."""
-    return joined(map(outcome_word, outcomes), ", ")
+    return word("outcome", OUTCOMES, outcome)
 
 
 def as_expected(judged: Judged) -> str:
     """Whether one came to what its file expects, or to what else; empty where it expects nothing."""
     expected, found = expected_of(judged), came_to(judged)
-    if not expected or is_met(judged):
-        return sentence("as_expected") if expected else ""
-    if set(expected) < set(found):
-        other = [outcome for outcome in found if outcome not in expected]
-        return sentence("as_expected#partly", expected=outcome_words(expected), other=outcome_words(other))
-    return sentence("as_expected#not")
-
-
-def demonstrated(shown: tuple[Finding, ...], asked: int) -> str:
-    """What fails as it is meant to, beside so many that are ``asked`` not to; empty if nothing does."""
-    if not shown:
+    if not expected:
         return ""
-    failed = sentence("demonstrations", count=len(shown), named=joined(listed(shown), ", "))
-    return joined([failed, "" if asked else sentence("nothing_else")])
-
-
-@says("demonstration")
-def _(found: Finding) -> str:
-    return say_as(found, outcome=outcome_words(found.found))
-
-
-@says("unmet_expectation")
-def _(found: Finding) -> str:
-    return say_as(found, found=outcome_words(found.found), expected=outcome_words(found.expected))
-
-
-@says("expectations_unmet")
-def _(found: Finding) -> str:
-    others = sentence("expectations_unmet.others", named=joined(listed(found.others), ", ")) if found.others else ""
-    return joined([say_as(found, count=len(found.unmet)), others], " ")
+    others = [outcome for outcome in found if outcome not in expected] if set(expected) < set(found) else []
+    return sentence("as_expected", wrong=not (others or is_met(judged)), others=others)

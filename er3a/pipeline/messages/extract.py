@@ -25,15 +25,5 @@ def extract(fileobj: Any, keywords: Any, comment_tags: Any, options: Any) -> Ite
             yield call.lineno, "pgettext", (TITLE, ast.literal_eval(call.args[0])), []
         elif ast.unparse(call.func) == "texts" and isinstance(call.args[0], ast.Dict):
             for key, text in zip(call.args[0].keys, call.args[0].values, strict=True):
-                yield from _of_entry(ast.literal_eval(key or ast.Constant("")), text)
-
-
-def _of_entry(key: str, text: ast.expr) -> Iterator[Message]:
-    if not isinstance(text, ast.Call):
-        yield text.lineno, "pgettext", (KEYED, key), [ast.literal_eval(text)]
-    elif ast.unparse(text.func) == "Plural":
-        yield text.lineno, "npgettext", (KEYED, key, key), [ast.literal_eval(each) for each in text.args[1:]]
-    else:
-        for variant in text.keywords:
-            english = ast.literal_eval(variant.value)
-            yield variant.value.lineno, "pgettext", (KEYED, f"{key}#{variant.arg}"), [english]
+                entry = KEYED, ast.literal_eval(key or ast.Constant(""))
+                yield text.lineno, "pgettext", entry, [ast.literal_eval(text)]

@@ -5,10 +5,8 @@ from __future__ import annotations
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, with_unit
-from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.kinematics import limited, singular_pose, singularity_word
-from er3a.pipeline.messages.numbers import numbers
-from er3a.pipeline.messages.say import joined, listed, say_as, says, sentence, texts
+from er3a.pipeline.messages.kinematics import limited
+from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
 
 NAMED = 3
 KEY_FIGURES = {
@@ -52,44 +50,32 @@ TEXTS = texts(
         "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
         "branches_leave_limits": "solutions outside the limits: {count}",
         "branches_collide": "solutions that collide: {count}",
-        "inverse.solved#scene": "Targets solved within limits, free of collisions: {solved} of {targets}.",
-        "inverse.solved#itself": "Targets solved within limits, free of self-collision: {solved} of {targets}.",
-        "inverse.unsolved": "No solution: {none_for}.",
-        "inverse.singular": "At a singularity, so only joint moves lead there: {names:, }.",
+        "inverse.targets": (
+            "[{targets:?}Targets solved within limits, free of {collisions:inverse.collisions}: {solved} of "
+            "{targets}.][ No solution: {unsolved:3, }.][ At a singularity, so only joint moves lead there: "
+            "{singular:, }.][ Expected to fail, and did: {demonstrations:, }.]"
+        ),
         "reach_missing": "{gap_mm:.4g} mm out of reach",
         "turning_does_not_help": "No tool orientation tried here keeps a margin.",
         "shifting_does_not_help": "No other place tried for the part keeps a margin.",
         "move_obstacle": "Move the part, the obstacle or the base: the arm alone reaches this pose with margin.",
         "near_limit": "Little margin: {margin:.2g} from a limit.",
-        "at_singularity": "Singular ({kind}: {pose}): come here by a joint move, not on a straight line.",
+        "at_singularity": "Singular ({kind:singular_pose}): come here by a joint move, not on a straight line.",
         "turn_tool": (
-            "Turn the tool by {least_turn_deg:.1f} deg, to roll, pitch, yaw = {to} deg. It then keeps {margin_deg:g} "
-            "deg from limits and {clearance_mm:g} mm clear; {share:.2g} % of orientations tried have a solution."
+            "Turn the tool by {least_turn_deg:.1f} deg, to roll, pitch, yaw = {to_deg:.2f, } deg. It then keeps "
+            "{margin_deg:g} deg from limits and {clearance_mm:g} mm clear; {orientation_ratio:.2g} of orientations "
+            "tried have a solution."
         ),
         "shift_tool": (
-            "Move the part or the base by {shift_mm:.0f} mm, the tool to ({to}) mm. It then keeps {margin_deg:g} deg "
-            "from limits and {clearance_mm:g} mm clear."
+            "Move the part or the base by {shift_mm:.0f} mm, the tool to ({to_mm:.1f, }) mm. It then keeps "
+            "{margin_deg:g} deg from limits and {clearance_mm:g} mm clear."
         ),
     }
 )
+WORDS["inverse.collisions"] = {True: N_("collisions"), False: N_("self-collision")}
 
 
-@says("inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
-def _(found: Finding) -> str:
-    key = f"inverse.solved#{'scene' if found.collisions else 'itself'}"
-    solved = sentence(key, solved=found.solved, targets=found.targets) if found.targets else ""
-    unsolved = sentence("inverse.unsolved", none_for=_none_for(found.unsolved)) if found.unsolved else ""
-    singular = sentence("inverse.singular", names=found.singular) if found.singular else ""
-    expected = demonstrated(found.demonstrations, found.targets)
-    expected = sentence("finding", finding=expected) if expected else ""
-    return joined([solved, unsolved, singular, expected], " ")
-
-
-def _none_for(unsolved: tuple[Finding, ...]) -> str:
-    named = listed(unsolved[:NAMED])
-    if len(unsolved) > NAMED:
-        named.append(sentence("more", count=len(unsolved) - NAMED))
-    return joined(named, ", ")
+same_text("inverse.targets", "inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
 
 
 def limits_in_short(found: Finding) -> str:
@@ -99,18 +85,3 @@ def limits_in_short(found: Finding) -> str:
     units = [each.excess.unit for each in found.joints]
     shown = map(with_unit, by_how_much, units)
     return joined((f"{limited(each)} {text}" for each, text in zip(found.joints, shown)), ", ")
-
-
-@says("at_singularity")
-def _(found: Finding) -> str:
-    return say_as(found, kind=singularity_word(found.kind), pose=singular_pose(found.kind))
-
-
-@says("turn_tool")
-def _(found: Finding) -> str:
-    return say_as(found, share=100 * found.orientation_ratio, to=numbers(found.to_deg, 2))
-
-
-@says("shift_tool")
-def _(found: Finding) -> str:
-    return say_as(found, to=numbers(found.to_mm, 1))

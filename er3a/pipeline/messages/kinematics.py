@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
-from er3a.kinematics.solutions import ByClass, Label, PoseUnsolved, SideUnsolved
-from er3a.pipeline.language import N_, as_text
-from er3a.pipeline.messages.say import by, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.kinematics.solutions import Label
+from er3a.pipeline.language import N_
+from er3a.pipeline.messages.say import FORMATS, WORDS, say, say_as, says, sentence, texts, word
 
 BRANCHES = {
     "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
@@ -91,42 +91,61 @@ TEXTS = texts(
         "upper_arm_or_forearm_without_length": "the upper arm or the forearm has no length",
         "no_solution_of_class": "no joint values reach the pose; {miss}",
         "dependent_joints": "its joints move the tool in fewer ways than there are joints",
-        "iteration": "iteration from {starts} random starts may miss solutions; no closed form: {lacking}",
+        "iteration": "iteration from {starts} random starts may miss solutions[; no closed form: {lacking}]",
         "wrist_tilts_too_little": "the wrist can't tilt that far; {missing_deg:.3g} deg are missing",
         "nearest_miss": "the nearest configuration misses by {position_mm:.3g} mm and {rotation_deg:.3g} deg",
         "limit_bound": "limit-bound: {miss}; solved outside the limits: {exceeded}",
         "singular": "singular: the iteration ends at a singular configuration: {miss}",
         "unreachable": "unreachable: {miss}, whatever the start",
         "limit_exceeded": "{of} at {value:.1f}: {excess:.3g} beyond its limit of {limit:g}",
-        "bad_guess": by(
-            "solved_by",
-            other_starts="bad guess: from the start given {miss}; allow restarts",
-            without_limits="bad guess: {miss}; search without limits (respect_limits=False)",
-        ),
+        "limits_exceeded": "{joints:; }",
+        "bad_guess": "bad guess: {miss}; {solved_by:solved_by}",
         "found_arm": "solution {number}",
-        "not_six_turning_joints#revolute": "it has {joints} joints",
-        "not_six_turning_joints#sliding": "it has sliding joints ({sliding})",
-        "by_class_in_doubt": "{arm_class}; rounding may hide solutions",
-        "by_class_numbered": "{arm_class}; branches are numbered, as no signs separate them",
-        "wrist_too_near_axis_1": "wrist centre {gap} too near to axis 1",
-        "wrist_too_far": "{gap} beyond reach (wrist centre at most {reach} from axis 2)",
-        "wrist_too_near": "wrist centre {gap} too near to axis 2 (at least {least})",
-        "side_unsolved": "{side}: {why}",
+        "not_six_turning_joints": "it has {joints} joints[{sliding:?}, of these sliding: {sliding}]",
+        "by_class": (
+            "{arm_class:arm_class}[; rounding may hide solutions{certain:!}][; branches are numbered, as no signs "
+            "separate them{named:!}]"
+        ),
+        "wrist_too_near_axis_1": "wrist centre {gap_mm:mm} too near to axis 1",
+        "wrist_too_far": "{gap_mm:mm} beyond reach (wrist centre at most {reach_mm:mm} from axis 2)",
+        "wrist_too_near": "wrist centre {gap_mm:mm} too near to axis 2 (at least {least_mm:mm})",
+        "side_unsolved": "{side:arm_side}: {why}",
+        "pose_unsolved": "{why}",
         "greatest_move": "greatest joint move {move:.1f} (J{joint})",
         "only_admissible": "{move}; the only admissible solution",
         "joint_turned": "J{joint} turned by {turn_deg:+d} deg",
-        "other_turns": "the same branch, {joints:, }",
-        "other_free_joint": "the same branch, its free joint at another angle",
+        "other_turns": "the same branch, [{joints:, }][its free joint at another angle{joints:!}]",
         "all_collide": "all {count} solutions within the limits collide: {overlap}",
         "moves_less": "{move}; the next best ({next_best}) needs {less:.3g} more",
         "moves_less_together": "{move}; the next best ({next_best}) needs as much, but {less:.3g} more in all",
         "lower_branch_number": "{move}; as near: {next_best}; the lower branch number decides",
-        "no_solution": "out of reach: {fault}",
-        "all_outside_limits": "solutions outside the limits: {count}; nearest: {branch}: {reason}",
+        "no_solution": "out of reach: {unsolved:; }",
+        "all_outside_limits": "solutions outside the limits: {count}; nearest: {nearest}: {exceeded}",
         "placed": "place {place}: {measures:, }",
-        "best_by_rules": "{measures:, }; the next best has {next_best:, }",
+        "measure": "{rule:rule} {value:.3g}",
+        "best_by_rules": "{measures:, }; [the next best has {next_best:, }][the only admissible solution{next_best:!}]",
     }
 )
+WORDS.update(
+    {
+        "solved_by": {
+            "other_starts": N_("from the start given; allow restarts"),
+            "without_limits": N_("search without limits (respect_limits=False)"),
+        },
+        "arm_class": ARM_CLASSES,
+        "arm_side": SIDES,
+        "singularity": SINGULARITIES,
+        "singular_pose": SINGULARITIES | SINGULAR_POSES,
+        "rule": RULE_NAMES,
+    }
+)
+
+
+def _mm(length: float) -> str:
+    return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"
+
+
+FORMATS["mm"] = _mm
 
 
 def branch_word(label: Label | str, branch: int = 0) -> str:
@@ -166,42 +185,6 @@ def sum_of_joints(joints: Sequence[int], factors: Sequence[float]) -> str:
     return text
 
 
-@says("limits_exceeded")
-def _(found: Finding) -> str:
-    return joined(listed(found.joints))
-
-
-@says("not_six_turning_joints")
-def _(found: Finding) -> str:
-    return say_as(found, "sliding" if found.sliding else "revolute")
-
-
-@say.register
-def _(found: ByClass) -> str:
-    arm_class = word("arm_class", ARM_CLASSES, found.arm_class)
-    form = "" if found.certain and found.named else "_numbered" if found.certain else "_in_doubt"
-    return sentence(f"by_class{form}", arm_class=arm_class) if form else arm_class
-
-
-@says("wrist_too_near_axis_1", "wrist_too_far", "wrist_too_near")
-def _(found: Finding) -> str:
-    return say_as(found, **{name.removesuffix("_mm"): _mm(length) for name, length in found.params.items()})
-
-
-@say.register
-def _(found: SideUnsolved) -> str:
-    return say_as(found, side=word("side", SIDES, found.side))
-
-
-@say.register
-def _(found: PoseUnsolved) -> str:
-    return say(found.why)
-
-
-def _mm(length: float) -> str:
-    return f"{length:.1f} mm" if length >= 0.1 else f"{length:.2g} mm"
-
-
 @says("other_branch")
 def _(found: Finding) -> str:
     return branch_word(found.label, found.branch)
@@ -209,25 +192,10 @@ def _(found: Finding) -> str:
 
 @says("no_solution")
 def _(found: Finding) -> str:
-    if len(found.unsolved) == 1:
-        return say(found.unsolved[0])
-    faults = list(dict.fromkeys(say(part.why) for part in found.unsolved))
-    return say_as(found, fault=faults[0] if len(faults) == 1 else joined(listed(found.unsolved)))
+    whys = list(dict.fromkeys(say(part.why) for part in found.unsolved))
+    return whys[0] if len(whys) == 1 else say_as(found)
 
 
 @says("all_outside_limits")
 def _(found: Finding) -> str:
-    return say_as(found, branch=branch_word(found.label, found.branch), reason=found.exceeded)
-
-
-@says("measure")
-def _(found: Finding) -> str:
-    rule = word("rule", RULE_NAMES, found.rule)
-    return f"{rule} {as_text(found.value, '.3g')} {found.unit}".removesuffix(" 1")
-
-
-@says("best_by_rules")
-def _(found: Finding) -> str:
-    if not found.next_best:
-        return sentence("only_admissible", move=joined(listed(found.measures), ", "))
-    return say_as(found)
+    return say_as(found, nearest=branch_word(found.label, found.branch))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.say import joined, word
+from er3a.pipeline.messages.say import word
 
 # Words of the lists in which a reader of the report chooses pages; the workflow's rules use them.
 PAGE, INDEX, ALL_ROBOTS = N_("page"), N_("index"), N_("All robots")
@@ -142,85 +142,6 @@ def of_index() -> str:
 def of_article() -> str:
     """The page on the article."""
     return tr("What the article says, step by step, and what er3a computes from its table.")
-
-
-def decision(
-    table: str,
-    failed: Sequence[str],
-    instead: str | None = None,
-    *,
-    unproven: bool = False,
-    same_arm: bool = False,
-    conflict: str = "",
-) -> str:
-    """What to do with a robot's model, from validation's status and the titles of the stages that failed.
-
-    ``instead`` is a model of the same arm that evidence does not contradict; ``unproven``: independent documents settle
-    nothing of its geometry; ``same_arm``: the evidence is of this arm, defined otherwise; ``conflict``: values of one
-    number about which references contradict each other.
-    """
-    if table == "not_examined":
-        return tr("Its table has not been examined yet: run the stage validation first.")
-    if table == "fail" and same_arm:
-        return tr("This is the robot, but its zeros, directions, base or flange are others: correct them first.")
-    if table == "fail" and instead:
-        return tr("Never use this table: evidence contradicts it. Use {robot} instead.", robot=instead)
-    if table == "fail":
-        return tr("Never use this table: evidence contradicts it.")
-    if failed:
-        return tr("Do not use it as it is: see {stages}.", stages=joined(failed, ", "))
-    if table == "pass":
-        return tr("Use it: independent documents settle every entry that moves the tool.")
-    if table == "caution":
-        use = tr("Don't rely on it yet") if unproven else tr("Use it for planning only")
-        if conflict:
-            why = tr("references contradict each other ({values}).", values=conflict)
-        elif unproven:
-            why = tr("no independent document settles any of its geometry.")
-        else:
-            why = tr("part of its table is not settled.")
-        return tr("{use}: {why}", use=use, why=why)
-    return tr("There is no evidence on its table: check it before you use it.")
-
-
-@dataclass(frozen=True)
-class NextStep:
-    """What to do next with a robot's model, and the page that says how, from the index."""
-
-    text: str
-    page: str
-
-
-def next_step(
-    robot: str,
-    table: str,
-    failed: Mapping[str, str],
-    *,
-    instead: str | None = None,
-    same_arm: bool = False,
-    measurement: str = "",
-    entry: str = "",
-) -> NextStep | None:
-    """The step that helps most; None where nothing is open. ``failed``: titles of stages that failed, by name;
-    ``measurement``: the one that validation proposes, and ``entry``, what it settles; the others as of
-    :func:`decision`."""
-    validation = f"{robot}/validation.html"
-    if table == "fail" and same_arm:
-        return NextStep(tr("Take the corrected table from the validation page."), validation)
-    if table == "fail" and instead:
-        return NextStep(
-            tr("Take the table of {robot}, which nothing in the same evidence contradicts.", robot=instead),
-            f"{validation}#table-to-use",
-        )
-    if table == "fail":
-        return NextStep(tr("See which entries are contradicted, and what mends them."), validation)
-    if failed:
-        stage, title = next(iter(failed.items()))
-        return NextStep(tr("See why {stage} fails, and what to do about it.", stage=title), f"{robot}/{stage}.html")
-    if table == "no_reference":
-        text = tr("Gather the manufacturer's data, or compare the table with a URDF by er3a compare.")
-        return NextStep(text, validation)
-    return NextStep(measurement, f"{validation}#entry-{entry}") if measurement else None
 
 
 @dataclass(frozen=True)

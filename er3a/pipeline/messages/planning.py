@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.finding import Amount, Finding
+from er3a.finding import Amount
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.say import bracketed, by, joined, listed, says, sentence, texts
+from er3a.pipeline.messages.say import WORDS, says, sentence, texts
 from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import StrategyName
 
@@ -32,10 +32,11 @@ TEXTS = texts(
         "no_time_law_found": "no timing found within the joints' limits",
         "library_missing": "the library {name} is not installed; it has wheels for Linux on x86-64 only",
         "nothing_measured": "distances can't be measured here, so nothing can be planned",
-        "no_end": by("end", end="at its end: {why}", start="at its start: {why}"),
+        "no_end": "at its {end:end}: {why}",
         "none_within_limits": "no joint angles within the limits reach it",
         "none_found": "no path found in {rounds} rounds; there may be one",
         "nothing_to_avoid": "nothing to avoid",
+        "out_of_reach": "{reasons:; }",
         "beyond_reach": "out of reach",
         "in_region": "inside the region",
         "partly_out_of_reach": "a part of the path is out of reach",
@@ -45,17 +46,19 @@ TEXTS = texts(
         "bent_path_singular": "the bent path runs into another singular region",
         "path_not_finished": "only {done:.0%} of the path is completed",
         "ends_off_path": "it ends {distance_mm:.3g} mm and {angle_deg:.3g} deg from the path's end",
-        "speed_exceeded": "a joint needs {ratio:.2f} times its greatest speed",
-        "acceleration_exceeded": "a joint needs {ratio:.2f} times its greatest acceleration",
-        "rate#needed": "J{joint} needs {needed:.0f}; limit {limit:g}",
-        "rate#far": "J{joint} needs more than {times:g} times its limit of {limit:g}",
-        "rate#step": "J{joint}'s acceleration has a step; jerk limit {limit:g}",
-        "rates": "too fast: {named}; {worst:; }",
-        "assumed": "assumed",
+        "rate_exceeded": "a joint needs {ratio:.2f} times its greatest {rate:rate}",
+        "rate": (
+            "J{joint} needs [{needed:.0f}][over {times:g} times as much][a step of its acceleration{step:?}]; limit "
+            "{limit:g}[ (assumed{assumed:?})]"
+        ),
+        "path.cause": "{event}: {pose}",
+        "rates": "too fast: {joints:, }; {worst:; }",
         "times_needed": "{times} × its limit",
         "undecided": "not decided between the poses solved",
     }
 )
+WORDS["end"] = {"start": N_("start"), "end": N_("end")}
+WORDS["rate"] = {"speed": N_("speed"), "acceleration": N_("acceleration")}
 
 
 def unit_of(slides: bool) -> str:
@@ -67,19 +70,15 @@ def unit_of(slides: bool) -> str:
 def rate_needed(cause: RateCause) -> str:
     """What a joint needs of a rate, and what it has; far beyond that it is rounded, then no figure."""
     ratio, needed = rate_ratio(cause), cause.needed
-    form = "step" if needed is None else "far" if ratio > UNBOUNDED else "needed"
-    if form == "needed" and ratio > FAR:
-        needed = Amount(float(f"{needed.value:.1e}"), needed.unit)
-    text = sentence(f"rate#{form}", joint=cause.joint, needed=needed, limit=cause.limit, times=UNBOUNDED)
-    return bracketed(text, sentence("assumed") if cause.basis == "assumed" else "")
+    step, far = needed is None, ratio > UNBOUNDED
+    if needed and ratio > FAR:
+        needed = None if far else Amount(float(f"{needed.value:.1e}"), needed.unit)
+    times = UNBOUNDED if far and not step else None
+    shown = {"joint": cause.joint, "limit": cause.limit, "assumed": cause.basis == "assumed"}
+    return sentence("rate", needed=needed, times=times, step=step, **shown)
 
 
 def times_needed(ratio: float) -> str:
     """How many times its limit a joint needs, in a few letters."""
     times = f"> {UNBOUNDED:g}" if ratio > UNBOUNDED else f"{float(f'{ratio:.2g}'):g}"
     return sentence("times_needed", times=times)
-
-
-@says("out_of_reach")
-def _(found: Finding) -> str:
-    return joined(listed(found.reasons))

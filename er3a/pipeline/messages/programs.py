@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import singledispatch
-from typing import Any
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.pairs import LinkAndSolid
-from er3a.finding import Amount, AnyFinding, Finding, is_one
+from er3a.finding import Amount, Finding, is_one
 from er3a.kinematics.singularity import SingularityType
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.expectations import OUTCOMES, demonstrated
-from er3a.pipeline.messages.kinematics import SINGULARITIES, singular_pose
+from er3a.pipeline.messages import expectations  # noqa: F401
+from er3a.pipeline.messages.kinematics import singular_pose
 from er3a.pipeline.messages.planning import rate_needed
 from er3a.pipeline.messages.say import (
     WORDS,
     Maker,
-    bracketed,
     by_code,
     joined,
-    say,
+    same_text,
     say_as,
     says,
     sentence,
@@ -30,9 +26,7 @@ from er3a.pipeline.messages.say import (
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
 from er3a.planning.motion_faults import RateCause, rate_ratio
-from er3a.program_check import program_check_findings as found_in
-from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, MotionCollides, NotFollowedReason
-from er3a.programs.program_names import ProgramOutcome
+from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, NotFollowedReason
 
 LEVELS: dict[Level, str] = {
     "pass": N_("pass"),
@@ -105,7 +99,6 @@ SINGULAR: dict[SingularityType, str] = {
     "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
     "shoulder": N_("Keep the wrist at a distance from axis 1."),
 }
-MAX_PAIRS = 3  # that are named of a collision
 KEY_FIGURES = {
     "programs_passed": N_("Programs that pass, of those meant to"),
     "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
@@ -118,9 +111,10 @@ KEY_FIGURES = {
 TEXTS = texts(
     {
         "programs.none": "The list of programs is empty.",
-        "programs.programs": "{passed} of {count} programs pass",
-        "programs.not_examined": "not all examined ({names:, })",
-        "programs.fault": "{count} {word:trajectory.path} ({names:, })",
+        "programs.verdict": (
+            "[{programs:?}{passed} of {programs} programs pass.][ Fail: {failed:, }.][ Caution: {caution:, }.][ "
+            "Not all examined: {not_examined:, }.][ Expected to fail, and did: {demonstrations:, }.]"
+        ),
         "not_followed": "not followed: {text:not_followed} ({reason:target_reason})",
         "way_not_known": "start of the motion unknown; only the target was checked",
         "configuration_guessed": "{solutions} solutions possible: the joints before are not known",
@@ -136,11 +130,12 @@ TEXTS = texts(
         "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",
         "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds {bounded:bounded}",
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
-        "programs.cause": "{finding}: {pose}",
         "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
-        "motion_collides": "collision ({assumed:shapes}): {touches:; }",
-        "bodies_touch": "{pair} after {at:.4g}, {depth_mm:.1f} mm deep",
-        "bodies_touch.enlarged": "shapes up to {enlarged_mm:.1f} mm larger than their meshes",
+        "motion_collides": "collision ({assumed:shapes}): {touches:3; }",
+        "bodies_touch": (
+            "{pair} after {at:.4g}, {depth_mm:.1f} mm deep[{enlarged_mm:?} (shapes up to {enlarged_mm:.1f} mm larger "
+            "than their meshes)]"
+        ),
         "speed_not_given": "no usable speed (given: {word:speed_given}); {assumed:g} assumed",
         "suspect_number": "{text} looks like {kind:suspect}; expected: {usual}",
         "frames_from_robot_file": (
@@ -149,34 +144,13 @@ TEXTS = texts(
         "program_not_understood": "not understood: {text}",
         "program_nothing_moves": "no instruction moves the arm",
         "load_above_payload": "{mass_kg:g} kg on the flange; payload {payload_kg:g} kg",
-        "written_zones_dropped": "zones without equivalent (the arm stops there): {zones}",
-        "written_speeds_estimated": "durations written as speeds (ramps decide the time): {motions}",
-        "written_speeds_cut": "speeds above 100 % written as 100 %: {motions}",
-        "written_speeds_raised": "speeds raised to the least with a name, so faster than checked: {motions}",
-        "written_speeds_of_assumed": (
-            "speeds written with an assumed {assumed} as 100 % (the controller's may be far from that): {motions}"
-        ),
-        "written_half_turns_split": "lines or arcs with a turn by 180 deg halved, which fixes the sense: {lines}",
-        "written_targets_left_out": "motions left out (target unknown): {motions}",
-        "written_tool_not_given": "set this tool or base on the controller: {name}",
-        "written_values_rounded": "speeds or zones rounded down to the next with a name: {values}",
-        "written_not_translated": "instructions of the other language kept as comments: {instructions}",
-        "written_one_side": "branches with one side written, the other left out: {branches}",
-        "written_external_axes_dropped": "motions written without external axes: {motions}",
-        "written_arcs_split": "arcs written as lines within {deviation_mm:g} mm: {arcs} as {lines}",
-        "written_unsafe": "path {path} is not safe: {verdict:trajectory.path}",
-        "written_near_assumed": (
-            "path {path}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm"
-        ),
-        "written_beside_points": (
-            "path {path} was checked with corners rounded by up to {missed}; a controller that stops or blends "
-            "otherwise moves elsewhere"
-        ),
         "remedy.zone_too_large": "Make the zone {half:.1f} mm at most.",
         "remedy.limit": "Keep J{joint} within {limit:g} deg; turn or move a target given as a pose.",
-        "remedy.collision#solid": "Add a via point around {name}: the target itself is clear.",
-        "remedy.collision#solid_at_target": "Move the target away from {name}: they overlap there.",
-        "remedy.collision#links": (
+        "remedy.solid": (
+            "[Add a via point around {name}: the target itself is clear.{there:!}][Move the target away from "
+            "{name}: they overlap there.{there:?}]"
+        ),
+        "remedy.links": (
             "Keep these links apart: give the target another place, orientation or configuration, or add a via point."
         ),
         "remedy.slower": "Lower this line's speed to {percent:g} % or less, its acceleration to {acceleration:g} %.",
@@ -185,8 +159,6 @@ TEXTS = texts(
 )
 WORDS.update(
     {
-        "singularity": SINGULARITIES,
-        "trajectory.path": OUTCOMES,
         "target_reason": REASONS,
         "not_followed": {"": N_("from here on")},
         "shapes": {True: N_("assumed shapes"), False: N_("stated shapes")},
@@ -204,22 +176,7 @@ WORDS.update(
 )
 
 
-@says("programs.pass", "programs.caution", "programs.fail")
-def _(found: Finding) -> str:
-    passed = sentence("programs.programs", count=found.programs + len(found.demonstrations), passed=found.passed)
-    unsound: dict[ProgramOutcome, tuple[str, ...]] = {"fail": found.failed, "caution": found.caution}
-    others = [
-        sentence("programs.fault", count=len(names), word=outcome, names=names)
-        for outcome, names in unsound.items()
-        if names
-    ]
-    sentences = [
-        passed if found.programs else "",
-        joined(others, ", "),
-        sentence("programs.not_examined", names=found.not_examined) if found.not_examined else "",
-        demonstrated(found.demonstrations, found.programs),
-    ]
-    return sentence("finding", finding=joined(sentences))
+same_text("programs.verdict", "programs.pass", "programs.caution", "programs.fail")
 
 
 def level_word(level: Level) -> str:
@@ -227,26 +184,16 @@ def level_word(level: Level) -> str:
     return word("program_level", LEVELS, level)
 
 
-@say.register
-def _(found: found_in.MotionCollides) -> str:
-    rest = len(found.touches) - MAX_PAIRS
-    more = [sentence("more", count=rest)] if rest > 0 else []
-    return say_as(found, touches=(*found.touches[:MAX_PAIRS], *more))
-
-
-@say.register
-def _(found: found_in.BodiesTouch) -> str:
-    at = Amount(found.t_s, "s") if found.at_mm is None else Amount(found.at_mm, "mm")
-    enlarged = sentence("bodies_touch.enlarged", enlarged_mm=found.enlarged_mm) if found.enlarged_mm else ""
-    return bracketed(say_as(found, at=at), enlarged)
+@says("bodies_touch")
+def _(found: Finding) -> str:
+    return say_as(found, at=Amount(found.t_s, "s") if found.at_mm is None else Amount(found.at_mm, "mm"))
 
 
 ADVISED: dict[str, Maker] = {}
 advises = by_code(ADVISED)
 
 
-@singledispatch
-def remedy(finding: Any) -> str:
+def remedy(finding: Finding) -> str:
     """What to do about a finding, as a sentence in the language in use; empty where nothing is to be done."""
     if maker := ADVISED.get(finding.code):
         return maker(finding)
@@ -268,13 +215,13 @@ def _(found: Finding) -> str:
     return sentence("remedy.limit", joint=found.joint, limit=found.limit_deg)
 
 
-@remedy.register
-def _(found: MotionCollides) -> str:
+@advises("motion_collides")
+def _(found: Finding) -> str:
     there = next((touch for touch in found.touches if touch.at_target), None)
     pair = (there or found.touches[0]).pair
-    if isinstance(pair, LinkAndSolid):
-        return sentence("remedy.collision#solid_at_target" if there else "remedy.collision#solid", name=pair.solid)
-    return sentence("remedy.collision#links")
+    if is_one(pair, "link_and_solid"):
+        return sentence("remedy.solid", there=there is not None, name=pair.solid)
+    return sentence("remedy.links")
 
 
 @advises("too_fast")
@@ -299,13 +246,13 @@ def rates_text(paces: Sequence[RateCause]) -> str:
     """What is too fast on a line, all joints together: the worst of them."""
     joints = sorted({each.joint for each in paces})
     worst = rate_needed(max(paces, key=rate_ratio))
-    named = ", ".join(f"J{joint}" for joint in joints)
-    return sentence("rates", named=named, worst=(worst,)) if len(joints) > 1 else worst
+    named = tuple(f"J{joint}" for joint in joints)
+    return sentence("rates", joints=named, worst=(worst,)) if len(joints) > 1 else worst
 
 
-def singular_cause(found: AnyFinding) -> str:
+def singular_cause(found: Finding) -> str:
     """That a line comes to a singular pose, and how the arm stands there."""
-    return sentence("programs.cause", finding=found, pose=singular_pose(found.type))
+    return sentence("path.cause", event=found, pose=singular_pose(found.type))
 
 
 def remedies(findings: Sequence[CheckFinding | FindingAt]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
 from er3a.pipeline.messages.pages import SIDES
-from er3a.pipeline.messages.say import bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete
 
@@ -79,74 +79,60 @@ MEASURED = {
 TEXTS = texts(
     {
         "axis_direction": "axis {joint} direction",
-        "drawing_extent": "{extreme} {axis} in the side view",
+        "drawing_extent": "{extreme:extreme} {axis} in the side view",
         "joint_speed": "J{joint} speed",
-        "orientation_at_pose": "orientation of the flange",
+        "orientation_at_pose": "orientation of the flange[ {coordinate:coordinate}]",
+        "point_at_pose": "{point:point}[ {coordinate:coordinate}]",
+        "segment_inclination": "{segment:segment}",
+        "joint_limit": "J{joint} {side:side}",
         "pose_excess": "outside the limits by",
-        "axis_position": "axis {joint}",
+        "axis_position": "axis {joint}[ {coordinate:coordinate}]",
         "at_pose": "{own_pose}: {seen}",
-        "drawing_corner": "corner ({q2_deg:g}, {q3_deg:g})",
-        "reach": "{extreme} distance of the {point} from axis {axis}",
+        "drawing_corner": "corner ({q2_deg:g}, {q3_deg:g})[ {coordinate:coordinate}]",
+        "reach": "{extreme:extreme} distance of the {point:point} from axis {axis}",
         "motion_of_joint": "+J{joint}: {motion}",
-        "entry_of_table": "{own_entry}, measured",
-        "read_limit": "read J{joint}'s {side} in the controller's settings; don't drive there",
+        "entry_of_table": "{column}{joint}, measured",
+        "read_limit": "read J{joint}'s {side:side} in the controller's settings; don't drive there",
         "time_joint": ("in a cleared cell, time a long turn of J{joint} at full speed, to ±{half_width_deg_s:g} deg/s"),
-        "measure": "measure {own_entry} to ±{half_width:g}: {what}",
+        "measure_entry": "measure {own_entry} to ±{half_width:g}: {what}",
         "look_at_motion": (
             "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from {start} and see, from behind "
             "the arm, whether {motion}"
         ),
         "not_the_robot_described": (
-            "This is not the robot that these describe: {against:; }. Positions differ by up to {mismatch_mm:.0f} mm; "
-            "{tried} corrections of one or two entries leave {left_mm:.1f} mm or more."
+            "This is not the robot that these describe: {against:own; }. Positions differ by up to "
+            "{mismatch_mm:.0f} mm; {tried} corrections of one or two entries leave {left_mm:.1f} mm or more."
         ),
         "inconsistent_with_own_text": (
-            "The table contradicts its own text ({against:; }), which asks for {entry} = {needed:g} {unit}, not "
-            "{given:g}. The text is no evidence about a real robot."
-        ),
-        "inconsistent_unexplained": (
-            "The table contradicts its own text ({own_documents}); no single sign or quarter turn mends it."
+            "The table contradicts its own text ({against:own; })[, which asks for {entry} = {needed:g} "
+            "{unit:unit}, not {given:g}. The text is no evidence about a real robot.][; no single sign or quarter "
+            "turn mends it.{entry:!}]"
         ),
     }
 )
+WORDS.update(
+    {
+        "side": SIDES,
+        "coordinate": LABELS,
+        "extreme": EXTREMES,
+        "point": POINT_WORDS,
+        "segment": SEGMENT_WORDS,
+    }
+)
+FORMATS["unit"] = tr
+
+
+AtPose = subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess
 
 
 def quoted(subject: subjects.Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
-    if isinstance(subject, subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess):
-        return bracketed(_seen(subject), own_title(subject.pose))
-    return say(subject)
+    return bracketed(say_as(subject), own_title(subject.pose)) if isinstance(subject, AtPose) else say(subject)
 
 
 @say.register
-def _(found: subjects.AxisPosition | subjects.DrawingCorner) -> str:
-    return _with_coordinate(say_as(found), found.coordinate)
-
-
-@say.register
-def _(found: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
-    return sentence("at_pose", own_pose=own_title(found.pose), seen=_seen(found))
-
-
-@say.register
-def _(found: subjects.SegmentInclination) -> str:
-    return word(found.code, SEGMENT_WORDS, found.segment)
-
-
-@say.register
-def _(found: subjects.DrawingExtent) -> str:
-    return say_as(found, extreme=word("extreme", EXTREMES, found.extreme))
-
-
-@say.register
-def _(found: subjects.JointLimit) -> str:
-    return f"J{found.joint} {word('side', SIDES, found.side)}"
-
-
-@say.register
-def _(found: subjects.Reach) -> str:
-    point = word("point", POINT_WORDS, found.point)
-    return say_as(found, extreme=word("extreme", EXTREMES, found.extreme), point=point)
+def _(found: AtPose) -> str:
+    return sentence("at_pose", own_pose=own_title(found.pose), seen=say_as(found))
 
 
 @say.register
@@ -154,28 +140,11 @@ def _(found: subjects.MotionOfJoint) -> str:
     return say_as(found, motion=motion_seen(found))
 
 
-@say.register
-def _(found: subjects.EntryOfTable) -> str:
-    return say_as(found, own_entry=f"{found.column}{found.joint}")
-
-
 def motion_seen(found: subjects.MotionOfJoint) -> str:
     """What is seen, as a clause."""
     manner, *others = found.seen.split("_")
     way = word("way", WAYS, others[-1] if others else manner)
     return tr(MANNERS[manner if others else "moves"], point=word("point", POINT_WORDS, found.point), way=way)
-
-
-def _seen(subject: subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess) -> str:
-    if isinstance(subject, subjects.OrientationAtPose):
-        return _with_coordinate(say_as(subject), subject.coordinate)
-    if isinstance(subject, subjects.PoseExcess):
-        return say_as(subject)
-    return _with_coordinate(word("point", POINT_WORDS, subject.point), subject.coordinate)
-
-
-def _with_coordinate(vector: str, coordinate: str | None) -> str:
-    return f"{vector} {LABELS.get(coordinate, coordinate)}" if coordinate else vector
 
 
 @says("look_at_motion")
@@ -186,27 +155,9 @@ def _(found: Finding) -> str:
     return say_as(found, start=start, motion=motion)
 
 
-@says("read_limit")
-def _(found: Finding) -> str:
-    return say_as(found, side=word("side", SIDES, found.side))
-
-
 @says("measure_angle", "measure_length")
 def _(found: Finding) -> str:
     mm = is_one(found, "measure_length")
     half_width = Amount(found.half_width_mm, "mm") if mm else Amount(found.half_width_deg, "deg")
     what = tr(MEASURED[found.column], joint=found.joint, before=found.joint - 1)
-    return sentence("measure", own_entry=found.entry, half_width=half_width, what=what)
-
-
-@says("inconsistent_with_own_text")
-def _(found: Finding) -> str:
-    against = tuple(map(own_title, found.against))
-    if found.entry is None:
-        return sentence("inconsistent_unexplained", own_documents=joined(against))
-    return say_as(found, against=against, unit=tr(found.unit))
-
-
-@says("not_the_robot_described")
-def _(found: Finding) -> str:
-    return say_as(found, against=tuple(map(own_title, found.against)))
+    return sentence("measure_entry", own_entry=found.entry, half_width=half_width, what=what)

@@ -1,20 +1,28 @@
 """From findings to sentences in the language in use.
 
-The texts of an area stand in one table, by key: the code of a finding, or of a sentence that others are made of, and
-where it has several forms, ``#`` and which one. The fields of a text are those of its finding::
+The texts of an area stand in one table, by code: of a finding, or of a sentence that others are made of. Each has one
+form. The fields of a text are those of its finding::
 
     TEXTS = texts(
         {
-            "not_reached": "joint {joint} is {gap_mm:.1f} mm short",
-            "wrong_limit": by("side", lower="the lower limit is wrong", upper="the upper limit is wrong"),
-            "missed": Plural("missed", "{count} check is missed", "{count} checks are missed"),
-            "blocked": "blocked by {bodies:, }",
+            "not_reached": "joint {joint} is {gap_mm:.1f} mm short[ (assumed{assumed:?})]",
+            "wrong_limit": "the {side:side} is wrong",
+            "blocked": "blocked by {bodies:3, }",
         }
     )
 
-Numbers are formatted as the English text says, and a finding in a field is said; several findings or texts are joined
-by ``", "``, ``"; "`` or ``" "``, whichever stands as their format. Catalogues hold translations by key, so that a
-changed English wording loses none. Where a sentence needs more than that, a function makes it::
+Numbers are formatted as the English text says, and a finding in a field is said. What is between ``[`` and ``]`` is
+there only if each of its fields has a value: not None, and no empty text or list. A field with the format ``?`` or
+``!`` is not shown; it asks that its value holds, or does not hold: a truth value, a number other than 0, a list.
+Formats besides those of Python:
+
+- the name of a table of words (:data:`WORDS`): the word for the field's value;
+- one of :data:`FORMATS`: ``own`` for a title out of somebody's file, ``at_least L`` for a bound that stays one;
+- of several values: how many are shown at most, the format of each, and what is between them: ``{bodies:3, }``,
+  ``{xyz_mm:.1f, }``, ``{faults:; }``.
+
+Each text has ``{assumed}``, which holds if its finding's basis is assumed. Catalogues hold translations by key, so that
+a changed English wording loses none. Where a sentence needs more than that, a function makes it::
 
     @says("free_space")
     def _(found: Finding) -> str:
@@ -25,70 +33,47 @@ Views and the command line import the modules whose findings they show.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Callable, Iterable, Mapping
 from functools import singledispatch
-from typing import Any, Literal, TypeVar
+from string import Formatter
+from typing import Any
 
 from er3a.finding import Amount, AnyFinding
 from er3a.finding import Finding as Found
 from er3a.pipeline import language
-
-KeyT = TypeVar("KeyT", bound=str)
-Separator = Literal["; ", ", ", ". ", " "]
-
-
-@dataclass(frozen=True)
-class Plural:
-    """A text whose form depends on a field: a number, or how many it holds; ``{count}`` in the text."""
-
-    field: str
-    one: str
-    many: str
-
-
-@dataclass(frozen=True)
-class By:
-    """Texts of which a field decides."""
-
-    field: str
-    texts: Mapping[str, str]
-
+from er3a.pipeline.language import N_, tr
+from er3a.pipeline.messages.numbers import at_least, at_most
 
 LONGEST, EXCERPT = 2_000, 200  # letters
-Text = str | Plural
-_texts: dict[str, Text] = {}
+_texts: dict[str, str] = {}
 Maker = Callable[[Found], str]
 WORDS: dict[str, Mapping[Any, str]] = {}
 """Tables of words marked with ``N_``: a field whose format names one takes its word, as ``{reason:target_reason}``."""
 MAKERS: dict[str, Maker] = {}
 """What makes the texts of findings, by their codes, where a text alone can't."""
-_fields: dict[str, str] = {}  # of keys whose form is decided by a field of the finding
+_OPTIONAL = re.compile(r"\[([^\[\]]*)\]")
+_MARKS = ("?", "!")
+_MARKED = re.compile(r"\{\w+:[?!]\}")
+_SEVERAL = re.compile(r"(\d*)([\w.+]*?)(; |, |\. | or | and | |)")
+FORMATS: dict[str, Callable[[Any], str]] = {
+    "own": language.own_title,
+    "at_least L": lambda litres: at_least(litres, "L"),
+    "at_most L": lambda litres: at_most(litres, "L"),
+    "at_least %": lambda ratio: f"{at_least(100 * ratio, 1)} %",
+}
+"""Formats of fields besides those of Python and the tables of words; modules of messages add theirs."""
 
 
-def by(field: str, **variants: str) -> By:
-    """Texts by the value of a field; those of a truth value are ``true`` and ``false``."""
-    return By(field, variants)
-
-
-def texts(table: Mapping[str, Text | By]) -> Mapping[str, Text | By]:
+def texts(table: Mapping[str, str]) -> Mapping[str, str]:
     """Make the texts of an area known, and return them."""
-    for key, text in table.items():
-        if isinstance(text, By):
-            _fields[key] = text.field
-            _texts.update({f"{key}#{variant}": each for variant, each in text.texts.items()})
-        else:
-            _texts[key] = text
+    _texts.update(table)
     return table
 
 
 TEXTS = texts(
     {
-        "joined#; ": "{first}; {rest}",
-        "joined#, ": "{first}, {rest}",
-        "joined#. ": "{first}. {rest}",
         "bracketed": "{text} ({more})",
-        "joined# ": "{first} {rest}",
         "finding": "{finding}.",
         "more": "{count} more",
         "stage.not_computed": "Not computed: {reason}",
@@ -101,19 +86,16 @@ TEXTS = texts(
 )
 
 
-def english(key: str) -> tuple[str, ...]:
-    """The English forms of a text by its key."""
-    text = _texts[key]
-    return (text.one, text.many) if isinstance(text, Plural) else (text,)
+def english(key: str) -> str:
+    """The English text by its key."""
+    return _texts[key]
 
 
 @singledispatch
 def say(finding: Any) -> str:
     """A finding as a text in the language in use, by its code; functions for types are registered with it."""
-    if maker := MAKERS.get(finding.code):
-        return maker(finding)
-    field = _fields.get(finding.code)
-    return say_as(finding, str(_params(finding)[field]).lower() if field else "")
+    maker = MAKERS.get(finding.code, say_as)
+    return maker(finding)
 
 
 def by_code(makers: dict[str, Maker]) -> Callable[..., Callable[[Maker], Maker]]:
@@ -138,9 +120,14 @@ says = by_code(MAKERS)
 """Has a function make the texts of findings with these codes."""
 
 
+def same_text(key: str, *codes: str) -> None:
+    """Have findings with these codes share the text of a key, which is none of a finding's."""
+    MAKERS.update(dict.fromkeys(codes, lambda found: sentence(key, **_params(found))))
+
+
 def _params(finding: Any) -> Mapping[str, Any]:
     if isinstance(finding, Found):
-        return finding.params
+        return {"assumed": finding.basis == "assumed", **finding.params}
     return {name: getattr(finding, name) for name in finding.__dataclass_fields__}
 
 
@@ -149,9 +136,9 @@ def excerpt(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:EXCERPT]} …"
 
 
-def say_as(finding: AnyFinding, variant: str = "", /, **parts: Any) -> str:
-    """A finding as one of its texts, with parts besides its own fields or in place of them."""
-    return sentence(f"{finding.code}#{variant}" if variant else finding.code, **{**_params(finding), **parts})
+def say_as(finding: AnyFinding, /, **parts: Any) -> str:
+    """A finding's text, with parts besides its own fields or in place of them."""
+    return sentence(finding.code, **{**_params(finding), **parts})
 
 
 def sentence(key: str, /, **parts: Any) -> str:
@@ -160,25 +147,53 @@ def sentence(key: str, /, **parts: Any) -> str:
         text = _texts[key]
     except KeyError:
         raise KeyError(f"no text is known for {key!r}; import the module of messages that has it") from None
-    if isinstance(text, Plural):
-        count = parts[text.field]
-        count = len(count) if isinstance(count, Sequence) else count
-        form, parts = text.one if count == 1 else text.many, parts | {"count": count}
-        return language.filled(language.by_key(key, form, count), text.many + form, parts, _as_text)
-    return language.filled(language.by_key(key, text), text, parts, _as_text)
+    held, translated = _held(text, parts), _held(language.by_key(key, text), parts)
+    return language.filled(translated, held, parts, _as_text).strip()
+
+
+def _held(text: str, parts: Mapping[str, Any]) -> str:
+    """A text without those of its optional parts whose fields hold nothing."""
+
+    def holds(name: str, spec: str) -> bool:
+        value = parts[name]
+        if spec in _MARKS:
+            return bool(value) == (spec == "?")
+        return value is not None and (not isinstance(value, str | tuple | list) or len(value) > 0)
+
+    def part(found: re.Match[str]) -> str:
+        fields = [(name, spec or "") for _, name, spec, _ in Formatter().parse(found[1]) if name]
+        return _MARKED.sub("", found[1]) if all(holds(*field) for field in fields) else ""
+
+    return _OPTIONAL.sub(part, text)
 
 
 def _as_text(part: Any, spec: str) -> str:
-    """A part of a text: findings as sentences, words out of tables, several parts joined as the format says."""
+    """A part of a text; see the module for formats."""
+    if spec in FORMATS:
+        return FORMATS[spec](part)
+    if isinstance(part, tuple | list):
+        return _several(part, spec)
     if spec in WORDS:
         part, spec = word(spec, WORDS[spec], part), ""
-    if isinstance(part, tuple | list):
-        return joined([_as_text(each, "") for each in part], spec or "; ")
     if hasattr(part, "code"):
         return say(part)
     if isinstance(part, Amount):
-        return language.with_unit(language.as_text(part.value, spec), part.unit)
-    return language.as_text(excerpt(part) if isinstance(part, str) else part, spec)
+        return language.with_unit(language.as_text(part.value, spec), part.unit.removeprefix("1"))
+    if isinstance(part, str):
+        return excerpt(part)
+    text = language.as_text(part + 0.0 if isinstance(part, float) else part, spec)
+    return f"{text[:-1]} %" if spec.endswith("%") else text
+
+
+def _several(parts: tuple[Any, ...] | list[Any], spec: str) -> str:
+    """Values as one text: how many at most, the format of each, what is between them."""
+    found = _SEVERAL.fullmatch(spec)
+    if found is None:
+        raise ValueError(f"{spec!r} is no format of several values")
+    most, each, separator = found.groups()
+    shown = [_as_text(part, each) for part in parts[: int(most) if most else None]]
+    more = len(parts) - len(shown)
+    return joined([*shown, sentence("more", count=more) if more else ""], separator or "; ")
 
 
 def word(code: str, words: Mapping[Any, str], key: Any) -> str:
@@ -204,19 +219,16 @@ def bracketed(text: str, more: str) -> str:
 def say_first(finding: Any) -> str:
     """A finding with the first of the reasons that it names, and of the bodies that touch the first and the deepest."""
     if reasons := getattr(finding, "reasons", ()):
-        return say(
-            finding.but(reasons=reasons[:1]) if isinstance(finding, Found) else replace(finding, reasons=reasons[:1])
-        )
+        return say(finding.but(reasons=reasons[:1]))
     if touches := getattr(finding, "touches", ()):
         deepest = max(touches, key=lambda each: each.depth_mm)
-        return say(replace(finding, touches=tuple(dict.fromkeys((touches[0], deepest)))))
+        return say(finding.but(touches=tuple(dict.fromkeys((touches[0], deepest)))))
     return say(finding)
 
 
-def joined(parts: Iterable[str], separator: Separator | str = "; ") -> str:
-    """Texts as one: apart by ``"; "``, ``", "``, ``". "`` or ``" "`` (whole sentences); empty ones are left out."""
-    kept = [text for text in parts if text]
-    whole = kept[-1] if kept else ""
-    for text in reversed(kept[:-1]):
-        whole = sentence(f"joined#{separator}", first=text, rest=whole)
-    return whole
+SEPARATORS = (N_("; "), N_(", "), N_(". "), N_(" "), N_(" or "), N_(" and "))
+
+
+def joined(parts: Iterable[str], separator: str = "; ") -> str:
+    """Texts as one, with one of ``SEPARATORS`` between them; empty ones are left out."""
+    return tr(separator).join(filter(None, parts))

@@ -9,8 +9,7 @@ from er3a.collision.pairs import BASE, link_label
 from er3a.finding import AnyFinding
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.pages import GROUP_NAMES
-from er3a.pipeline.messages.say import bracketed, joined, say, say_as, sentence, texts, word
-from er3a.pipeline.results import NotChecked
+from er3a.pipeline.messages.say import FORMATS, bracketed, joined, say, sentence, texts, word
 from er3a.pipeline.scope import Check, Coverage, Open
 
 CHECKS: Mapping[Check, str] = {
@@ -27,84 +26,87 @@ CHECKS: Mapping[Check, str] = {
     "program_lines": N_("lines of programs"),
     "units": N_("units"),
 }
+GAP_WORDS: Mapping[str, str] = {
+    "not_run": N_("the check was not made"),
+    "limits_assumed": N_("the robot's file assumes the limits"),
+    "not_followed": N_("paths not followed"),
+    "points_missed": N_("points that the motion misses as it rounds corners"),
+    "tool_turned": N_("the joints set only part of how the tool is turned (off by up to {amount:.1f}°)"),
+    "undecided_cells": N_("undecided: {amount:.0f} % of the volume, so raise proof_cells"),
+    "half_turns": N_("turns of half a circle, which a controller may make either way"),
+    "tray_inside": N_("the tray would stand inside solids"),
+    "rates_contradict": N_("the trajectory's rates contradict its points"),
+    "uncovered_links": N_("links that reach out of all shapes"),
+    "partial_links": N_("links whose shapes cover less than {amount:.0f} % of their length"),
+    "bare_tool": N_("the tool has no shape (`carried` in the scene)"),
+    "allowed_contacts": N_("contacts that the scene's or the robot's file allows"),
+    "wrong_shapes": N_("shapes that overlap where no arm's can"),
+    "no_scene": N_("no scene is given"),
+    "base_inside": N_("the base lies inside solids"),
+    "inside_solid": N_("places inside solids"),
+    "gripper": N_("the gripper has no shape (`carried` in the scene)"),
+    "gravity": N_("gravity is set to {amount:g} m/s²"),
+    "paths_not_run": N_("paths that may not be run"),
+    "program_loads": N_("loads that programs name"),
+    "arm_errors": N_("the file does not state all of the arm's own errors"),
+    "out_of_view": N_("objects out of the camera's stated view"),
+    "flange_frame": N_("the recorded poses may be a tool's, not the flange's"),
+    "base_frame": N_("the recorded poses may be in another frame than the base"),
+    "intrinsics": N_("the camera's intrinsics are unknown, and no touched points confirm the result"),
+    "program_rest": N_("lines that may move the arm and belong to no path"),
+    "program_findings": N_("doubts or faults in these programs"),
+    "program_lines": N_("lines not followed each time"),
+    "units": N_("numbers that look like radians or metres (`units_checked: true` confirms them)"),
+}
+"""Why a check does not cover all, by the reasons of gaps."""
+ASSUMED: Mapping[str, str] = {
+    "own_values": N_("values of the robot's file that are inferred"),
+    "own_speeds": N_("joint speeds"),
+    "own_accelerations": N_("joint accelerations"),
+    "tool": N_("no tool: the flange's centre is the tip"),
+    "carried": N_("nothing is carried"),
+    "guessed_pairs": N_("pairs of links for which guessed shapes are too coarse"),
+    "base_contacts": N_("the base is mounted on these solids"),
+    "start_branches": N_("the solution to start with"),
+    "arm_angles": N_("the arm angle"),
+    "solutions_complete": N_("the solutions found are all"),
+    "program_starts": N_("where programs start from"),
+    "program_load": N_("programs name loads"),
+    "outer_axes": N_("axes beside the arm's rest"),
+    "capability": N_("tool directions were not computed"),
+    "places": N_("no place for the tray was looked for"),
+    "tray_nowhere": N_("no place for the tray was found"),
+    "references": N_("no reference states these"),
+    "loose_references": N_("references too loose to tell"),
+    "tool_and_base": N_("the study's tool and base"),
+    "link_masses": N_("links without a mass weigh nothing"),
+    "peak_torques": N_("peak torques are unknown"),
+    "rated_torques": N_("rated torques are unknown"),
+    "rotor_inertias": N_("rotors have no inertia"),
+    "friction": N_("joints have no friction"),
+    "wrist_limits": N_("wrist limits are unknown"),
+    "load": N_("tool and payload weigh nothing"),
+    "open_space": N_("nothing stands around the arm"),
+    "mounting": N_("the base stands upright"),
+    "real_camera": N_("the camera is simulated"),
+    "joint_zeros": N_("joint zeros"),
+    "small_joint_zeros": N_("joint zeros are right to {amount:g} deg"),
+    "touched_points": N_("no touched points confirm the result"),
+    "given_intrinsics": N_("the camera's intrinsics are exact"),
+    "pose_intrinsics": N_("the camera's intrinsics are exact"),
+}
+"""What is assumed, by its reason."""
 
 TEXTS = texts(
     {
-        "link#base": "base",
-        "link#number": "link {number}",
+        "link": "[base{base:?}][{base:!}link {number}]",
         "reserved.dynamics.no_limits": (
             "What is not known comes on top of these torques, whose ± is that of the known masses alone: don't choose "
             "motors by them."
         ),
-        "not_checked": "Not checked: {checks}.",
+        "not_checked": "Not checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
-        "coverage.all": "all",
-        "coverage.none": "none",
-        "coverage.part": "{covered} of {of}",
-        "gap.not_run": "the check was not made",
-        "gap.limits_assumed": "the robot's file assumes the limits",
-        "gap.not_followed": "paths not followed",
-        "gap.points_missed": "points that the motion misses as it rounds corners",
-        "gap.tool_turned": "the joints set only part of how the tool is turned (off by up to {amount:.1f}°)",
-        "gap.undecided_cells": "undecided: {amount:.0f} % of the volume, so raise proof_cells",
-        "gap.half_turns": "turns of half a circle, which a controller may make either way",
-        "gap.tray_inside": "the tray would stand inside solids",
-        "gap.rates_contradict": "the trajectory's rates contradict its points",
-        "gap.uncovered_links": "links that reach out of all shapes",
-        "gap.partial_links": "links whose shapes cover less than {amount:.0f} % of their length",
-        "gap.bare_tool": "the tool has no shape (`carried` in the scene)",
-        "gap.allowed_contacts": "contacts that the scene's or the robot's file allows",
-        "gap.wrong_shapes": "shapes that overlap where no arm's can",
-        "gap.no_scene": "no scene is given",
-        "gap.base_inside": "the base lies inside solids",
-        "gap.inside_solid": "places inside solids",
-        "gap.gripper": "the gripper has no shape (`carried` in the scene)",
-        "gap.gravity": "gravity is set to {amount:g} m/s²",
-        "gap.paths_not_run": "paths that may not be run",
-        "gap.program_loads": "loads that programs name",
-        "gap.arm_errors": "the file does not state all of the arm's own errors",
-        "gap.out_of_view": "objects out of the camera's stated view",
-        "gap.flange_frame": "the recorded poses may be a tool's, not the flange's",
-        "gap.base_frame": "the recorded poses may be in another frame than the base",
-        "gap.intrinsics": "the camera's intrinsics are unknown, and no touched points confirm the result",
-        "gap.program_rest": "lines that may move the arm and belong to no path",
-        "gap.program_findings": "doubts or faults in these programs",
-        "gap.program_lines": "lines not followed each time",
-        "gap.units": "numbers that look like radians or metres (`units_checked: true` confirms them)",
-        "assumed.own_values": "values of the robot's file that are inferred",
-        "assumed.own_speeds": "joint speeds",
-        "assumed.own_accelerations": "joint accelerations",
-        "assumed.tool": "no tool: the flange's centre is the tip",
-        "assumed.carried": "nothing is carried",
-        "assumed.guessed_pairs": "pairs of links for which guessed shapes are too coarse",
-        "assumed.base_contacts": "the base is mounted on these solids",
-        "assumed.start_branches": "the solution to start with",
-        "assumed.arm_angles": "the arm angle",
-        "assumed.solutions_complete": "the solutions found are all",
-        "assumed.program_starts": "where programs start from",
-        "assumed.program_load": "programs name loads",
-        "assumed.outer_axes": "axes beside the arm's rest",
-        "assumed.capability": "tool directions were not computed",
-        "assumed.places": "no place for the tray was looked for",
-        "assumed.tray_nowhere": "no place for the tray was found",
-        "assumed.references": "no reference states these",
-        "assumed.loose_references": "references too loose to tell",
-        "assumed.tool_and_base": "the study's tool and base",
-        "assumed.link_masses": "links without a mass weigh nothing",
-        "assumed.peak_torques": "peak torques are unknown",
-        "assumed.rated_torques": "rated torques are unknown",
-        "assumed.rotor_inertias": "rotors have no inertia",
-        "assumed.friction": "joints have no friction",
-        "assumed.wrist_limits": "wrist limits are unknown",
-        "assumed.load": "tool and payload weigh nothing",
-        "assumed.open_space": "nothing stands around the arm",
-        "assumed.mounting": "the base stands upright",
-        "assumed.real_camera": "the camera is simulated",
-        "assumed.joint_zeros": "joint zeros",
-        "assumed.small_joint_zeros": "joint zeros are right to {amount:g} deg",
-        "assumed.touched_points": "no touched points confirm the result",
-        "assumed.given_intrinsics": "the camera's intrinsics are exact",
-        "assumed.pose_intrinsics": "the camera's intrinsics are exact",
+        "coverage": "[all{all:?}][none{none:?}][{part:?}{covered} of {of}]",
         "never.validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
         "never.workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
         "never.inverse": "Never checked: the motions from one target to the next.",
@@ -146,12 +148,12 @@ def open_names(found: Open, most: int | None = None) -> str:
 
 def gap_text(found: Open, most: int | None = MAX_NAMED) -> str:
     """Why a check does not cover all, and of what."""
-    return bracketed(sentence(f"gap.{found.reason}", amount=found.amount), open_names(found, most))
+    return bracketed(tr(GAP_WORDS[found.reason], amount=found.amount), open_names(found, most))
 
 
 def assumed_text(found: Open, most: int | None = None) -> str:
     """What is assumed, and of what."""
-    return bracketed(sentence(f"assumed.{found.reason}", amount=found.amount), open_names(found, most))
+    return bracketed(tr(ASSUMED[found.reason], amount=found.amount), open_names(found, most))
 
 
 def check_name(check: Check) -> str:
@@ -161,8 +163,9 @@ def check_name(check: Check) -> str:
 
 def covered_text(found: Coverage) -> str:
     """How much a check covers: all, none, or how many of how many."""
-    form = "all" if found.complete else "none" if not found.covered else "part"
-    return sentence(f"coverage.{form}", covered=found.covered, of=found.of)
+    none = not (found.complete or found.covered)
+    marks = {"all": found.complete, "none": none, "part": not (found.complete or none)}
+    return sentence("coverage", covered=found.covered, of=found.of, **marks)
 
 
 def missed_text(found: Coverage) -> str:
@@ -182,17 +185,19 @@ def say_reserved(finding: AnyFinding, assumed: Iterable[Open]) -> str:
     return joined([say(finding), sentence(f"reserved.{finding.code}") if reserved else ""], " ")
 
 
-@say.register
-def _(found: NotChecked) -> str:
-    return say_as(found, checks=joined(map(missed_text, found.checks)))
+FORMATS["missed"] = missed_text
+
+
+def not_checked(missed: tuple[Coverage, ...]) -> str:
+    """What was to be checked and was not, or not all of it; empty where that is nothing."""
+    return sentence("not_checked", checks=missed) if missed else ""
 
 
 def body_word(name: str) -> str:
     """A body of the arm, or what is carried, by its name."""
-    if name == link_label(BASE):
-        return sentence("link#base")
     number = name.removeprefix("link_")
-    return sentence("link#number", number=number) if number != name else own_title(name)
+    base = name == link_label(BASE)
+    return sentence("link", base=base, number=number) if base or number != name else own_title(name)
 
 
 def pair_words(label: str) -> str:

@@ -10,11 +10,10 @@ from typing import Any, Literal, NamedTuple
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
 from er3a.pipeline.language import N_, as_text, with_unit
-from er3a.pipeline.messages.expectations import demonstrated, outcome_word
+from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.numbers import numbers
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import joined, listed, say, say_first, says, sentence, texts, word
+from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import PathVerdict, StrategyName
@@ -62,7 +61,6 @@ FACTS: dict[FactName, str] = {
 """What is said of a motion to be run instead, beside what it is."""
 OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
 """Of paths that may be safe all the same, if nothing that is undecided is against it."""
-MAX_PAIRS = 3
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
@@ -76,49 +74,50 @@ PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
 TEXTS = texts(
     {
-        "trajectory.paths": "{safe} of {count} paths pass",
-        "trajectory.not_followed": "not followed to the end",
-        "trajectory.of_program": "doubt or fault in the program",
-        "trajectory.fault": "{word}: {count} ({names})",
-        "trajectory.near_assumed": "within the margin of assumed shapes: {count}",
-        "dependent_axes": "axes {axes} dependent",
+        "trajectory.paths": (
+            "[{paths:?}{safe} of {paths} paths pass.][ Unreachable: {unreachable:, }.][ None found: {none_found:, "
+            "}.][ Leave limits: {leaves_limits:, }.][ Collide: {collides:, }.][ Too fast: {too_fast:, }.][ "
+            "Singular: {singular:, }.][ Too fast for the assumed limits: {too_fast_if_assumed:, }.][ Undecided: "
+            "{undecided:, }.][ Near-singular: {near_singular:, }.][ Not followed to the end: {not_followed:, }.][ "
+            "Doubt or fault in the program: {of_program:, }.][{near_assumed:?} Within the margin of assumed "
+            "shapes: {near_assumed}.][ Expected to fail, and did: {demonstrations:, }.]"
+        ),
+        "dependent_axes": "axes {axes:, } dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
         "path.shown": "the figure shows the straight joint move",
         "path.harmless": "passes singular poses, which joint moves may: {places}",
         "path.no_fault": "no fault",
         "path.pace": "at its fastest it takes {fastest:.2f} s, of {programmed:.2f} s programmed",
-        "path.speeds#unbounded": "no finite joint speed follows the path there",
-        "path.speeds#bounded": "a controller may stop there or change configuration",
+        "path.speeds": (
+            "[{bounded:?}a controller may stop there or change configuration][{bounded:!}no finite joint speed "
+            "follows the path there]"
+        ),
         "path.passed": "{type} within {distance} at t = {when} s",
         "path.stretch": "from t = {start:.4g} to {end:.4g} s",
-        "path.cause": "{event}: {pose}",
         "path.worst": "{cause} at t = {t} s",
         "pair_touches": "{pair} overlap from t = {t0_s:.4g} s, up to {depth_mm:.1f} mm at t = {t_s:.4g} s",
         "path.singular": "{type} singularity",
-        "path.rates": "until t = {end:.4g} s {rates}",
-        "path.rates#again": "{rates}; again from t = {again:.4g} s",
-        "path.rates#edge": "{named} too fast from there on, without bound towards the edge of the reach",
-        "path.cause#edge": "the edge of the reach: stretched towards it, the arm needs speeds without bound",
+        "bodies_overlap": "{touches:3; }",
+        "path.rates": "until t = {end:.4g} s {rates}[; again from t = {again:.4g} s]",
+        "path.rates_at_edge": "{named:, } too fast from there on, without bound towards the edge of the reach",
+        "path.edge": "the edge of the reach: stretched towards it, the arm needs speeds without bound",
         "advice.none": "No repair: {why}",
         "advice.slower": (
             "Or run all of it at {percent:.3g} % of the programmed speed: {needed:.4g} s in all, its times × "
             "{longer:.4g}"
         ),
         "advice.clear_until": (
-            "It is {margin:.1f} mm clear up to t = {t:.4g} s ({far:.1f} mm), also in a stop ({stop:.2f} s). End it "
-            "with the tool at x, y, z = {xyz} mm, roll, pitch, yaw = {rpy} deg (joints {q}). Or move the path, or "
-            "what it hits: {pair} touch at {contact} mm"
+            "It is {margin_mm:.1f} mm clear up to t = {t_s:.4g} s ({far:.1f} mm), also in a stop ({stop_s:.2f} s). End "
+            "it with the tool at x, y, z = {xyz_mm:.1f, } mm, roll, pitch, yaw = {rpy_deg:.2f, } deg (joints "
+            "{q_deg:.2f, }). Or move the path, or what it hits: {pair} touch at {contact_mm:.0f, } mm"
         ),
         "advice.within_reach": (
-            "It is within reach up to t = {t:.4g} s ({far:.1f} mm): move its end or the workpiece nearer"
+            "[From t = {first:.4g} s: {what}; ]out of reach from t = {t:.4g} s ({far:.1f} mm)[: move its end or the "
+            "workpiece nearer{first:!}]"
         ),
-        "advice.within_reach#later": ("From t = {first:.4g} s: {what}; out of reach from t = {t:.4g} s ({far:.1f} mm)"),
         "advice.end": (
-            "End it at t = {t:.4g} s, x, y, z = {xyz} mm: {left:.2f} s before the first fault (a stop takes "
-            "{stop:.2f} s)"
-        ),
-        "advice.end#clear": (
-            "End it at t = {t:.4g} s, x, y, z = {xyz} mm: {margin:.1f} mm clear, also in a stop ({stop:.2f} s)"
+            "End it at t = {t_s:.4g} s, x, y, z = {xyz_mm:.1f, } mm: [{margin:.1f} mm clear, also in a stop of "
+            "{stop_s:.2f} s][{margin:!}{left_s:.2f} s before the first fault; a stop takes {stop_s:.2f} s]"
         ),
         "advice.slow_there": "Slow down from t = {start:.2f} to {end:.2f} s, to {percent} % at the slowest",
         "advice.no_part": "Run no part of it",
@@ -130,47 +129,21 @@ TEXTS = texts(
         "advice.full_speed": "A joint moves at full speed: start slowly",
         "limits_assumed": "Joint speeds or accelerations are assumed: what passes may be too fast.",
         "advice.limits": (
-            "It uses {speed:.0f} % of joint speeds and {acceleration:.0f} % of accelerations, in part assumed: begin "
-            "at 10 % override"
+            "It uses [{speed:.0%} of joint speeds and ]{acceleration:.0%} of joint accelerations, in part assumed"
+            "[{speed:?}: begin at 10 % override]"
         ),
-        "advice.limits#acceleration": "It uses {acceleration:.0f} % of joint accelerations, in part assumed",
-        "advice.tool": "the tool leaves the path by {far} mm, {turned} deg",
-        "advice.tool#none": "the tool stays on the path",
+        "advice.tool": "the tool [leaves the path by {far} mm, {turned} deg][stays on the path{far:!}]",
         "advice.swing": "J{joint} turns by {swing:.0f} deg",
-        "advice.switch#before": "It begins at other joint angles ({changes}): the way there was not checked",
-        "advice.switch#within": "The move to the other solution is part of it and was checked",
-        "advice.time": "{takes:.2f} s instead of {programmed:.2f} s",
-        "advice.time#same": "same time",
+        "advice.switch": (
+            "[It begins at other joint angles ({changes:, }): the way there was not checked][The move to the other "
+            "solution is part of it and was checked{changes:!}]"
+        ),
+        "advice.time": "[{takes:.2f} s instead of {programmed:.2f} s][same time{takes:!}]",
     }
 )
 
 
-@says("trajectory.safe", "trajectory.some_unsafe", "trajectory.none_safe")
-def _(found: Finding) -> str:
-    unsafe: dict[PathVerdict, tuple[str, ...]] = {
-        "unreachable": found.unreachable,
-        "none found": found.none_found,
-        "leaves limits": found.leaves_limits,
-        "collides": found.collides,
-        "too fast": found.too_fast,
-        "singular": found.singular,
-        "too fast for the assumed limits": found.too_fast_if_assumed,
-        "undecided": found.undecided,
-        "near-singular": found.near_singular,
-    }
-    by_word = {outcome_word(verdict): names for verdict, names in unsafe.items()}
-    by_word[sentence("trajectory.not_followed")] = found.not_followed
-    by_word[sentence("trajectory.of_program")] = found.of_program
-    faults = [
-        sentence("trajectory.fault", count=len(names), word=title, names=joined(names, ", "))
-        for title, names in by_word.items()
-        if names
-    ]
-    safe = sentence("trajectory.paths", count=found.paths + len(found.demonstrations), safe=found.safe)
-    if near := found.paths - found.safe - sum(map(len, by_word.values())):
-        faults.append(sentence("trajectory.near_assumed", count=near))
-    sentences = [safe if found.paths else "", joined(faults, ", "), demonstrated(found.demonstrations, found.paths)]
-    return sentence("finding", finding=joined(sentences))
+same_text("trajectory.paths", "trajectory.safe", "trajectory.some_unsafe", "trajectory.none_safe")
 
 
 def kind_word(kind: model.PathKind) -> str:
@@ -182,7 +155,7 @@ def event_word(event: model.Singularity) -> str:
     """A singularity's type, or the axes that become dependent where the field has no name for it."""
     if event.type != "dependent_axes":
         return singularity_word(event.type)
-    return sentence("dependent_axes", axes=", ".join(map(str, event.axes)))
+    return sentence("dependent_axes", axes=event.axes)
 
 
 def event_distance(event: model.Singularity) -> str:
@@ -228,7 +201,7 @@ def _apart_from_collisions(path: model.PathSummary) -> str:
     if path.in_joint_space and met:
         return sentence("path.harmless", places=joined(met))
     if not path.in_joint_space and (met or path.jumps):
-        speeds = sentence("path.speeds#bounded" if path.joint_speed_bounded else "path.speeds#unbounded")
+        speeds = sentence("path.speeds", bounded=path.joint_speed_bounded)
         return joined([*met, *map(say, path.jumps), speeds])
     if not path.in_joint_space and path.singularities:
         return joined(map(say, path.singularities))
@@ -282,12 +255,6 @@ def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatc
 
 def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
     return sentence("path.stretch", start=stretch.t0_s, end=stretch.t1_s)
-
-
-@say.register
-def _(found: model.BodiesOverlap) -> str:
-    more = len(found.touches) - MAX_PAIRS
-    return joined([*listed(found.touches[:MAX_PAIRS]), sentence("more", count=more) if more > 0 else ""])
 
 
 def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
@@ -345,7 +312,7 @@ def cause_of(path: model.PathSummary) -> str:
             return sentence("path.cause", event=say(event), pose=pose) if pose else say(event)
     if path.verdict in ("singular", "near-singular") and path.singularities:
         return singular_pose(path.singularities[0].type)
-    return sentence("path.cause#edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
+    return sentence("path.edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
 
 
 def _beside(event: model.Singularity, part: model.Stretch[RateCause]) -> bool:
@@ -394,14 +361,13 @@ def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf
     """
     run, again = _run(stretches)
     first, end = run[0], _end_of(run)
-    named = ", ".join(f"J{joint}" for joint in sorted({part.cause.joint for part in run}))
+    named = [f"J{joint}" for joint in sorted({part.cause.joint for part in run})]
     if end >= edge - ADJOINING:
-        return sentence("path.rates#edge", named=named)
+        return sentence("path.rates_at_edge", named=named)
     if len(run) == 1 and not _lasts(first):
         return say(first.cause)
     worst = [_with_worst(part, say(part.cause)) for part in _worst_of_kinds(run)]
-    rates = sentence("path.rates", end=end, rates=sentence("rates", named=named, worst=worst))
-    return rates if again is None else sentence("path.rates#again", rates=rates, again=again)
+    return sentence("path.rates", end=end, rates=sentence("rates", joints=named, worst=worst), again=again)
 
 
 def _with_worst(part: model.Stretch[Any], cause: str) -> str:
@@ -481,26 +447,22 @@ def _until(path: model.PathSummary) -> str:
         return ""
     if path.clear_until and end.t_s >= path.clear_until.t_s:
         return _clear(path)
-    return sentence("advice.end", **_end(end))
+    return sentence("advice.end", margin=None, **vars(end))
 
 
 def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: Finding | None) -> str:
     """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured, of
     assumed ``shapes`` or of given ones; that first, where assumed ones may be wrong by more."""
-    last = path.clear_until
-    if last is None:
-        return sentence("finding", finding=sentence("advice.end", **_end(end)))
-    clear = sentence("advice.end#clear", **_end(end) | {"margin": last.margin_mm, "stop": last.stop_s})
-    return sentence("finding", finding=joined([_of_assumed(last.margin_mm, shapes), clear], ". "))
+    last, parts = path.clear_until, vars(end) | {"margin": None}
+    if last:
+        parts |= {"margin": last.margin_mm, "stop_s": last.stop_s}
+    assumed = _of_assumed(last.margin_mm, shapes) if last else ""
+    return sentence("finding", finding=joined([assumed, sentence("advice.end", **parts)], ". "))
 
 
 def end_facts(path: model.PathSummary) -> list[tuple[FactName, str]]:
     """Why a path that is to end earlier has no repair, and where exactly it may end."""
     return [("repair", no_repair(path)), ("end", _until(path))]
-
-
-def _end(end: model.SoundEnd) -> dict[str, Any]:
-    return {"t": end.t_s, "xyz": numbers(end.xyz_mm, 1), "left": end.left_s, "stop": end.stop_s}
 
 
 def whole_pace(path: model.PathSummary) -> str:
@@ -518,8 +480,8 @@ def _within_reach(path: model.PathSummary) -> str:
     if part is None or part.s0_m <= 0:
         return ""
     first = min(first_faults(path))
-    form = "advice.within_reach#later" if first.t_s < part.t0_s else "advice.within_reach"
-    return sentence(form, t=part.t0_s, far=part.s0_m * 1000, first=first.t_s, what=first.text)
+    before = first.t_s if first.t_s < part.t0_s else None
+    return sentence("advice.within_reach", t=part.t0_s, far=part.s0_m * 1000, first=before, what=first.text)
 
 
 def _clear(path: model.PathSummary) -> str:
@@ -527,18 +489,8 @@ def _clear(path: model.PathSummary) -> str:
     last = path.clear_until
     if last is None or path.unreachable:
         return ""
-    return sentence(
-        "advice.clear_until",
-        margin=last.margin_mm,
-        t=last.t_s,
-        far=last.s_m * 1000,
-        stop=last.stop_s,
-        xyz=numbers(last.xyz_mm, 1),
-        rpy=numbers(last.rpy_deg, 2),
-        q=numbers(last.q_deg, 2),
-        contact=numbers(last.contact_mm, 0),
-        pair=path.collisions[0].cause.touches[0].pair,
-    )
+    pair = path.collisions[0].cause.touches[0].pair
+    return sentence("advice.clear_until", **vars(last), far=last.s_m * 1000, pair=pair)
 
 
 def reasons(tried: model.TriedStrategy) -> str:
@@ -617,10 +569,10 @@ def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:
     """What of assumed limits a motion takes; empty where none is assumed."""
     if not any(limits.speed_assumed) and not limits.acceleration_assumed:
         return ""
-    if not any(limits.speed_assumed):
-        return sentence("advice.limits#acceleration", acceleration=100 * motion.max_joint_acceleration_ratio)
-    speed = max(most / limit for most, limit in zip(motion.max_joint_speed_deg_s, limits.speed_deg_s))
-    return sentence("advice.limits", speed=100 * speed, acceleration=100 * motion.max_joint_acceleration_ratio)
+    speed = None
+    if any(limits.speed_assumed):
+        speed = max(most / limit for most, limit in zip(motion.max_joint_speed_deg_s, limits.speed_deg_s))
+    return sentence("advice.limits", speed=speed, acceleration=motion.max_joint_acceleration_ratio)
 
 
 def limits_assumed(speed: Sequence[bool], acceleration: bool) -> str:
@@ -629,9 +581,8 @@ def limits_assumed(speed: Sequence[bool], acceleration: bool) -> str:
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:
-    if far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION:
-        return sentence("advice.tool#none")
-    return sentence("advice.tool", far=_shortly(far_mm), turned=_shortly(turned_deg))
+    stays = far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION
+    return sentence("advice.tool", far="" if stays else _shortly(far_mm), turned=_shortly(turned_deg))
 
 
 def _shortly(value: float) -> str:
@@ -646,12 +597,10 @@ def switch_text(change: Sequence[float], sliding: Sequence[int]) -> str:
     ``change``: of each joint between the programmed start and the motion's, deg, mm where it is one of ``sliding``.
     """
     moved = [(joint, value) for joint, value in enumerate(change, 1) if abs(value) >= LEAST_CHANGE]
-    if not moved:
-        return sentence("advice.switch#within")
-    parts = (with_unit(f"J{j} {as_text(value, '+.0f')}", "mm" if j in sliding else "deg") for j, value in moved)
-    return sentence("advice.switch#before", changes=joined(parts, ", "))
+    changes = [with_unit(f"J{j} {as_text(value, '+.0f')}", "mm" if j in sliding else "deg") for j, value in moved]
+    return sentence("advice.switch", changes=changes)
 
 
 def _takes(takes_s: float, programmed_s: float) -> str:
-    form = "advice.time#same" if abs(takes_s - programmed_s) < NO_TIME else "advice.time"
-    return sentence(form, takes=takes_s, programmed=programmed_s)
+    takes = None if abs(takes_s - programmed_s) < NO_TIME else takes_s
+    return sentence("advice.time", takes=takes, programmed=programmed_s)

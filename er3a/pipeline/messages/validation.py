@@ -11,24 +11,17 @@ from er3a.finding import Finding
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.language import N_, as_text, distinct, own_title, tr, with_unit
+from er3a.pipeline.language import N_, as_text, distinct, tr, with_unit
 from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, MISSING_WORDS, quoted
-from er3a.pipeline.messages.say import bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.stages.validation.model import (
     AnotherArm,
-    Confirmed,
     Contradicted,
-    DefinedOtherwise,
-    JudgedTable,
     LeftOpen,
     ModelUnsound,
-    NothingToCompare,
     PartFound,
-    SelfCheck,
-    WholeGroup,
 )
-from er3a.robots.robot import Grade
 
 SELF_CHECKS = {
     "numbers_not_finite": N_("numbers that are not finite"),
@@ -86,54 +79,57 @@ TEXTS = texts(
     {
         "claims": "Statements without a document (“claims”) in {reference_set} that fail: {failed} of {claims}.",
         "counted_checks": "{passed} of {total} {kind} checks pass",
-        "validation.off": "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f} deg.",
-        "validation.off#tip": (
-            "A tool's tip is then off by up to {factor:.2g} times its distance from the flange: run no Cartesian "
-            "target with a tool before."
+        "validation.off": (
+            "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f} deg.[ A tool's tip is then "
+            "off by up to {factor:.2g} times its distance from the flange: run no Cartesian target with a tool "
+            "before.]"
         ),
-        "validation.left_open#uncovered": "No independent document covers this table. {checks}.",
-        "validation.left_open#unsettled": (
-            "Don't rely on this table: no independent document settles any of its entries. {checks}."
+        "validation.speaks": (
+            "{why:speaks}. {checks}[{conflicting:?}, {conflicting} undecided, as documents contradict each other]."
         ),
-        "validation.left_open#uncontradicted": (
-            "Nothing contradicts this table, but part of it is not settled. {checks}."
+        "validation.parts": (
+            "Confirmed by independent documents (to {mm:g} mm and {deg:g} deg at the tool): {parts:, }."
         ),
-        "validation.left_open#parts": (
-            "Confirmed by independent documents (to {mm:g} mm and {deg:g} deg at the tool): {parts}."
-        ),
-        "validation.left_open#open": "Not confirmed: {names}.",
-        "validation.left_open#measurement": "Most useful measurement: {next_measurement}.",
-        "validation.left_open#unbounded": (
+        "validation.open": "Not confirmed: {names}.",
+        "validation.unbounded": (
             "Only the table's own source gives {names}: nothing bounds the tool's error if they are wrong."
         ),
-        "validation.left_open#conflicting": "{count} undecided, as documents contradict each other",
-        "validation.contradicted": (
-            "The table contradicts the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}. "
-            "{checks}."
+        "validation.left_open": (
+            "{speaks}[ {settled}][ {off: }][ Most useful measurement: {next_measurement}.][ {contradiction}][ "
+            "{claims: }][ {own_text: }]"
         ),
-        "validation.another_arm": (
-            "This is not the arm of the {grades} data in {own_set}: the {quantity} is {measured}, not {expected}. "
-            "{checks}."
+        "validation.missed": (
+            "[The table contradicts{other:!}][This is not the arm of{other:?}] the {grades:data and } data in "
+            "{reference_set}: the {quantity} is {measured}, not {expected}. {checks}.[ Contradicted entries that "
+            "move the tool: {names}.]"
         ),
-        "validation.another_arm#entries": "Contradicted entries that move the tool: {names}.",
         "validation.defined_otherwise": (
-            "This is the same arm, defined otherwise than in the {grades} data in {own_set} ({checks}). Convert joint "
-            "values and positions before you use them."
+            "This is the same arm, defined otherwise than in the {grades:data and } data in {reference_set} "
+            "({counts:counts}). Convert joint values and positions before you use them.[ {diagnosis}][ {claims: }]"
+            "[ {own_text: }]"
         ),
         "validation.confirmed": (
-            "Independent documents settle every entry that moves the tool: {checks} ({grades} data)."
+            "Independent documents settle every entry that moves the tool: {counts:counts} ({grades:data and } data)."
+            "[ {contradiction}][ {claims: }][ {own_text: }]"
         ),
-        "part_found": "{settled} of {entries} {part}",
-        "part_found#more": "{more} more of the {part}",
-        "part_found#up_to_signs": "{count} of these if the open entries are right",
-        "validation.no_reference": "There is no official, CAD or exported data to compare this table with.",
+        "part_found": (
+            "{known} of {entries} {part:part_entries}[{up_to_signs:?} ({up_to_signs} of these if the open entries are "
+            "right)]"
+        ),
+        "part_found.more": "{more} more of the {part:part_entries}",
+        "self_check": "{quantity:self_check}",
+        "whole_group": "{group:missing_group}",
+        "named_pose": "{name:own}",
+        "validation.no_reference": (
+            "There is no official, CAD or exported data to compare this table with.[ {claims: }][ {own_text: }]"
+        ),
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
         "contradiction": (
             "References contradict each other about the {subjects}: measure that on the arm before you rely on it."
         ),
         "not_in_robot_file": "the robot's file gives no value",
         "source_gives_none": "the source gives none",
-        "not_of_this_arm": "set aside (arm of {joints} joints): {reason}",
+        "not_of_this_arm": "set aside (arm of {joints} joints): {reason:set_aside}",
         "too_uncertain": (
             "decides nothing: uncertain by ±{uncertainty:g}; from {undecided_from:.4g} on a value taken at random "
             "would pass as often as not"
@@ -150,15 +146,20 @@ TEXTS = texts(
 )
 
 
-@say.register
-def _(found: SelfCheck) -> str:
-    return word(found.code, SELF_CHECKS, found.quantity)
-
-
-@say.register
-def _(found: Confirmed) -> str:
-    text = say_as(found, checks=counted_checks(found.counts), grades=_grades(found.grades))
-    return joined([text, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+WORDS.update(
+    {
+        "data": DATA_GRADES,
+        "part_entries": PART_ENTRIES,
+        "self_check": SELF_CHECKS,
+        "missing_group": MISSING_WORDS,
+        "set_aside": SET_ASIDE,
+        "speaks": {
+            "uncovered": N_("No independent document covers this table"),
+            "unsettled": N_("Don't rely on this table: no independent document settles any of its entries"),
+            "uncontradicted": N_("Nothing contradicts this table, but part of it is not settled"),
+        },
+    }
+)
 
 
 def counted_checks(counts: CheckCounts) -> str:
@@ -172,30 +173,29 @@ def counted_checks(counts: CheckCounts) -> str:
     return joined(said, ", ")
 
 
-def _of_claims(found: JudgedTable) -> list[str]:
-    return [*map(say, found.claims), *map(say, found.own_text)]
+FORMATS["counts"] = counted_checks
 
 
 @say.register
 def _(found: LeftOpen) -> str:
-    some = any(part.settled or part.up_to_signs for part in found.parts)
-    sentences = [_what_speaks(found.counts, settled=some or not found.parts), settled_parts(found)]
-    sentences += how_far_off(found)
-    if found.next_measurement:
-        sentences.append(say_as(found, "measurement"))
-    return joined([*sentences, *_contradiction(found.contradiction), *_of_claims(found)], " ")
+    some = any(part.settled or part.up_to_signs for part in found.parts) or not found.parts
+    counts = found.counts.independent
+    why = ("uncontradicted" if some else "unsettled") if counts.total else "uncovered"
+    checks = counted_checks(found.counts)
+    speaks = sentence("validation.speaks", why=why, checks=checks, conflicting=counts.conflicting)
+    return say_as(found, speaks=speaks, settled=settled_parts(found), off=how_far_off(found))
 
 
 def settled_parts(found: LeftOpen) -> str:
     """How much of each part of a table is settled, and what is not."""
-    known, limit = [say(part) for part in found.parts if part.settled or part.up_to_signs], found.tolerance
-    confirmed = say_as(found, "parts", parts=joined(known, ", "), mm=limit.mm, deg=limit.deg) if known and limit else ""
+    known, limit = [part for part in found.parts if part.settled or part.up_to_signs], found.tolerance
+    confirmed = sentence("validation.parts", parts=known, mm=limit.mm, deg=limit.deg) if known and limit else ""
     return joined([confirmed, not_confirmed(unconfirmed(found.parts, found.unbounded))], " ")
 
 
 def not_confirmed(names: str) -> str:
     """What nothing settles, as a sentence; empty where that is nothing."""
-    return sentence("validation.left_open#open", names=names) if names else ""
+    return sentence("validation.open", names=names) if names else ""
 
 
 PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
@@ -214,7 +214,11 @@ def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> st
             named.append(tr("all {part}", part=kind))
         else:
             excluded = bracketed(shortened(part.contradicted), tr("contradicted")) if part.contradicted else ""
-            named += [shortened(own), excluded, say_as(part, "more", more=more, part=kind) if more > 0 else ""]
+            named += [
+                shortened(own),
+                excluded,
+                sentence("part_found.more", more=more, part=part.part) if more > 0 else "",
+            ]
     return joined([*named, shortened(left)], ", ")
 
 
@@ -248,31 +252,19 @@ def how_far_off(found: LeftOpen) -> list[str]:
     """How far what is open or weak could put the tool off, each a sentence."""
     sentences = []
     if found.unbounded:
-        sentences.append(sentence("validation.left_open#unbounded", names=shortened(found.unbounded)))
+        sentences.append(sentence("validation.unbounded", names=shortened(found.unbounded)))
     if found.off.moves:
         entry = bracketed(tr("an open or weak entry"), shortened(_open_alone(found)))
         bound = tr("at least") if found.at_least else tr("up to")
-        off = sentence("validation.off", entry=entry, bound=bound, mm=found.off.mm, deg=found.off.deg)
         factor = 2.0 if found.at_least else 2 * math.sin(math.radians(min(found.off.deg, 180.0) / 2))
-        tip = sentence("validation.off#tip", factor=factor) if round(found.off.mm) == 0 else ""
-        sentences.append(joined([off, tip], " "))
+        tip, off = None if round(found.off.mm) else factor, found.off
+        sentences.append(sentence("validation.off", entry=entry, bound=bound, mm=off.mm, deg=off.deg, factor=tip))
     return sentences
-
-
-def _what_speaks(counts: CheckCounts, *, settled: bool) -> str:
-    checks = counted_checks(counts)
-    if counts.independent.conflicting:
-        undecided = sentence("validation.left_open#conflicting", count=counts.independent.conflicting)
-        checks = joined([checks, undecided], ", ")
-    form = ("uncontradicted" if settled else "unsettled") if counts.independent.total else "uncovered"
-    return sentence(f"validation.left_open#{form}", checks=checks)
 
 
 @say.register
 def _(found: PartFound) -> str:
-    part, settled = word("part_entries", PART_ENTRIES, found.part), found.settled + found.up_to_signs
-    signs = say_as(found, "up_to_signs", count=found.up_to_signs) if found.up_to_signs else ""
-    return bracketed(say_as(found, part=part, settled=settled), signs)
+    return say_as(found, known=found.settled + found.up_to_signs)
 
 
 def shortened(names: Sequence[str]) -> str:
@@ -284,15 +276,6 @@ def shortened(names: Sequence[str]) -> str:
     return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
 
 
-def _contradiction(found: Finding | None) -> list[str]:
-    return [say(found)] if found else []
-
-
-@say.register
-def _(found: NothingToCompare) -> str:
-    return joined([say_as(found), *_of_claims(found)], " ")
-
-
 @say.register
 def _(found: ModelUnsound) -> str:
     value = with_unit(as_text(found.measured, ".1f"), found.unit) if found.unit else as_text(found.measured, "g")
@@ -300,21 +283,12 @@ def _(found: ModelUnsound) -> str:
 
 
 @say.register
-def _(found: Contradicted) -> str:
-    return joined([missed_text(found), say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
-
-
-@say.register
-def _(found: DefinedOtherwise) -> str:
-    head = say_as(found, grades=_grades(found.grades), own_set=found.reference_set, checks=counted_checks(found.counts))
-    return joined([head, say(found.diagnosis) if found.diagnosis else "", *_of_claims(found)], " ")
-
-
-@say.register
-def _(found: AnotherArm) -> str:
-    excluded = say_as(found, "entries", names=shortened(found.contradicted)) if found.contradicted else ""
-    described = say(found.described) if found.described else ""
-    return joined([described, missed_text(found), excluded, *_of_claims(found)], " ")
+def _(found: Contradicted | AnotherArm) -> str:
+    other = isinstance(found, AnotherArm)
+    described, diagnosis = found.described if other else None, None if other else found.diagnosis
+    excluded = shortened(found.contradicted) if other else ""
+    shown = [described, missed_text(found, excluded), diagnosis, *found.claims, *found.own_text]
+    return joined([each if isinstance(each, str) else say(each) for each in shown if each], " ")
 
 
 @says("contradiction")
@@ -328,35 +302,17 @@ def stated_text(found: Finding) -> str:
     return tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
 
 
-def missed_text(found: Contradicted | AnotherArm) -> str:
-    """What a contradicted table gives, and what the documents say."""
+def missed_text(found: Contradicted | AnotherArm, names: str = "") -> str:
+    """What a contradicted table gives, and what the documents say; ``names``: entries that they exclude."""
     measured, expected = (with_unit(value, found.unit) for value in distinct([found.measured, found.expected]))
-    other = isinstance(found, AnotherArm) and not found.described
     return sentence(
-        "validation.another_arm" if other else "validation.contradicted",
-        grades=_grades(found.grades),
-        own_set=found.reference_set,
+        "validation.missed",
+        other=isinstance(found, AnotherArm) and not found.described,
+        grades=found.grades,
+        reference_set=found.reference_set,
         checks=counted_checks(found.counts),
         quantity=quoted(found.check),
         measured=measured,
         expected=expected,
+        names=names,
     )
-
-
-def _grades(grades: Sequence[Grade]) -> str:
-    return tr(" and ").join(word("data", DATA_GRADES, grade) for grade in grades)
-
-
-@says("not_of_this_arm")
-def _(found: Finding) -> str:
-    return say_as(found, reason=word(found.code, SET_ASIDE, found.reason))
-
-
-@says("named_pose")
-def _(found: Finding) -> str:
-    return own_title(found.name)
-
-
-@say.register
-def _(found: WholeGroup) -> str:
-    return word(found.code, MISSING_WORDS, found.group)

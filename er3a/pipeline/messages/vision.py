@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 import er3a.pipeline.messages.collision
 import er3a.pipeline.messages.diagnosis
+import er3a.pipeline.messages.expectations
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.finding import Finding
 from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.language import N_, as_text
-from er3a.pipeline.messages.expectations import demonstrated
-from er3a.pipeline.messages.say import WORDS, joined, listed, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, same_text, say, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.vision_findings import Convention, Suspect
 
@@ -68,21 +67,24 @@ TEXTS = texts(
             "Touched points contradict the calibration: {points}, off by up to {largest_mm:.3g} mm (probability "
             "{probability:.1g})."
         ),
-        "not_grasped_object": "not {name} ({why})",
+        "not_grasped_object": "{name} ({why})",
         "grasp_out_of_reach": "grasp poses, all out of reach: {poses}",
         "grasp_near_limits": "best of {solutions} solutions: {margin:.1f} from the joint limits; {needed:g} required",
         "grasp_singular": "all solutions singular: singular value {singular_value:.2g} at best; {needed:g} required",
         "no_transfer": "the straight move to the approach collides, and no other was found: {why}",
-        "grasp_counts#grasped": "{grasped} of {objects} objects can be grasped",
-        "grasp_counts#assumed": "{count} more only if undocumented shapes are right ({assumed:, })",
-        "grasp_counts#error": "95 % of errors below {point_mm:.2g} mm at the worst grasp",
-        "grasp_counts#success": "probability of success at least {percent:g} %",
-        "grasp_counts#left_out": "calibrated without {left_out:, }",
+        "grasp_counts": (
+            "{grasped} of {objects} objects can be grasped.[ Only if undocumented shapes are right: {assumed:, "
+            "}.][ Probability of success: at least {probability:at_least %}.][ 95 % of errors below {point_mm:.2g} "
+            "mm at the worst grasp.][ Not grasped: {missed:, }.][ Calibrated without {left_out:, }.][ Expected to "
+            "fail, and did: {demonstrations:, }.]"
+        ),
         "grasp_unlikely": "within the gripper's tolerance with probability {probability:.3g}; {needed:.3g} required",
-        "grasp_collides": "at the grasp, {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm required",
         "line_leaves": "{part:vision.part} exceeds limits or becomes singular {after_mm:.0f} mm from the grasp",
         "line_unproven": "{part:vision.part}: limits, joint speeds and distance from singularities not proven",
-        "way_collides": "{part:vision.part}, {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm required",
+        "too_near_there": (
+            "[{part:vision.part}][at the grasp{part:!}], {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm "
+            "required"
+        ),
         "far_from_fit": (
             "{sample}: {off_mm:.3g} mm, {off_deg:.2g} deg from the other samples' prediction (probability "
             "{probability:.1g})"
@@ -161,21 +163,7 @@ WORDS.update(
         "vision.convention": CONVENTIONS,
     }
 )
-
-
-@says("grasp_counts")
-def _(found: Finding) -> str:
-    percent = None if found.probability is None else math.floor(1000 * found.probability) / 10
-    sentences = [
-        say_as(found, "grasped") if found.objects else "",
-        say_as(found, "assumed", count=len(found.assumed)) if found.assumed else "",
-        "" if percent is None else say_as(found, "success", percent=percent),
-        say_as(found, "error") if found.point_mm is not None else "",
-        *listed(found.missed),
-        say_as(found, "left_out") if found.left_out else "",
-        demonstrated(found.demonstrations, found.objects),
-    ]
-    return sentence("finding", finding=joined(sentences))
+same_text("too_near_there", "grasp_collides", "way_collides")
 
 
 def pose_words(setup: str) -> tuple[str, str]:

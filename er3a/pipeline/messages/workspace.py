@@ -6,20 +6,13 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
+from er3a.pipeline.language import N_, as_text, tr, with_unit
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import joined, say, say_as, says, sentence, texts
+from er3a.pipeline.messages.say import FORMATS, joined, say, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
-from er3a.workspace.causes import (
-    Disappears,
-    Geometry,
-    Relaxed,
-    SeveralLimits,
-    SingleChange,
-    VoidCause,
-)
+from er3a.workspace.causes import SingleChange, VoidCause
 
 KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
@@ -47,79 +40,80 @@ TEXTS = texts(
         "workspace.unsettled": "Voids can't be judged: {undecided_percent:.2g} % of the volume is undecided.",
         "workspace.no_void": "No enclosed void is found; {undecided_percent:.2g} % of the volume is undecided.",
         "workspace.void_unexpected": (
-            "An enclosed void of at least {litres} L lies away from the shoulder, at ({x}, {y}, {z}) mm."
+            "An enclosed void of at least {litres:at_least L} L lies away from the shoulder, at ({x_mm:.0f}, "
+            "{y_mm:.0f}, {z_mm:.0f}) mm. Cause: {cause}. Never widen a limit of the arm for it. That is not "
+            "normal: a limit, a zero or a direction of joint 2 or 3 may be wrong.[ {changes}]"
         ),
         "workspace.void_at_shoulder": (
-            "An enclosed void of at least {litres} L surrounds the shoulder: normal. Its centre is ({x}, {y}, {z}) mm; "
-            "no other was found."
+            "An enclosed void of at least {litres:at_least L} L surrounds the shoulder: normal. Its centre is "
+            "({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm; no other was found."
         ),
         "void_changes": (
-            "Single changes of the table that leave less than a tenth of it: {named} ({count} of {tried}; undecided: "
-            "{undecided}). References must tell which is right."
+            "Single changes of the table that leave less than a tenth of it: {named:4, } ({count} of {tried}; "
+            "undecided: {undecided}). References must tell which is right."
         ),
-        "void_disappears": "{limits}; it disappears at {extended}",
-        "void_of_several_limits": "several limits together",
-        "void_of_geometry": "geometry: {percent:.0f} % of it stays without any joint limit",
-        "void_shrinks": "it shrinks by {percent:.0f} % at {limit}",
+        "void_disappears": "{limits:limit, }; it disappears at {extended:extended or }",
+        "void_of_several_limits": "several limits together[; {most}]",
+        "void_of_geometry": "geometry: {remaining_ratio:.0%} of it stays without any joint limit[; {most}]",
+        "relaxed_limit": "it shrinks by {filled:.0%} at {limit}",
         "workspace.pockets": "open pockets: {count}",
         "workspace.voids": "enclosed voids: {count}",
+        "workspace.capability_missing": "{lacks}",
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": "joint 1 is coupled or limited together with others, so no azimuth stands for another",
         "orientations_unknown": "the orientations that {joints} joints reach at a point are not known for this kind",
         "workspace.placement_too_long": (
             "Not computed: this arm takes milliseconds for a pose. A larger tray or a narrower cone may do."
         ),
-        "stand.fits": "On {name}: centre at ({centre}) mm; {reached}.",
-        "stand.too_low": "Not on {name}: at {height} mm it is lower than the {lowest} mm allowed.",
-        "stand.too_small": "Not on {name}: there is no room for it.",
-        "stand.out_of_reach": "Not on {name}: nowhere on it does the tool reach all of the tray.",
-        "stand.in_the_way": "Not on {name}: the arm comes within {margin} mm of the scene or of itself.",
-        "void.at": "{lower} to {upper} L, centred at ({centre}) mm: no target there can be reached.",
-        "void.normal": "It surrounds the shoulder, which is normal.",
-        "void.not_normal": "That is not normal: a limit, a zero or a direction of joint 2 or 3 may be wrong.",
-        "void.within": "It lies within {box} mm of the base.",
-        "void.rests": "The bounds hold for {limits}, which nothing confirms.",
-        "void.cause": "Cause: {cause}. Never widen a limit of the arm for it.",
-        "void.larger": "It is larger where the arm collides: that is not counted.",
+        "stand.fits": "On {name:own}: centre at ({centre}) mm; {reached}.",
+        "stand.none": (
+            "Not on {name:own}: [at {height} mm it is lower than the {lowest} mm allowed{too_low:?}][there is no "
+            "room for it{too_small:?}][nowhere on it does the tool reach all of the tray{out_of_reach:?}][the arm "
+            "comes within {margin} mm of the scene or of itself{in_the_way:?}]."
+        ),
+        "void.at": (
+            "{lower} to {upper} L, centred at ({centre}) mm: no target there can be reached. [It surrounds the "
+            "shoulder, which is normal.{normal:?}][That is not normal: a limit, a zero or a direction of joint 2 "
+            "or 3 may be wrong.{normal:!}]"
+        ),
+        "void.rest": (
+            "It lies within {box} mm of the base. Cause: {cause}. Never widen a limit of the arm for it.[ The "
+            "bounds hold for {limits}, which nothing confirms.][ It is larger where the arm collides: that is not "
+            "counted.{normal:?}][{more:?} Other enclosed voids: {more}.][ {pocket}]"
+        ),
         "void.pocket": "Open pocket besides: {lower} to {upper} L, within {box} mm.",
-        "void.more": "Other enclosed voids: {count}.",
         "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
-        "box.unknown": "Tray of {box} mm: {why}",
-        "box.nowhere": "nowhere does the tool reach all of it.",
+        "box.unknown": "Tray of {box} mm: [{why}][nowhere does the tool reach all of it.{why:!}]",
         "box.run_again": (
             "Before a motion is run there, put the tray, and its stand if any, into the study's scene file as boxes, "
-            "and run again."
+            "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"
         ),
-        "box.no_tool": "No tool is given: repeat it with your tool's length.",
         "box.sampled": (
             "the tool, up to {cone:g} deg from {axis}, reaches all points sampled above the tray's lowest "
-            "{served_from} mm; the arm's clearance was only sampled, without tray and stand"
+            "{served_from} mm; clearance was sampled, without tray and stand"
         ),
         "workspace.tool_points_elsewhere": (
-            "Nowhere: the arm can't tilt its tool out of ({x:.2f}, {y:.2f}, {z:.2f}) into the cone."
+            "Nowhere: the arm can't tilt its tool out of ({direction:.2f, }) into the cone."
         ),
     }
 )
 
 
-@say.register
-def _(found: model.VoidUnexpected) -> str:
-    check = sentence("void.not_normal")
-    return joined([say_as(found, **_place(found)), _cause(found.cause), check, _changes(found)], " ")
-
-
 CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
-NAMED_CHANGES = 4
 
 
-def _changes(found: model.VoidUnexpected) -> str:
+@says("workspace.void_unexpected")
+def _(found: Finding) -> str:
+    return say_as(found, changes=_changes(found))
+
+
+def _changes(found: Finding) -> str:
     """The single changes of the table that take the void away; empty where none was tried or none does."""
     decided = [(change, change.left_litres[1]) for change in found.single_changes if change.left_litres]
     least = [change for change, litres in decided if litres < 0.1 * found.litres]
     if not least:
         return ""
-    shown = sorted(least, key=lambda change: CHANGED_FIRST.index(change.column))
-    named = joined([*map(change_text, shown[:NAMED_CHANGES]), *(["…"] if len(shown) > NAMED_CHANGES else [])], ", ")
+    named = [*map(change_text, sorted(least, key=lambda change: CHANGED_FIRST.index(change.column)))]
     tried = len(found.single_changes)
     return sentence("void_changes", count=len(least), tried=tried, named=named, undecided=tried - len(decided))
 
@@ -130,57 +124,24 @@ def change_text(change: SingleChange) -> str:
     return f"{tr(ENTRIES[change.column], joint=change.joint)} = {with_unit(tried, change.unit)}"
 
 
-@says("workspace.void_at_shoulder")
+@says("void_disappears")
 def _(found: Finding) -> str:
-    return say_as(found, **_place(found))
+    return say_as(found, extended=found.limits)
 
 
-def _cause(cause: VoidCause) -> str:
-    return sentence("void.cause", cause=say(cause))
+@says("relaxed_limit")
+def _(found: Finding) -> str:
+    return say_as(found, limit=_limit(found, found.extended))
 
 
-def _place(found: model.VoidUnexpected | Finding) -> dict[str, str]:
-    shown = {"x": found.x_mm, "y": found.y_mm, "z": found.z_mm}
-    return {"litres": at_least(found.litres, "L")} | {
-        key: str(round(value)).replace("-", "−") for key, value in shown.items()
-    }
-
-
-@say.register
-def _(found: Disappears) -> str:
-    extended = tr(" or ").join(_limit(limit, limit.extended) for limit in found.limits)
-    return say_as(found, limits=_limits(found), extended=extended)
-
-
-@say.register
-def _(found: SeveralLimits) -> str:
-    return joined([say_as(found), _shrinks(found.most)])
-
-
-@say.register
-def _(found: Geometry) -> str:
-    return joined([say_as(found, percent=100 * found.remaining_ratio), _shrinks(found.most)])
-
-
-def _shrinks(limit: Relaxed | None) -> str:
-    return sentence("void_shrinks", percent=100 * limit.filled, limit=_limit(limit, limit.extended)) if limit else ""
-
-
-def _limit(limit: Relaxed, at: float) -> str:
+def _limit(limit: Finding, at: float) -> str:
     """A limit at a value, such as "J3 ≤ 65 deg"."""
     value = with_unit(as_text(at, ".4g"), limit.unit)
     return f"{sum_of_joints(limit.joints, limit.factors)} {'≤' if limit.side == 'upper' else '≥'} {value}"
 
 
-@says("workspace.capability_missing")
-def _(found: Finding) -> str:
-    return say(found.lacks)
-
-
-@say.register
-def _(found: model.ToolPointsElsewhere) -> str:
-    x, y, z = found.direction
-    return say_as(found, x=x, y=y, z=z)
+FORMATS["limit"] = lambda limit: _limit(limit, limit.limit)
+FORMATS["extended"] = lambda limit: _limit(limit, limit.extended)
 
 
 def no_box_text(summary: Summary) -> str:
@@ -189,8 +150,7 @@ def no_box_text(summary: Summary) -> str:
     if placement is None or (isinstance(placement, model.PlacementSummary) and placement.named_places):
         return ""
     asked = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
-    nowhere = isinstance(placement, model.PlacementSummary)
-    return sentence("box.unknown", box=asked, why=sentence("box.nowhere") if nowhere else say(placement))
+    return sentence("box.unknown", box=asked, why=None if isinstance(placement, model.PlacementSummary) else placement)
 
 
 def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, served_from_m: float = 0.0) -> str:
@@ -205,7 +165,7 @@ def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, s
 def run_again_text(summary: Summary) -> str:
     """What to do before a motion is run beside the tray, or with a tool."""
     bare = any(each.reason == "tool" for each in summary.assumed)
-    return joined([sentence("box.run_again"), sentence("box.no_tool") if bare else ""], " ")
+    return sentence("box.run_again", bare=bare)
 
 
 def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
@@ -215,23 +175,20 @@ def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
     finding = summary.verdict.finding
     if is_one(finding, "workspace.no_void"):
         return say(finding), ""
-    normal = is_one(finding, "workspace.void_at_shoulder")
-    if not isinstance(summary, model.WorkspaceSummary) or not (normal or isinstance(finding, model.VoidUnexpected)):
+    if not isinstance(summary, model.WorkspaceSummary) or not is_one(
+        finding, "workspace.void_at_shoulder", "workspace.void_unexpected"
+    ):
         return "", ""
-    voids, judged = summary.enclosed_voids, judged_void(summary)
-    means = sentence("void.normal" if normal else "void.not_normal")
-    lead = joined([sentence("void.at", **_void_parts(judged)), means], " ")
-    limits = _limits(judged.cause)
-    pocket = max(summary.voids, key=lambda void: void.volume_m3.upper)
-    texts = [
-        sentence("void.within", **_void_parts(judged)),
-        _cause(judged.cause),
-        sentence("void.rests", limits=limits) if limits and not confirmed else "",
-        sentence("void.larger") if normal else "",
-        sentence("void.more", count=len(voids) - 1) if len(voids) > 1 else "",
-        sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else "",
-    ]
-    return lead, joined(texts, " ")
+    judged, pocket = judged_void(summary), max(summary.voids, key=lambda void: void.volume_m3.upper)
+    normal, limits = is_one(finding, "workspace.void_at_shoulder"), _limits(judged.cause)
+    rest = {
+        "cause": judged.cause,
+        "limits": "" if confirmed else limits,
+        "more": len(summary.enclosed_voids) - 1,
+        "pocket": sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else "",
+    }
+    parts = {"normal": normal, **_void_parts(judged)}
+    return sentence("void.at", **parts), sentence("void.rest", **parts, **rest)
 
 
 def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
@@ -243,8 +200,8 @@ def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
 
 def _limits(cause: VoidCause) -> str:
     """The limits that make a void, or have a part in it; empty where none has."""
-    if isinstance(cause, Disappears):
-        limits = cause.limits
+    if is_one(cause, "void_disappears"):
+        limits = tuple(cause.limits)
     elif cause.most is None:
         return ""
     else:
@@ -273,9 +230,9 @@ def millimetres(values: Sequence[float]) -> str:
 
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
     """Whether the tray can stand on a surface, and if not why."""
-    named = {"name": own_title(stand.name), "height": millimetres([stand.height_m])}
     if stand.place and stand.served_from_m is not None:
         reached = reached_text(placement, stand.place, stand.served_from_m)
-        return sentence("stand.fits", reached=reached, centre=millimetres(stand.place.centre_m), **named)
-    margin, lowest = as_text(placement.margin_mm, "g"), as_text(placement.task.lowest_mm, "g")
-    return sentence(f"stand.{stand.why_none}", margin=margin, lowest=lowest, **named)
+        return sentence("stand.fits", name=stand.name, reached=reached, centre=millimetres(stand.place.centre_m))
+    lengths = {"margin": as_text(placement.margin_mm, "g"), "lowest": as_text(placement.task.lowest_mm, "g")}
+    why = {each: each == stand.why_none for each in ("too_low", "too_small", "out_of_reach", "in_the_way")}
+    return sentence("stand.none", name=stand.name, height=millimetres([stand.height_m]), **lengths, **why)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import label_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
@@ -177,7 +178,7 @@ class TaskSearch:
     def always_overlapping(self) -> list[str]:
         """Pairs of bodies that overlap at all joint values drawn, which no arm can do."""
         always = np.flatnonzero(self.bodies.overlaps(self.drawn).all(axis=0))
-        return [self.bodies.pairs[k].label for k in always]
+        return [label_of(self.bodies.pairs[k]) for k in always]
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MAX_TARGETS``, fewer where the arm reaches no more of those tried."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import jinja2
 
+from er3a.collision.pairs import label_of
 from er3a.errors import Er3aError
 from er3a.files.kept_files import ROOT, write_atomically
 from er3a.files.reference_sets import FORMATS
@@ -110,7 +111,7 @@ def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
     """Which collisions were not looked at, if any."""
     if not search.bodies.in_error:
         return []
-    pairs = ", ".join(pair.label for pair in search.bodies.in_error)
+    pairs = ", ".join(label_of(pair) for pair in search.bodies.in_error)
     return [f"Collisions of {pairs} were not examined: these shapes overlap where no arm's can. {_remedy(arm)}"]
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import urlencode
 
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import first_sentence, tr
 from er3a.pipeline.messages.say import joined
+from er3a.pipeline.viewing.answer import Fix, ListRow, Part
 
 Weight = Literal["plain", "caution", "fail"]
 
@@ -120,3 +121,54 @@ class PlayedMotion:
     marks: Sequence[Mark] = ()
     beside: Sequence[Reals] = ()
     label: str = ""
+
+
+def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
+    """What happens during a motion, as parts of a bar.
+
+    Parameters
+    ----------
+    motion : with its events
+    duration_s : that the whole bar stands for, s; the part that the motion does not get to is marked ``none``
+    """
+    whole = max(duration_s, float(motion.t[-1])) or 1.0
+    order = sorted((each for each in motion.events if each.status != "plain"), key=lambda each: each.status == "fail")
+    parts = [Part(each.t / whole, each.until / whole, "fail" if each.status == "fail" else "caution") for each in order]
+    end = float(motion.t[-1]) / whole
+    return [*([Part(end, 1.0, "none")] if end < 0.995 else []), *parts]
+
+
+def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length: float, note: str = "") -> ListRow:
+    """A path or program that may not be run as it is, as a row of the list at the picture's side.
+
+    Parameters
+    ----------
+    motion : that the player shows; None where it shows none
+    duration_s : of the whole motion, s
+    length : of its bar, in parts of the longest
+    note : in few words why; its verdict if empty
+    """
+    seen = fault.moments[0].seen_s
+    return ListRow(
+        "fail" if fault.status == "fail" else "caution",
+        fault.name,
+        note or fault.verdict,
+        f"#{fault.name}",
+        (fault.name, seen or 0.0) if motion else None,
+        length if motion else 0.0,
+        bar_of(motion, duration_s) if motion else (),
+    )
+
+
+def opened(faults: Iterable[Fault]) -> tuple[str, float] | None:
+    """The motion and time (s) that a player opens at: the first fault that it can show; None where there is none."""
+    shown = ((fault.name, fault.moments[0].seen_s) for fault in faults)
+    return next(((name, t) for name, t in shown if t is not None), None)
+
+
+def fix_of(faults: Iterable[Fault]) -> Fix | None:
+    """What to do about the first fault that can be mended; None where none can."""
+    for fault in faults:
+        if fault.instead and fault.to_do:
+            return Fix(f"{fault.name}: {first_sentence(fault.to_do)[0]}", fault.instead[1])
+    return None

@@ -171,6 +171,7 @@ function tell() {
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const text = now.map((event) => event.text).join(words.between) || motion.text;
   show(nowShown, text);
+  nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
   for (const { dataset, classList } of stretches) {
@@ -318,14 +319,13 @@ for (const link of document.querySelectorAll("[data-t]")) {
 addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
-goTo(data.opening.name, data.opening.t);
 choose(decodeURIComponent(location.hash.slice(1)));
 if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));
   dock();
   tell();
   listed();
-}
+} else if (data.opened && location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

@@ -57,7 +57,7 @@ WORDS = {
     "next": N_("Next event"),
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
-    "clock": N_("t = {t} s of {end} s"),
+    "clock": N_("{t} of {end} s"),
     "joints": N_(
         "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
         "then, with what they would need."
@@ -72,10 +72,7 @@ WORDS = {
     "start_and_end": N_("start and end"),
     "undock": N_("return the player to its place"),
     "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
-    "help": N_(
-        "Drag to turn, wheel or + and − to zoom. A click into a plot or on a time leads to that moment; coloured marks "
-        "on the time bar are events."
-    ),
+    "joint_values": N_("Joints"),
     "no_script": N_("The player needs JavaScript; recordings show the same in the Rerun viewer."),
 }
 
@@ -86,29 +83,29 @@ def player(
     scene: Scene | None = None,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
-    opening: tuple[str, float] | None = None,
+    opened: tuple[str, float] | None = None,
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
     Parameters
     ----------
+    opened : the motion and the time (s) that it opens at; None for the worst contact, or else the first start
     beside : further arms, which move at the same time; their bases say where they stand
     signs : what is written below the base of each arm, the first included; nothing if empty
-    opening : the motion and the moment (s) that are shown at first; None for the worst contact, or else the first start
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
     data = _data(robot, shown, scene, words, beside, signs)
-    data["opening"] = dict(zip(("name", "t"), opening or _worst(robot, shown)))
+    data["opened"] = opened or _worst(robot, shown)
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still((robot, *beside), next(m for m in shown if m.name == data["opening"]["name"]), data),
+            still=_still((robot, *beside), next(m for m in shown if m.name == data["opened"][0]), data),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -184,7 +181,7 @@ def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
 
 def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
     """The picture at that moment, which the page shows without WebGL."""
-    t = data["opening"]["t"]
+    t = data["opened"][1]
     now = [event for event in motion.events if event.t <= t <= event.until]
     colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
     values = (motion.q, *motion.beside)

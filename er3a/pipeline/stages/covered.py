@@ -11,7 +11,7 @@ import numpy as np
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import PairState, base_contacts
-from er3a.collision.pairs import PENETRATION_TOLERANCE, link_label
+from er3a.collision.pairs import PENETRATION_TOLERANCE, label_of, link_label
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import COVERED, arm_shapes, depths_in, has_bare_tool
 from er3a.errors import DoubtfulUnit
@@ -65,14 +65,16 @@ def covered_collisions(
     hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.hides}
     allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene and name in hidden]
     contacts = base_contacts(robot, scene)
-    guessed = tuple(dict.fromkeys(each.label for arm in (bodies, *_with_tools(arms, scene)) for each in arm.guessed))
+    guessed = tuple(
+        dict.fromkeys(label_of(each) for arm in (bodies, *_with_tools(arms, scene)) for each in arm.guessed)
+    )
     shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
     gaps = (
         Open("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
         Open("partial_links", shares, 100 * COVERED if shares else None),
         Open("bare_tool", tuple(bare)),
         Open("allowed_contacts", (*by_scene.values(), *allowed)),
-        Open("wrong_shapes", tuple(pair.label for pair in bodies.in_error)),
+        Open("wrong_shapes", tuple(label_of(pair) for pair in bodies.in_error)),
         Open("base_inside", tuple(each.solid for each in contacts if each.inside)),
     )
     assumed = (

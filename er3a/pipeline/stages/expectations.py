@@ -104,7 +104,9 @@ def unmet_expectations(judged: Iterable[Judged], sound: Outcome | None = None) -
     others = tuple(
         fact("demonstration", name=each.name, found=came_to(each)) for each in rest if sound and each.outcome != sound
     )
-    return fact("expectations_unmet", expectations=len(expected), unmet=unmet, others=others) if unmet else None
+    if not unmet:
+        return None
+    return fact("expectations_unmet", count=len(unmet), expectations=len(expected), unmet=unmet, others=others)
 
 
 def pass_of(asked: Collection[Judged]) -> Status:

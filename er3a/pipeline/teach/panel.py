@@ -10,6 +10,7 @@ import numpy as np
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
+from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.finding import fact
@@ -426,7 +427,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
                 "joined": bool(joined),
                 "hulls": bool(max(layout.trees.root[[first, second]]) >= 0),
                 "text": say(pair),
-                "names": pair.names,
+                "names": names_of(pair),
             }
             for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
         ],

@@ -57,7 +57,7 @@ function compare([a, x], [b, y], sign) {
 function makeSortable(table) {
   const body = table.tBodies[0];
   const written = [...body.rows];
-  if (written.length < 2 || !table.tHead || table.matches(".entries")) return; // listings and D-H tables keep their order
+  if (written.length < 2 || !table.tHead || table.matches(".entries, .matrix table")) return; // listings and D-H tables keep their order
   const headers = [...table.tHead.rows[0].cells];
   headers.forEach((header, column) => {
     // No button element: browsers leave those out of a header that is repeated on the next printed sheet.
@@ -349,9 +349,9 @@ function filterFor(table) {
 
 const HEADINGS = ["H2", "H3", "SUMMARY", "CAPTION"];
 const CONTAINERS = "h2, h3, p, ul, ol, dl, tr, figure, section, details";
-const WHOLE = "tr, li, dl, figure, .verdict, #turning, .player"; // found or not as one
-const BESIDE = "script, style, thead, .contents, .tools, .pickers"; // goes with what it belongs to
-const WARNING = "#decisions tr, .caveat, .assumed-shapes, .verdict, .robot h2, .robot .decision, p:has(strong)";
+const WHOLE = "tr, li, dl, figure, .answer, #turning, .player"; // found or not as one
+const BESIDE = "script, style, thead, .tools, .pickers"; // goes with what it belongs to
+const WARNING = ".answer, .before, p:has(strong)";
 
 // What a reader sees of an element, folded or not, in small letters.
 function allText(element) {
@@ -415,7 +415,8 @@ function addFinder() {
   status.role = "status";
   elsewhere.className = elsewhere.id = "elsewhere";
   box.append(field, " ", status);
-  document.querySelector("header").append(box);
+  const header = document.querySelector("header");
+  header.insertBefore(box, header.querySelector(".chip"));
   main.after(elsewhere); // what this page has itself comes first
   let open = null; // what was unfolded before
   const find = () => {
@@ -545,70 +546,6 @@ function fade(box) {
   new ResizeObserver(tell).observe(box);
 }
 
-function nameHeading(heading, taken) {
-  const plainName = heading.innerText.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "") || "section";
-  for (let k = 1; !heading.id; k++) {
-    const name = k > 1 ? `${plainName}-${k}` : plainName;
-    if (!taken.has(name) && !document.getElementById(name)) heading.id = name;
-  }
-  taken.add(heading.id);
-  const link = document.createElement("a");
-  link.className = "anchor";
-  link.href = `#${encodeURIComponent(heading.id)}`;
-  link.textContent = "#";
-  link.title = link.ariaLabel = WORDS.link;
-  heading.append(" ", link);
-}
-
-// A list of the sections that stays in sight and names the robot and the section that is read.
-function addContents() {
-  const wide = matchMedia(document.body.classList.contains("wide") ? "not all" : "(min-width: 80rem)");
-  const headings = [...document.querySelectorAll("main h2")];
-  if (headings.length < 3 || document.body.classList.contains("teach")) return;
-  const titles = headings.map((heading) => heading.innerText);
-  const taken = new Set();
-  headings.forEach((heading) => nameHeading(heading, taken));
-  const list = document.createElement("ol");
-  const links = headings.map((heading, i) => {
-    const link = document.createElement("a");
-    link.href = `#${encodeURIComponent(heading.id)}`;
-    link.textContent = titles[i];
-    const item = document.createElement("li");
-    item.append(link);
-    list.append(item);
-    return link;
-  });
-  const summary = document.createElement("summary");
-  const [robot, place] = [document.createElement("b"), document.createElement("span")];
-  robot.textContent = document.querySelector("main").dataset.robot ?? "";
-  summary.append(...(robot.textContent ? [robot, " "] : []), place);
-  const details = document.createElement("details");
-  details.append(summary, list);
-  details.addEventListener("click", (event) => event.target.closest("a") && !wide.matches && (details.open = false));
-  const nav = document.createElement("nav");
-  nav.className = "contents";
-  nav.ariaLabel = WORDS.contents;
-  nav.append(details);
-  document.querySelector("main").prepend(nav);
-  const fit = () => (details.open = wide.matches);
-  const close = (event) => wide.matches || details.contains(event.target) || (details.open = false); // it covers the page
-  for (const event of ["pointerdown", "wheel", "touchmove"]) addEventListener(event, close, { passive: true });
-  addEventListener("keydown", (event) => event.key === "Escape" && !wide.matches && (details.open = false));
-  const tell = () => {
-    const read = headings.findLastIndex((heading) => heading.checkVisibility() && heading.getBoundingClientRect().top < 120);
-    place.textContent = read < 0 || wide.matches ? WORDS.contents : WORDS.contents + WORDS.colon + titles[read];
-    links.forEach((link, i) => (i === read ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current")));
-  };
-  list.addEventListener("click", (event) => {
-    const folded = headings[links.indexOf(event.target)]?.closest("details.section");
-    if (folded) folded.open = true;
-  });
-  wide.addEventListener("change", fit);
-  for (const event of ["scroll", "resize"]) addEventListener(event, tell, { passive: true });
-  fit();
-  tell();
-}
-
 // Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
 // teach panel; a variant has none.
 function linkJoints(page) {
@@ -677,6 +614,7 @@ function showOneOf(group) {
     aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
+  addEventListener("picked", ({ detail }) => parts.filter((part) => idOf(part).replace(/-solutions$/, "") === detail).forEach((part) => choose(part)));
   choose(parts[0]);
   follow();
 }
@@ -765,13 +703,12 @@ if (!document.querySelector("main[data-panel]")) {
 }
 addEventListener("hashchange", unfoldTarget);
 unfoldTarget();
-addContents();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
 explainTerms(JSON.parse(document.getElementById("terms").textContent));
 document.querySelectorAll(".scroll").forEach(fade);
 
 // A sheet of paper can't be unfolded.
-addEventListener("beforeprint", () => document.querySelectorAll(".provenance, details.section").forEach((details) => (details.open = true)));
+addEventListener("beforeprint", () => document.querySelectorAll("details.section").forEach((details) => (details.open = true)));
 
 // On a phone each row of a table of cards is one: its cells stand below one another, each after its column's name. A row
 // that an address leads to has these names too.
@@ -784,6 +721,7 @@ function nameCells(table) {
 for (const table of document.querySelectorAll("table")) {
   if (table.tHead && (table.classList.contains("cards") || table.querySelector("tbody tr[id]"))) nameCells(table);
   makeSortable(table);
+  if (table.matches(".matrix table, .tile table")) continue;
   const tools = document.createElement("p");
   tools.className = "tools";
   tools.append(toolButton(WORDS.csv, () => download(csvOf(table), "text/csv", `${nameFor(table)}.csv`)));
@@ -825,6 +763,29 @@ for (const link of document.querySelectorAll("[data-packed]")) {
     save(link);
   });
 }
+
+// What each stage of this robot came to, where the index has left word of it.
+const SIGNS = { pass: "✓", caution: "▲", fail: "✕", conflict: "≠", no_reference: "○", not_computed: "–" };
+for (const link of document.querySelectorAll("nav [data-stage]")) {
+  const status = globalThis.MARKS?.[document.querySelector("main").dataset.name]?.[link.dataset.stage];
+  if (!status) continue;
+  link.dataset.mark = SIGNS[status] ?? "○";
+  link.classList.add(status);
+}
+
+// The row of the list whose moment or picture is shown.
+const rows = [...document.querySelectorAll(".runs a")];
+const mark = (shown) => rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+rows.forEach((row) => row.addEventListener("click", () => {
+  mark(row);
+  dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
+}));
+mark(rows.find((row) => row.hash === location.hash) ?? rows[0]);
+
+// A menu closes by a click elsewhere and by Escape.
+const menus = document.querySelectorAll(".menu");
+addEventListener("click", ({ target }) => menus.forEach((menu) => menu.contains(target) || (menu.open = false)));
+addEventListener("keydown", ({ key }) => key === "Escape" && menus.forEach((menu) => (menu.open = false)));
 
 addFinder();
 addEventListener("click", keepPlace, true);

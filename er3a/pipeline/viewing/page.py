@@ -11,7 +11,7 @@ import shlex
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
@@ -55,6 +55,7 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer
 from er3a.pipeline.viewing.figures import readings, svg_data_uri
 from er3a.version import __version__
 
@@ -70,16 +71,33 @@ VERDICT_WORDS = {
 }
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
+SHORT_NAMES = {
+    "validation": N_("Table"),
+    "workspace": N_("Reach"),
+    "collision": N_("Collisions"),
+    "inverse": N_("Poses"),
+    "trajectory": N_("Paths"),
+    "programs": N_("Programs"),
+    "dynamics": N_("Torque"),
+    "vision": N_("Camera"),
+    "teach": N_("Teach panel"),
+}
+FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
+    "pass": N_("table confirmed"),
+    "fail": N_("table contradicted"),
+    "caution": N_("table partly open"),
+    "unsettled": N_("table open"),
+    "no_reference": N_("table unchecked"),
+    "not_computed": N_("table unchecked"),
+}
 
-WHOLE, LED = 300, 260  # characters of a verdict that is shown in one, and those before which a longer one breaks
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
-    "csv": N_("download as CSV"),
+    "csv": N_("CSV"),
     "known": N_("what is known of it"),
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
-    "contents": N_("Contents"),
     "filter": N_("Filter rows by"),
     "find": N_("Find on this page"),
     "findAnywhere": N_("Find on all pages"),
@@ -87,7 +105,6 @@ SCRIPT_WORDS = {
     "elsewhere": N_("{count} of them on other pages"),
     "none": N_("Nothing has all these words: try fewer, or others"),
     "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
-    "link": N_("link to this section"),
     "previous": N_("Previous"),
     "next": N_("Next"),
     "all": N_("all at once"),
@@ -245,6 +262,13 @@ class Head:
         return "pass as_meant" if self.status == "pass" and self.demonstrations else self.status
 
     @property
+    def foundation(self) -> str:
+        """What is known of the table that all rests on, in two words."""
+        first = self.caveats.get("validation")
+        own = self.status if self.stage == "validation" else "pass"
+        return tr(FOUNDATION_WORDS.get(first.status if first else own, FOUNDATION_WORDS["pass"]))
+
+    @property
     def finding(self) -> Any:
         """What the verdict says."""
         return self.summary.verdict.finding
@@ -363,6 +387,8 @@ def render(
             terms=glossary(),
             verdict_words=VERDICT_WORDS,
             pages=PAGES,
+            short_names=SHORT_NAMES,
+            at_side=bool(context.pop("at_side", False)),
             language=language.current(),
             summary=summary,
             head=head,
@@ -409,8 +435,7 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         "tr": tr,
         "own": language.own_title,
         "sentence": whole_sentence,
-        "led": led,
-        "first_sentence": first_sentence,
+        "first_sentence": language.first_sentence,
         "linked": linked,
         "breakable": breakable,
         "grade": partial(word, "grade", GRADE_NAMES),
@@ -423,6 +448,7 @@ def render_stage(
     study: Study,
     stored: Stored[Any],
     output: Path,
+    answer: Answer,
     *,
     head: Head | None = None,
     head_links: Mapping[str, str] | None = None,
@@ -435,13 +461,17 @@ def render_stage(
     study : that the results are of; the command at the page's foot names its file
     stored : what the stage found of a robot
     output : replaced whole, or left as it is
+    answer : its first screen, but where evidence contradicts the table that all rests on
     head : if it is another than the results give
     head_links : addresses that words of the head lead to; of the head that the results give
     context : what the template needs besides, by name
     """
     name, stage = stored.robot, stored.stage
+    head = head or head_of(stored, head_links)
     shared: dict[str, Any] = {
-        "head": head or head_of(stored, head_links),
+        "head": head,
+        "answer": replace(answer, **_void_of_meaning()) if head.no_verdict else answer,
+        "robots": robots_with(study, stage),
         "never": never_text(stage),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
@@ -450,6 +480,25 @@ def render_stage(
     }
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, stored.results.summary, **shared | context)
+
+
+def _void_of_meaning() -> dict[str, Any]:
+    """What a page says first of a table that evidence contradicts."""
+    return {
+        "headline": tr("Another arm's table."),
+        "rest": tr("Nothing here holds for this robot."),
+        "below": "",
+        "fix": None,
+    }
+
+
+def robots_with(study: Study, page: str) -> list[tuple[str, str, str]]:
+    """The robots of a study that have a page: name, title, and its address from a robot's page."""
+    return [
+        (name, language.own_title(study.robot(name).title), f"../{name}/{page}.html")
+        for name in study.names
+        if page in study.pages(name)
+    ]
 
 
 def _tray_edges(study: Study, stored: Stored[Any]) -> str:
@@ -481,42 +530,6 @@ def closed_up(html: str) -> str:
     html : text within ``<code>`` keeps its brackets
     """
     return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
-
-
-def led(text: str) -> tuple[str, str]:
-    """A verdict's text in two parts, of which a page shows the first large.
-
-    Parameters
-    ----------
-    text : of one or more sentences
-
-    Returns
-    -------
-    first, rest : up to the end of a sentence, or else of a clause; the rest is empty for a short text
-    """
-    ends = [[found.end() for found in re.finditer(end, text[:LED])] for end in (r"\.(?= )|。", r";(?= )|；")]
-    cut = next((found[-1] for found in ends if found), 0)
-    if len(text) <= WHOLE or not cut:
-        return text, ""
-    first, rest = text[:cut], text[cut:].strip()
-    if first[-1] in ".。":
-        return first, rest
-    return whole_sentence(first[:-1]), rest[:1].upper() + rest[1:]  # a clause becomes a sentence
-
-
-def first_sentence(text: str) -> tuple[str, str]:
-    """A text up to the end of its first sentence, and the rest.
-
-    Parameters
-    ----------
-    text : in English or Chinese
-
-    Returns
-    -------
-    first, rest : the rest is empty for a single sentence
-    """
-    end = re.search(r"\.(?= )|。", text)
-    return (text[: end.end()], text[end.end() :].strip()) if end else (text, "")
 
 
 def linked(text: str, links: Mapping[str, str]) -> Markup:
@@ -721,8 +734,11 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
         Path(__file__).with_name("absent.html.j2"),
         output,
         head=head_of(stored),
+        answer=Answer(tr("Not computed."), below=head_of(stored).own_text),
+        never="",
         command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
         robot=study.robot(stored.robot),
+        robots=robots_with(study, stored.stage),
         robot_pages=study.pages(stored.robot),
         box="",
     )

@@ -627,14 +627,13 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
     if found.done < 1.0:
         reasons.append(fact("path_not_finished", done=found.done))
     elif left > ARRIVED[0] or twisted > ARRIVED[1]:
-        reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=float(np.degrees(twisted))))
+        reasons.append(fact("ends_off_path", distance_mm=left * 1000, angle_deg=np.degrees(twisted)))
     worst = np.argmax(np.maximum(motion.q - robot.upper, robot.lower - motion.q).max(axis=1))
     if exceeded := limits_exceeded(robot, motion.q[worst]):
         reasons.append(exceeded)
-    if speed > 1 + OVER:
-        reasons.append(fact("speed_exceeded", ratio=speed))
-    if acceleration > 1 + OVER:
-        reasons.append(fact("acceleration_exceeded", ratio=acceleration))
+    for rate, ratio in {"speed": speed, "acceleration": acceleration}.items():
+        if ratio > 1 + OVER:
+            reasons.append(fact("rate_exceeded", rate=rate, ratio=ratio))
     keeps = found.crosses_by_joints or bool(segment.near.margin(robot, motion.q).min() > 1 - 1e-6)
     cost = StrategyCost(motion, found.done, distance, angle, speed, acceleration, keeps)
     return StrategyResult(name, cost, tuple(reasons))

@@ -9,7 +9,7 @@ import numpy as np
 from er3a.collision import free_space
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts
-from er3a.collision.pairs import Pair
+from er3a.collision.pairs import TRIED, Pair, label_of
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.finding import Finding, fact, is_one
@@ -69,7 +69,7 @@ def target_clearances(
                 label=solutions.label[rows],
                 q_deg=shown(robot, solutions.q[rows]),
                 clearance_mm=distance * 1000,
-                between=[bodies.pairs[k].label if k >= 0 else "" for k in pair],
+                between=[label_of(bodies.pairs[k]) if k >= 0 else "" for k in pair],
             )
         )
         choice = nearest(robot, solutions, target.q_ref, refusals_of(bodies, solutions))
@@ -123,7 +123,7 @@ def path_clearances(
                 t_s=along.t,
                 q_deg=shown(bodies.robot, q),
                 clearance_mm=along.distance * 1000,
-                between=[bodies.pairs[k].label if k >= 0 else "" for k in pair],
+                between=[label_of(bodies.pairs[k]) if k >= 0 else "" for k in pair],
                 from_mm=near[:, 0] * 1000,
                 to_mm=near[:, 1] * 1000,
             )
@@ -169,20 +169,20 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))
-    wrong = bodies.in_error and fact("collision.shapes_overlap", pairs=bodies.in_error, free_ratio=space.whole.value)
+    wrong = bodies.in_error and fact(
+        "collision.shapes_overlap", pairs=bodies.in_error, count=TRIED, free_ratio=space.whole.value
+    )
     closest = (*at_targets, *on_paths)
     assumed = shapes_assumed(robot, study.assumed_margin(name), {one.name: one.clearance_mm / 1000 for one in closest})
     undecided = int((matrix.state == "undecided").sum())
-    free = model.FreeSpace(
-        *(space.whole.value, places_found.reached, places_found.clear, places_found.joined, undecided),
-        assumed is not None,
-        targets=len(at_targets),
-        nearest=_nearest_target(at_targets),
-        colliding=_colliding(motions, on_paths, first_touch),
-        blocked=blocked,
+    free = _free_space(space, places_found, at_targets, blocked, _colliding(motions, on_paths, first_touch)).but(
+        undecided=undecided, shapes_assumed=assumed is not None
     )
     covered = covered_collisions(robot, bodies, scene)
-    home = None if at_home is None else model.HomeCollides(at_home, 1000 * depth, free)
+    home = None
+    if at_home is not None:
+        free = free.but(joined=None)
+        home = fact("collision.home_collides", pair=at_home, depth_mm=1000 * depth, **free.params)
     rows = model.PlaceRows.of(places, middle=places.middles, witness_deg=shown(robot, places.witness))
     return model.CollisionResults(
         summary=model.CollisionSummary(
@@ -207,6 +207,28 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         places=rows.of_joints(robot.slides),
         targets=targets,
         paths=paths,
+    )
+
+
+def _free_space(
+    space: free_space.JointSpace,
+    places: model.PlacesSummary,
+    at_targets: list[model.Closest],
+    blocked: tuple[Finding, ...],
+    colliding: tuple[Finding, ...],
+) -> Finding:
+    """How much of joint space and of the reached places is free, and what targets and paths come to."""
+    return fact(
+        "collision.free_space",
+        free_ratio=space.whole.value,
+        places=places.reached,
+        clear=places.clear,
+        joined=places.joined,
+        targets=len(at_targets),
+        nearest=_nearest_target(at_targets),
+        colliding=colliding,
+        blocked=blocked,
+        demonstrations=tuple(each for each in (*blocked, *colliding) if each.expected),
     )
 
 
@@ -259,7 +281,7 @@ def _checked(study: Study, name: str, seen: Covered, motions: list[ListedMotion]
 def _matrix(bodies: Bodies) -> model.MatrixRows:
     robot = bodies.robot
     unknown = np.full(robot.joints, np.nan)
-    watched = {tuple(pair.label.split("/")) for pair, second in zip(bodies.pairs, bodies.second) if second >= 0}
+    watched = {tuple(label_of(pair).split("/")) for pair, second in zip(bodies.pairs, bodies.second) if second >= 0}
     return model.MatrixRows.of_rows(
         (
             row.first,
@@ -286,7 +308,7 @@ def _pair_shares(bodies: Bodies, space: free_space.JointSpace) -> model.PairShar
         share = free_space.Share(space.count(own), len(space.q))
         always = share.count == share.of and any(bodies.always_overlaps(number) for number in own)
         rows.append((pair, bool(bodies.second[own[0]] >= 0), share.value, *share.interval, always))
-    return model.PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], row[0].label)))
+    return model.PairShares.of_rows(sorted(rows, key=lambda row: (-row[2], label_of(row[0]))))
 
 
 def _share(share: free_space.Share) -> model.FreeShare:
@@ -311,12 +333,12 @@ def _verdict(
     pairs: model.PairShares,
     mounting: tuple[model.Mounting, ...],
     wrong: Finding | None,
-    found: model.FreeSpace,
-    home: model.HomeCollides | None,
-) -> Verdict[Finding | model.HomeCollides | model.FreeSpace]:
+    found: Finding,
+    home: Finding | None,
+) -> Verdict[Finding]:
     if pairs.always.any():
         return Verdict(
-            "fail", fact("collision.never_free", pairs=tuple(pairs.between[pairs.always]), assumed=found.assumed)
+            "fail", fact("collision.never_free", pairs=tuple(pairs.between[pairs.always]), assumed=found.shapes_assumed)
         )
     if inside := tuple(contact.solid for contact in mounting if contact.inside):
         return Verdict("fail", fact("collision.base_in_solid", solids=inside))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from er3a.by_value import Coded
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
@@ -14,50 +13,6 @@ from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-
-
-class FreeSpace(Coded, code="collision.free_space"):
-    """How much of joint space and of the reached places is free.
-
-    Attributes
-    ----------
-    places, clear, joined : cells reached, with an arm free of overlap, and joined to home by a proven motion
-    undecided : pairs of links of which it is not known whether they can meet
-    assumed : whether the shapes of the arm's links are, so that nothing is proven of the arm itself
-    targets, nearest : how many have a chosen solution, and the nearest of these; colliding : paths that do
-    blocked : targets that collide in every solution
-    """
-
-    free_ratio: float
-    places: int
-    clear: int
-    joined: int
-    undecided: int
-    assumed: bool = False
-    targets: int = 0
-    nearest: Finding | None = None
-    colliding: tuple[Finding, ...] = ()
-    blocked: tuple[Finding, ...] = ()
-
-    @property
-    def demonstrations(self) -> tuple[Finding, ...]:
-        """What collides as it is meant to."""
-        collide: tuple[Finding, ...] = (*self.blocked, *self.colliding)
-        return tuple(each for each in collide if each.expected)
-
-
-class HomeCollides(Coded, code="collision.home_collides"):
-    """At home, all joints at 0 or as near to it as the limits allow, something overlaps; ``found``: what holds besides,
-    but for what can be reached from there."""
-
-    pair: Pair
-    depth_mm: float
-    found: FreeSpace
-
-    @property
-    def demonstrations(self) -> tuple[Finding, ...]:
-        """What collides as it is meant to."""
-        return self.found.demonstrations
 
 
 @dataclass(frozen=True)
@@ -118,7 +73,7 @@ class CollisionSummary(Summary):
 
     needs = ("self_collision", "scene_collision", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[Finding | HomeCollides | FreeSpace]
+    verdict: Verdict[Finding]
     scene: str | None
     samples: int
     of_itself: FreeShare

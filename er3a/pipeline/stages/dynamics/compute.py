@@ -39,7 +39,7 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
 
-DynamicsVerdict = Verdict[Finding | model.NoLimits | model.AllWithin | model.Marginal | model.Overload]
+DynamicsVerdict = Verdict[Finding]
 
 
 def drive_uses(
@@ -184,11 +184,12 @@ def verdict_of(
     """
     missing = tuple(found.link for found in findings if is_one(found, "missing_link"))
     doubts = len(findings) - len(missing)
-    shown = missing, doubts, None if masses is None or masses.grade in DOCUMENTED else masses.grade
+    grade = None if masses is None or masses.grade in DOCUMENTED else masses.grade
+    shown = {"missing_links": missing, "doubts": doubts, "grade": grade}
     if not uses:
         if not holding:
             return Verdict("no_reference", fact("dynamics.no_data", needs=unknown))
-        return Verdict("no_reference", _no_limits([path.summary for path in paths], holding, *shown))
+        return Verdict("no_reference", _no_limits([path.summary for path in paths], holding).but(**shown))
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
     needs = tuple(each.what for each in unknown)
@@ -199,26 +200,24 @@ def verdict_of(
     )
     guessed = masses is not None and masses.grade == "inferred"
     open_ = unsettled or doubts or needs or not_run or guessed
-    kind = model.Overload if beyond else model.Marginal if open_ else model.AllWithin
+    code = "dynamics.overload" if beyond else "dynamics.marginal" if open_ else "dynamics.fits"
     status: Status = "fail" if beyond else "caution" if open_ else "pass"
-    return Verdict(status, kind(len(uses), beyond, uses[0], unsettled, needs, not_run, *shown))
+    counts = {"compared": len(uses), "beyond": beyond, "unsettled": unsettled, "unknown": needs, "not_run": not_run}
+    return Verdict(status, fact(code, tightest=fact("dynamics.use", **vars(uses[0])), **counts, **shown))
 
 
-def _no_limits(
-    paths: list[model.PathLoad],
-    holding: tuple[model.HoldingTorque, ...],
-    missing: tuple[int, ...],
-    doubts: int,
-    grade: Grade | None,
-) -> model.NoLimits:
-    counted, shown = [path for path in paths if path.counts], (missing, doubts, grade)
-    at_rest = model.hardest_held(holding)
-    if counted:
-        path = max(counted, key=lambda path: path.hardest.peak)
-        load = path.hardest
-        more = at_rest if abs(at_rest.torque) > load.peak and at_rest.unit == load.unit else None
-        return model.NoLimits(len(counted), load.joint, load.peak, load.tolerance, load.unit, path.name, *shown, more)
-    return model.NoLimits(0, at_rest.joint, abs(at_rest.torque), at_rest.tolerance, at_rest.unit, None, *shown)
+def _no_limits(paths: list[model.PathLoad], holding: tuple[model.HoldingTorque, ...]) -> Finding:
+    counted, at_rest = [path for path in paths if path.counts], model.hardest_held(holding)
+    held = fact("dynamics.torque", **vars(at_rest) | {"torque": abs(at_rest.torque), "path": None})
+    if not counted:
+        return fact("dynamics.no_limits", paths=0, torques=(held,))
+    path = max(counted, key=lambda path: path.hardest.peak)
+    load = path.hardest
+    parts = {"joint": load.joint, "torque": load.peak, "tolerance": load.tolerance, "unit": load.unit}
+    more = (held,) if held.torque > load.peak and at_rest.unit == load.unit else ()
+    return fact(
+        "dynamics.no_limits", paths=len(counted), torques=(fact("dynamics.torque", path=path.name, **parts), *more)
+    )
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from er3a.by_value import Coded
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
 from er3a.finding import Finding
@@ -63,64 +62,16 @@ class Use:
         return self.asked / self.allowed
 
 
-class NoLimits(Coded, code="dynamics.no_limits"):
-    """Torques are known, and no limit that they could be compared with: the largest one.
-
-    Attributes
-    ----------
-    paths : that may be run, and count
-    path : None where it is the holding torque
-    missing_links : without mass, which count as massless
-    doubts : findings on the masses besides
-    grade : of the masses, where no document or scale gives them; None where one does
-    held : at rest, where that is more than on any path that counts
-    """
-
-    paths: int
-    joint: int
-    torque: float
-    tolerance: float
-    unit: Unit
-    path: str | None
-    missing_links: tuple[int, ...]
-    doubts: int
-    grade: Grade | None
-    held: HoldingTorque | None = None
-
-
-@dataclass(frozen=True)
-class Compared:
-    """So much was compared with limits; ``tightest`` is what is nearest to its limit, or farthest beyond it.
-
-    Attributes
-    ----------
-    unsettled : what is within its limit, and not with the tolerances of the masses
-    unknown : what the files leave open, wholly or in part; torques and limits that rest on it were not examined
-    not_run : paths that are to be run, and may not be: they count for nothing
-    missing_links, doubts, grade : as of :class:`NoLimits`
-    """
-
-    compared: int
-    beyond: int
-    tightest: Use
-    unsettled: int
-    unknown: tuple[Need, ...]
-    not_run: tuple[str, ...]
-    missing_links: tuple[int, ...]
-    doubts: int
-    grade: Grade | None
-
-
-class AllWithin(Compared, Coded, code="dynamics.fits"):
-    """All is within its limits, tolerances included."""
-
-
-class Marginal(Compared, Coded, code="dynamics.marginal"):
-    """All is within the limits that are known: not with the tolerances of the masses, or not all was examined."""
-
-
-class Overload(Compared, Coded, code="dynamics.overload"):
-    """Something is beyond its limit."""
+Compared = Finding
+"""What was compared with limits: ``dynamics.fits`` (all is within, tolerances included), ``dynamics.marginal`` (all is
+within what is known: not with the tolerances of the masses, or not all was examined), ``dynamics.overload``.
+``compared`` with limits and ``beyond`` them; ``tightest`` is what is nearest to its limit, or farthest beyond it
+(:class:`Use`). ``unsettled``: what is within its limit, and not with the tolerances of the masses. ``unknown``:
+what the files leave open, wholly or in part; torques and limits that rest on it were not examined. ``not_run``:
+paths that are to be run, and may not be: they count for nothing. Without any limit ``dynamics.no_limits``: the
+largest torque on a path that counts, and the one at rest where that is larger. All have ``missing_links`` without
+mass, which count as massless, the number of ``doubts`` on masses besides, and the ``grade`` of the masses, where no
+document or scale gives them, else None."""
 
 
 @dataclass(frozen=True)
@@ -331,7 +282,7 @@ class DynamicsSummary(Summary):
 
     needs = ("torque", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[Finding | NoLimits | AllWithin | Marginal | Overload]
+    verdict: Verdict[Finding]
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]

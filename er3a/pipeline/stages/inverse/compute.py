@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from er3a.collision.along import bodies_of
+from er3a.collision.pairs import label_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
@@ -23,7 +24,7 @@ from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import MANY_TARGETS, ByClass, Iteration, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.solutions import MANY_TARGETS, Method, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
@@ -288,7 +289,7 @@ def rankings(
     few = solved.solutions.take(rows)
     free = ~collides(solved.rows)[rows]
     bodies = bodies_of(robot, scene)
-    nearest = [bodies.pairs[k].label if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
+    nearest = [label_of(bodies.pairs[k]) if k >= 0 else "" for k in bodies.min_distance(few.q)[1]]
     return model.RankingRows.stacked(
         model.RankingRows.of(
             few,
@@ -468,7 +469,7 @@ def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
 
 def _is_certain(method: Method) -> bool:
     """Whether the solutions that it found are all."""
-    return method.certain if isinstance(method, ByClass) else not isinstance(method, Iteration)
+    return bool(method.certain) if is_one(method, "by_class") else not is_one(method, "iteration")
 
 
 def _verdict(

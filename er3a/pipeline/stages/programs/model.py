@@ -14,8 +14,6 @@ from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
 from er3a.program_check.program_check_findings import CheckFinding, Level
-from er3a.programs.instructions import Place
-from er3a.programs.program_findings import NotUnderstood
 from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 NO_STEPS: Mapping[int, Any] = MappingProxyType({})
@@ -65,9 +63,7 @@ def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> 
 
 def _without_path(finding: CheckFinding) -> CheckFinding:
     """A finding whose own place names no folder of this machine."""
-    if isinstance(finding, NotUnderstood):
-        return replace(finding, place=Place(None, finding.place.line, finding.place.element))
-    return finding
+    return replace(finding, params={name: value for name, value in finding.params.items() if name != "place"})
 
 
 @dataclass(frozen=True)

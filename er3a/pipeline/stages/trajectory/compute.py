@@ -581,23 +581,21 @@ def _verdict(
         pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
     )
     judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
-    counts = fact(
-        code,
-        paths=count,
-        safe=safe,
-        unreachable=named("unreachable"),
-        none_found=named("none found"),
-        leaves_limits=named("leaves limits"),
-        collides=named("collides"),
-        too_fast=named("too fast"),
-        singular=named("singular"),
-        too_fast_if_assumed=named("too fast for the assumed limits"),
-        undecided=named("undecided"),
-        near_singular=named("near-singular"),
-        demonstrations=demonstrations(judged, "safe"),
-        not_followed=tuple(path.name for path in unfollowed),
-        of_program=tuple(path.name for path in asked if path.verdict == "safe" and path.of_program),
-    )
+    unsafe = {
+        "unreachable": named("unreachable"),
+        "none_found": named("none found"),
+        "leaves_limits": named("leaves limits"),
+        "collides": named("collides"),
+        "too_fast": named("too fast"),
+        "singular": named("singular"),
+        "too_fast_if_assumed": named("too fast for the assumed limits"),
+        "undecided": named("undecided"),
+        "near_singular": named("near-singular"),
+        "not_followed": tuple(path.name for path in unfollowed),
+        "of_program": tuple(path.name for path in asked if path.verdict == "safe" and path.of_program),
+    }
+    near, shown = count - safe - sum(map(len, unsafe.values())), demonstrations(judged, "safe")
+    counts = fact(code, paths=count, safe=safe, near_assumed=near, demonstrations=shown, **unsafe)
     return Verdict(status, counts)
 
 

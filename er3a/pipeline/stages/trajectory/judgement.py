@@ -10,6 +10,7 @@ import scipy
 
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import label_of
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
@@ -160,7 +161,7 @@ def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
     )
 
 
-def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.BodiesOverlap]]:
+def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[Finding]]:
     """Stretches of a motion on which bodies overlap.
 
     Parameters
@@ -175,11 +176,12 @@ def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[model.Bodie
         motion_faults.Interval(
             contact.start,
             contact.end,
-            model.BodiesOverlap(
-                tuple(
+            fact(
+                "bodies_overlap",
+                touches=tuple(
                     fact("pair_touches", pair=each.pair, t0_s=each.start, depth_mm=each.depth * 1000, t_s=each.at)
                     for each in contact.touches
-                )
+                ),
             ),
         )
         for contact in along.contacts
@@ -380,5 +382,5 @@ def clearance_rows(name: str, along: ClearanceAlong) -> model.Clearances:
     -------
     rows : s and mm; NaN where the path can't be reached
     """
-    between = [pair.label if pair else "" for pair in along.pair]
+    between = [label_of(pair) if pair else "" for pair in along.pair]
     return model.Clearances.of(path=name, t_s=along.t, clearance_mm=along.distance * 1000, between=between)

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
-from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.finding import AnyFinding, Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
@@ -104,22 +103,6 @@ class Jump:
     t_s: float
     joint: int
     angle_deg: float
-
-
-class BodiesOverlap(Coded):
-    """What overlaps, the first to touch first."""
-
-    touches: tuple[Finding, ...]
-
-    @property
-    def pairs(self) -> tuple[Pair, ...]:
-        """What overlaps, the first to touch first."""
-        return tuple(each.pair for each in self.touches)
-
-    @property
-    def depth_mm(self) -> float:
-        """The largest overlap of all pairs, mm."""
-        return max(each.depth_mm for each in self.touches)
 
 
 @dataclass(frozen=True)
@@ -275,7 +258,7 @@ class PathSummary:
     max_joint_speed_ratio: float | None
     max_joint_acceleration_ratio: float | None
     joint_speed_bounded: bool
-    collisions: tuple[Stretch[BodiesOverlap], ...]
+    collisions: tuple[Stretch[Finding], ...]
     clearance: MinClearance | None
     not_planned: NoWayAround | None
     fastest_s: float | None

@@ -35,7 +35,7 @@ from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Hull, Void, convex_hull, pocket_block, proven_voids
 
 
-def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict[model.WorkspaceFinding]:
+def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict[Finding]:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
@@ -51,19 +51,19 @@ def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdic
     enclosed = [void for void in voids if void.kind == "enclosed"]
     unexpected = [void for void in enclosed if not void.holds_shoulder]
     if unexpected:
-        return Verdict("caution", model.VoidUnexpected(*_size_and_place(unexpected[0]), unexpected[0].cause))
+        found = {"cause": unexpected[0].cause, "single_changes": ()}
+        return Verdict("caution", fact("workspace.void_unexpected", **_size_and_place(unexpected[0]), **found))
     if undecided > SETTLED:
         return Verdict("caution", fact("workspace.unsettled", undecided_percent=100 * undecided))
     if enclosed:
-        litres, x, y, z = _size_and_place(enclosed[0])
-        return Verdict("pass", fact("workspace.void_at_shoulder", litres=litres, x_mm=x, y_mm=y, z_mm=z))
+        return Verdict("pass", fact("workspace.void_at_shoulder", **_size_and_place(enclosed[0])))
     return Verdict("pass", fact("workspace.no_void", undecided_percent=100 * undecided))
 
 
-def _size_and_place(void: Void) -> tuple[float, float, float, float]:
+def _size_and_place(void: Void) -> dict[str, float]:
     """Litres, and the centre in mm."""
     x, y, z = (1000 * value for value in void.centroid.tolist())
-    return 1000 * void.lower, x, y, z
+    return {"litres": 1000 * void.lower, "x_mm": x, "y_mm": y, "z_mm": z}
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +141,9 @@ def _summary(
 ) -> model.WorkspaceSummary:
     settings, grid, hull = study.section(WorkspaceSettings), samples.grid, samples.hull
     judged = judge(hull.volume, voids, proven.proof.width)
-    if isinstance(judged.finding, model.VoidUnexpected) and not wrist_partition_missing(robot):
+    if is_one(judged.finding, "workspace.void_unexpected") and not wrist_partition_missing(robot):
         tried = single_changes(robot, judged.finding.cause, study.seed)
-        judged = replace(judged, finding=replace(judged.finding, single_changes=tried))
+        judged = replace(judged, finding=judged.finding.but(single_changes=tried))
     examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_kept)
@@ -191,7 +191,7 @@ def _assumed(tool: ToolCapability) -> Iterator[Open]:
     found, placement = tool.capability, tool.placement
     if is_one(found, "workspace.capability_missing"):
         yield Open("capability")
-    elif isinstance(placement, model.PlacementTooLong):
+    elif is_one(placement, "workspace.placement_too_long"):
         yield Open("places")
     elif placement and not getattr(placement, "named_places", ()):
         yield Open("tray_nowhere", (f"{' × '.join(f'{edge:g}' for edge in placement.task.box_mm)} mm",))

@@ -10,7 +10,6 @@ import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import Coded
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
@@ -22,32 +21,11 @@ from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import ReachExtremes
 from er3a.workspace.capability import Capability, Overall
-from er3a.workspace.causes import SingleChange, VoidCause
+from er3a.workspace.causes import VoidCause
 from er3a.workspace.orientations import AskedKind
 from er3a.workspace.placement import Places
 from er3a.workspace.proven import Proven
 from er3a.workspace.voids import Void, VoidKind
-
-
-@dataclass(frozen=True)
-class VoidFound:
-    """How large an enclosed void is, and where its middle lies."""
-
-    litres: float
-    x_mm: float
-    y_mm: float
-    z_mm: float
-
-
-class VoidUnexpected(VoidFound, Coded, code="workspace.void_unexpected"):
-    """An enclosed void away from the shoulder, proven empty."""
-
-    cause: VoidCause
-    single_changes: tuple[SingleChange, ...] = ()
-
-
-WorkspaceFinding = Finding | VoidUnexpected | Finding
-
 
 Singles = NDArray[np.float32]
 
@@ -288,19 +266,6 @@ class TaskSummary:
     clear_of_axis_mm: float
 
 
-class ToolPointsElsewhere(Coded, code="workspace.tool_points_elsewhere"):
-    """The tray is nowhere served: the tool points along ``direction`` and can't tilt, which is not what is asked."""
-
-    task: TaskSummary
-    direction: Triple
-
-
-class PlacementTooLong(Coded, code="workspace.placement_too_long"):
-    """Places were not looked for: with what a pose takes this arm, the lattice would have to be wider than the tray."""
-
-    task: TaskSummary
-
-
 @dataclass(frozen=True)
 class PlaceSummary:
     """One of the best places for the tray.
@@ -400,7 +365,10 @@ class PlacementSummary:
         return min(fitting, key=lambda stand: stand.served_from_m or 0.0, default=None)
 
 
-Placement = PlacementSummary | ToolPointsElsewhere | PlacementTooLong
+Placement = PlacementSummary | Finding
+"""``workspace.tool_points_elsewhere``: the tray is nowhere served: the tool points along ``direction`` and can't tilt,
+which is not what is asked. ``workspace.placement_too_long``: places were not looked for: with what a pose takes
+this arm, the lattice would have to be wider than the tray. Both hold the ``task``."""
 
 
 class WorkspaceSummary(Summary):
@@ -411,7 +379,7 @@ class WorkspaceSummary(Summary):
 
     needs = ("reach", "limits", "self_collision")
 
-    verdict: Verdict[WorkspaceFinding]
+    verdict: Verdict[Finding]
     samples: int
     sampling: Sampling
     volume_m3: Bounds

@@ -225,13 +225,12 @@ def _placed(
     ----------
     best : the arm's largest manipulability, m^3
     """
-    asked = plan.asked
+    asked, wanted = plan.asked, fact("workspace.task", **vars(task_summary(settings.placement)))
     if not asked.in_cone(np.zeros((1, 3)), task.axis, task.half_angle, task.step).shape[1]:
-        return model.ToolPointsElsewhere(
-            task_summary(settings.placement), model.triple(asked.tool[:, 2])
-        ), model.BoxPlaces.empty()
+        direction = model.triple(asked.tool[:, 2])
+        return fact("workspace.tool_points_elsewhere", task=wanted, direction=direction), model.BoxPlaces.empty()
     if plan.lattice is None:
-        return model.PlacementTooLong(task_summary(settings.placement)), model.BoxPlaces.empty()
+        return fact("workspace.placement_too_long", task=wanted), model.BoxPlaces.empty()
     within = narrowed(robot, task.margin)
     bodies, free = Bodies(robot, scene), partial(Bodies(within, scene).free, margin=margin)
     placement = find_places(robot, task, asked, plan.lattice, LISTED, free)

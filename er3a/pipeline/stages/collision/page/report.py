@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 
 from er3a.collision.pairs import TRIED
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
@@ -22,6 +23,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, REFERENCE, VERDICTS
@@ -126,20 +128,45 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     robot = study.robot(name)
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
+    worst = next(((found.name, found.t_s) for found in closest if found.t_s is not None), None)
     render_stage(
         study,
         stored,
         output,
+        _answer(summary, closest),
         matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
         tried=TRIED,
         by_pair=by_pair(results.pairs),
         workspace=workspace(results),
-        player=player(robot, motions(robot, results), scene),
+        player=player(robot, motions(robot, results), scene, opened=worst),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MAX_ROWS]],
         rows_left_out=len(closest) - MAX_ROWS,
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
+
+
+def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest]) -> Answer:
+    """How much of the joint space is free, and how near each path and chosen solution comes to anything."""
+    found = {figure.name: figure.value for figure in summary.figures}
+    free, places = found.get("free_of_collisions"), summary.places
+    share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
+    headline = tr("{share} of the joint space is free.", share=share) if share else tr("Collisions checked.")
+    touch = sum(each.clearance_mm < 0 for each in closest)
+    rest = tr("{count} of {all} motions collide.", count=touch, all=len(closest)) if closest else ""
+    keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
+    groups = (
+        Group(tr("Paths"), [_row(each) for each in closest[:MAX_ROWS] if each.kind == "path"]),
+        Group(tr("Targets"), [_row(each) for each in closest[:MAX_ROWS] if each.kind == "target"]),
+    )
+    return Answer(headline, rest, "", keys, groups)
+
+
+def _row(found: model.Closest) -> ListRow:
+    """A path or chosen solution: how near it comes, and to what."""
+    note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
+    play = None if found.t_s is None else (found.name, found.t_s)
+    return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, "" if play else "#clearance", play)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[str]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
@@ -18,6 +18,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import motions
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
@@ -123,6 +124,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
+        _answer(summary),
         payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
@@ -141,6 +143,56 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         units=_units(summary),
         holding=holding,
         held=_held(summary.holding),
+    )
+
+
+def _answer(summary: model.DynamicsSummary) -> Answer:
+    """The greatest torque that is needed, and that of each joint against its limit."""
+    if not summary.motors:
+        held = model.hardest_held(summary.holding) if summary.holding else None
+        if held is None:
+            return Answer(tr("Torques need the links' masses."), tr("None are given."))
+        size = with_unit(number(abs(held.torque), 2), held.unit)
+        return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size))
+    worst = max(summary.motors, key=lambda motor: motor.peak if motor.unit == summary.motors[0].unit else 0.0)
+    most = with_unit(number(worst.peak, 2), worst.unit)
+    limited = all(motor.peak_limit is not None for motor in summary.motors)
+    over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
+    rest = (
+        tr("Too much for {joints}.", joints=joined(over, ", "))
+        if over
+        else tr("Within all limits.")
+        if limited
+        else tr("Motor limits are unknown.")
+    )
+    keys = [
+        (with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))
+    ]
+    rows = [_row(motor, worst.peak) for motor in summary.motors]
+    return Answer(
+        tr("J{joint} needs most: {torque}.", joint=worst.joint, torque=most),
+        rest,
+        "",
+        keys,
+        (Group(tr("Greatest torque on the paths"), rows),),
+    )
+
+
+def _mark(motor: model.MotorNeed) -> Mark:
+    """Whether a joint's greatest torque is within its limit; ``none`` where that is not known."""
+    if motor.peak_limit is None:
+        return "none"
+    return "pass" if motor.peak <= motor.peak_limit else "fail"
+
+
+def _row(motor: model.MotorNeed, most: float) -> ListRow:
+    """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
+    size = with_unit(number(motor.peak, 3), motor.unit)
+    limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
+    full = motor.peak_limit or most or 1.0
+    note = joined([size, limit or tr("holding {value}", value=with_unit(number(motor.holding, 3), motor.unit))], ", ")
+    return ListRow(
+        _mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")]
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 
 from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
-from er3a.kinematics.solutions import ClosedForm
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
@@ -30,6 +29,7 @@ from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
@@ -165,6 +165,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         study,
         stored,
         output,
+        _answer(summary, chosen),
         nearest_rule=tr(NEAREST_RULE),
         overview=[overview_row(robot, target, of_target(target)) for target in chosen],
         sections=[_section(robot, target, results, rules, contradicted) for target in chosen],
@@ -181,6 +182,33 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         stops=_stops(summary.sequence, {target.name for target in chosen}),
         move=_move_rule(robot, summary.sequence),
     )
+
+
+def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) -> Answer:
+    """How many targets the arm can take, and of each what came of it."""
+    met = [each for each in summary.targets if each.outcome == "reached"]
+    caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
+    due = len(summary.targets) - len(caught)
+    headline = tr("{count} of {due} poses reached.", count=len(met), due=due)
+    rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""
+    clear = [each.clearance.least_mm for each in met if each.clearance]
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    if summary.round_trips:
+        keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
+    failed = Group(tr("No solution to take"), [_row(each) for each in shown if each.outcome != "reached"])
+    return Answer(
+        headline, rest, "", keys, (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met]))
+    )
+
+
+def _row(target: model.TargetResult) -> ListRow:
+    """A target: how many branches serve it, or what it came to."""
+    note = (
+        tr("{within} of {all} solutions within limits", within=target.within_limits, all=target.solutions)
+        if target.outcome == "reached"
+        else outcome_word(target.outcome)
+    )
+    return ListRow("pass" if target.outcome == "reached" else "fail", target.name, note, f"#{target.name}")
 
 
 def _section(
@@ -202,7 +230,7 @@ def _section(
         reason=say(target.reason),
         advice=own if contradicted else listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
-        method="" if isinstance(target.method, ClosedForm) else say(target.method),
+        method="" if is_one(target.method, "closed_form") else say(target.method),
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),

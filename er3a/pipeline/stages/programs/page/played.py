@@ -8,18 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.collision.pairs import names_of
 from er3a.finding import Finding, is_one
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
-from er3a.pipeline.messages.programs import rates_text, remedies, say, singular_cause
-from er3a.pipeline.messages.say import joined, say_first
+from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause
+from er3a.pipeline.messages.say import joined, say, say_first
 from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.planning.motion_faults import rate_ratio
-from er3a.program_check.program_check_findings import RANKS, Level, MotionCollides
+from er3a.program_check.program_check_findings import RANKS, Level
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -192,8 +193,8 @@ def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:
 
 def touching(program: ProgramSummary, line: int) -> tuple[str, ...]:
     """Names of the bodies that overlap on the motion of a line."""
-    collisions = [each.finding for each in of_line(program, line) if isinstance(each.finding, MotionCollides)]
-    return tuple(dict.fromkeys(name for each in collisions for touch in each.touches for name in touch.pair.names))
+    collisions = [each.finding for each in of_line(program, line) if is_one(each.finding, "motion_collides")]
+    return tuple(dict.fromkeys(name for each in collisions for touch in each.touches for name in names_of(touch.pair)))
 
 
 def stretches(rows: ProgramMotion) -> list[tuple[int, Level, float, float]]:

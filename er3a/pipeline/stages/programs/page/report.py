@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +12,14 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from er3a.finding import is_one
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import first_sentence, tr, with_unit
 from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import limits_assumed
+from er3a.pipeline.player.motions import Fault, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -32,7 +35,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.conditions import condition_of
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -46,10 +49,12 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "trajectory")  # the scene of paths counts here too
     sections = [_section(results, program) for program in worst_first(summary.programs)]
+    wrong, played = faults(results), motions(robot, results)
     render_stage(
         study,
         stored,
         output,
+        _answer(summary, wrong, played),
         head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
         entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
@@ -57,13 +62,48 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         limits_assumed=limits_assumed(
             summary.assumed_speed, any(each.reason == "own_accelerations" for each in summary.assumed)
         ),
-        faults={fault.name: fault for fault in faults(results)},
-        player=player(robot, motions(robot, results), scene),
+        faults={fault.name: fault for fault in wrong},
+        player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),
-        condition="" if stored.rests_on.get("validation") == "fail" else condition_of(stored.validated),
     )
+
+
+def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequence[PlayedMotion]) -> Answer:
+    """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
+    shown = {motion.name: motion for motion in played if len(motion.t)}
+    known = {each.name: each for each in summary.programs}
+    ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}
+    shares = dict(zip(ends, lengths(ends.values())))
+    bad = {
+        each.name: row_of(each, shown.get(each.name), ends[each.name], shares[each.name], _in_few_words(each))
+        for each in wrong
+    }
+    sound = [
+        ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), shares[name])
+        for name, each in known.items()
+        if name not in bad
+    ]
+    caught = sum(fault.meant for fault in wrong)
+    headline, rest = may_run(len(sound), len(known) - caught, caught, tr("programs"))
+    clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    fix = next(
+        (Fix(f"{each.name}: {first_sentence(each.to_do)[0]}", f"#{each.name}") for each in wrong if each.to_do), None
+    )
+    groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
+    return Answer(headline, rest, "", keys, groups, fix)
+
+
+def _in_few_words(fault: Fault) -> str:
+    """What is wrong first, up to where its details begin."""
+    return re.split(r"[:;(：；（]", fault.moments[0].what)[0].strip()
+
+
+def _passed(program: model.ProgramSummary) -> str:
+    """How many of its motions pass, and its cycle time."""
+    return tr("{passed} of {count} motions", passed=program.passed, count=program.motions)
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:

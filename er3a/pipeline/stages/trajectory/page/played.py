@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from er3a.collision.pairs import names_of
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.expectations import as_expected, outcome_words
+from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
-from er3a.pipeline.messages.programs import remedies, remedy, say
-from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.programs import remedies, remedy
+from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.trajectory import (
     FactName,
     FaultText,
@@ -273,7 +274,7 @@ def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return weight_of(path.verdict), outcome_words(path.outcomes)
+    return weight_of(path.verdict), joined(map(outcome_word, path.outcomes), ", ")
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> Finding | None:
@@ -325,7 +326,7 @@ def _near_events(path: model.PathSummary, near: Finding | None, clearance: model
     far = rows.t_s[~(rows.clearance_mm < near.margin_mm)]
     start = min(rows.t_s[rows.t_s > max(far[far < at], default=-np.inf)], default=at)
     end = max(rows.t_s[rows.t_s < min(far[far > at], default=np.inf)], default=at)
-    return [PlayedEvent(min(start, at), max(end, at), say(near), "caution", near.pair.names)]
+    return [PlayedEvent(min(start, at), max(end, at), say(near), "caution", names_of(near.pair))]
 
 
 def _joints(cause: object) -> tuple[tuple[int, str], ...]:
@@ -351,8 +352,8 @@ def contact(path: model.PathSummary) -> list[Mark]:
 
 
 def _touching(cause: object) -> tuple[str, ...]:
-    pairs = cause.pairs if isinstance(cause, model.BodiesOverlap) else ()
-    return tuple(dict.fromkeys(name for pair in pairs for name in pair.names))
+    touches = cause.touches if is_one(cause, "bodies_overlap") else ()
+    return tuple(dict.fromkeys(name for each in touches for name in names_of(each.pair)))
 
 
 def _singular(event: model.Singularity) -> str:

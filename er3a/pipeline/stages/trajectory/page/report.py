@@ -27,7 +27,7 @@ from er3a.pipeline.messages.trajectory import (
     reasons,
     strategy_word,
 )
-from er3a.pipeline.player.motions import PlayedEvent
+from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
@@ -45,7 +45,8 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.conditions import condition_of, program_head
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.figures import readings
 from er3a.pipeline.viewing.page import packed_text, render_stage
 from er3a.programs.languages import titles_unwritten
@@ -66,6 +67,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
+    wrong = _by_name(results)
+    played = motions(robot, results, _tray_events(met or {}))
     for i, path in enumerate(paths):
         rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
@@ -77,11 +80,12 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         study,
         stored,
         output,
+        answer_of(summary, wrong, played),
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
-        faults={fault.name: fault for fault in faults(results)},
+        faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
         clearance=clearance_picture(results, count),
         solids=solid_rows(scene),
@@ -90,10 +94,71 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
-        player=player(robot, motions(robot, results, _tray_events(met or {})), scene),
+        player=player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
-        condition=condition_of(stored.validated),
     )
+
+
+def path_groups(robot: Robot, results: model.TrajectoryResults) -> Sequence[Group]:
+    """The paths by whether they may be run, each with its bar over time."""
+    return answer_of(results.summary, _by_name(results), motions(robot, results)).groups
+
+
+def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
+    """What is wrong with paths, by their names, what collides first."""
+    return {fault.name: fault for fault in sorted(faults(results), key=lambda fault: _plainest(results, fault))}
+
+
+def answer_of(summary: model.TrajectorySummary, wrong: Mapping[str, Fault], played: Sequence[PlayedMotion]) -> Answer:
+    """How many paths may be run, each with its bar over time, and what to do about the first of the others."""
+    motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
+    paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
+    shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
+    fault_rows = {
+        path.name: row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
+        for path in paths
+        if path.name in wrong
+    }
+    mended = [row for path in paths if path.chosen and (row := fault_rows.get(path.name))]
+    sound = [_sound_row(path, shares[path.name]) for path in paths if path.name not in wrong]
+    groups = (
+        Group(tr("Don't run as they are"), [row for row in fault_rows.values() if row not in mended]),
+        Group(tr("Repaired"), mended),
+        Group(tr("May run"), sound),
+    )
+    caught = sum(fault.meant for fault in wrong.values())
+    headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
+    clear = [path.clearance.least_mm for path in paths if path.clearance and path.name not in wrong]
+    speeds = [path.max_joint_speed_ratio for path in paths if path.name not in wrong and path.max_joint_speed_ratio]
+    keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
+    keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
+    return Answer(headline, rest, _in_short(paths, wrong), keys, groups, fix_of(wrong.values()))
+
+
+def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
+    """By which faults are sorted: what collides first, of these what has no other fault."""
+    path = next(path for path in results.summary.paths if path.name == fault.name)
+    return not path.collisions, len(path.outcomes)
+
+
+def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault]) -> str:
+    """What becomes of the paths that may not be run as they are."""
+    mended = sum(path.name in wrong and bool(path.chosen) for path in paths)
+    early = sum(path.name in wrong and not path.chosen and path.sound_end is not None for path in paths)
+    if not wrong:
+        return ""
+    return tr(
+        "Of the others {mended} can be repaired, {early} end early, {rest} can't run.",
+        mended=mended,
+        early=early,
+        rest=len(wrong) - mended - early,
+    )
+
+
+def _sound_row(path: model.PathSummary, length: float) -> ListRow:
+    """A path that may be run, with how near it comes to anything."""
+    clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
 
 
 def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:

@@ -375,7 +375,7 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[
     shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=mark, title=title)
     gives = _gives(each, evidence) or _alone(each)
     alone = gives and each.status == "contradicted" and each.entry in unconfirmed
-    shown |= dict(gives=f"{gives} {_mark('consistent')}" if alone else gives)
+    shown |= dict(plain=gives, gives=f"{gives} {_mark('consistent')}" if alone else gives)
     return shown | dict(status="consistent") if of_one else shown  # not in the colour of what is confirmed
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,12 @@ from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
+from er3a.kinematics.forward import skeleton
 from er3a.kinematics.symbolic import Factor, Product, SymbolicTransform, arm_transform, link_transforms
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
-from er3a.pipeline.messages.pages import GRADE_NAMES, decision
-from er3a.pipeline.messages.references import CHECK_KINDS
+from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS, counted_checks, unconfirmed
 from er3a.pipeline.results import Stored, read_stage
@@ -27,22 +27,24 @@ from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import validation_figures
 from er3a.pipeline.stages.validation.page.evidence_section import (
     OTHER_TITLES,
+    SETTLED,
     evidence_section,
     other_robot,
     table_to_use,
 )
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
-    Head,
     Picture,
     alternative_table,
-    head_of,
     render_stage,
     text_address,
 )
+from er3a.pipeline.viewing.side_view import seen_arm, side_view
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
+SEEN_M = 2e-3  # by which two arms differ in a drawing
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -62,16 +64,6 @@ def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     found: dict[str, list[Judged]] = {}
     for check in checks:
         found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    return found
-
-
-def by_kind(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
-    """Checks by their set and what they rest on, as the page names both."""
-    found: dict[str, list[Judged]] = {}
-    for title, own in by_set(checks).items():
-        for check in own:
-            kind = check.kind and word("check_kind", CHECK_KINDS, check.kind)
-            found.setdefault(tr("{set}, {kind}", set=title, kind=kind) if kind else title, []).append(check)
     return found
 
 
@@ -262,14 +254,18 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     unsettled, known = _known(stored, instead) if instead else ("", None)
+    evidence = evidence_section(robot, summary.evidence, known)
     render_stage(
         study,
         stored,
         output,
-        head=_head(stored, instead),
+        _answer(summary, instead, evidence is not None),
+        arms=_both_arms(robot, study.robot(instead) if instead else other_robot(robot, summary.evidence)),
+        at_side=evidence is not None,
+        head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
-        table_evidence=evidence_section(robot, summary.evidence, known),
+        table_evidence=evidence,
         frames=_frames_picture(robot, summary),
         formulas=formulas(robot),
         sets=[_set_story(found, judged, results.key_poses) for found in summary.sets],
@@ -279,10 +275,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         groups=group_rows(judged),
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         more_failed=[check_row(check) for check in failed[SHOWN_FAILURES:]],
-        passed={
-            title: [check_row(check) for check in own if check.status == "pass"]
-            for title, own in by_kind(judged).items()
-        },
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         blanks=[blank_row(check) for check in checks if isinstance(check, model.Unjudged)],
@@ -293,6 +285,62 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     )
 
 
+def _both_arms(robot: Robot, other: Robot | None) -> Markup:
+    """The arm of the table, and the one that documents describe, from the side at one scale."""
+    zero = np.zeros(robot.joints)
+    seen = [skeleton(each, zero) for each in (robot, other) if each is not None]
+    differs = len(seen) == 2 and (seen[0].shape != seen[1].shape or np.abs(seen[0] - seen[1]).max() > SEEN_M)
+    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "wrong" if differs else "right")]
+    if other is not None and differs:
+        arms.append(seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
+    return side_view(arms)
+
+
+def _answer(summary: model.ValidationSummary, instead: str | None, has_entries: bool) -> Answer:
+    """How many checks pass, how much of the table is confirmed, and what to do."""
+    found, counts = summary.verdict.finding, summary.counts.independent
+    evidence = summary.evidence
+    status = [each.status for each in evidence.entries if each.value is not None] if evidence else []
+    bad, unsure = (
+        status.count("contradicted"),
+        sum(each not in SETTLED for each in status) - status.count("contradicted"),
+    )
+    headline, rest = _headline(summary, bad, unsure)
+    passed = tr("{passed} of {total}", passed=counts.passed, total=counts.total)
+    keys = [(passed, tr("checks pass"))] if counts.total else []
+    keys += (
+        [(str(bad), tr("entries contradicted"))]
+        if bad
+        else [(str(unsure), tr("entries unconfirmed"))]
+        if status
+        else []
+    )
+    if instead:
+        fix = Fix(tr("use the table of {robot}.", robot=instead), "#table-to-use")
+    elif isinstance(found, model.LeftOpen) and found.next_measurement:
+        fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}")
+    else:
+        fix = None
+    return Answer(headline, rest, "", keys, (), fix)
+
+
+def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[str, str]:
+    """The verdict in two short sentences; ``bad``, ``unsure``: entries contradicted, and not confirmed."""
+    status = summary.verdict.status
+    if isinstance(summary.verdict.finding, model.DefinedOtherwise):
+        return tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first.")
+    if status == "fail":
+        another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
+        return another, tr("{count} entries are contradicted.", count=bad) if bad else ""
+    if summary.conflicts:
+        return tr("Sources disagree."), tr("Measure before you rely on it.")
+    if status == "no_reference":
+        return tr("Nothing to check against."), tr("Find documents or measure.")
+    if unsure:
+        return tr("Nothing contradicts this table."), tr("{count} entries are unconfirmed.", count=unsure)
+    return tr("This table is right."), tr("Documents confirm every entry.")
+
+
 def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, model.TableEvidence | None]:
     """What nothing settles of the table of another robot of the study, and the evidence of its entries."""
     if stored.folder is None:
@@ -300,21 +348,6 @@ def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, mo
     summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
     parts = summary.evidence.parts if summary.evidence else ()
     return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ())), summary.evidence
-
-
-def _head(stored: Stored[model.ValidationResults], instead: str | None) -> Head:
-    """The head; the verdict on a table that evidence contradicts begins with what to do.
-
-    Parameters
-    ----------
-    instead : a model of the same arm that evidence does not contradict
-    """
-    head = head_of(stored)
-    if head.status != "fail":
-        return head
-    same_arm = isinstance(head.finding, model.DefinedOtherwise)
-    text = joined([decision(head.status, (), instead, same_arm=same_arm), head.text], " ")
-    return replace(head, text=text, links={instead: f"../{instead}/validation.html"} if instead else {})
 
 
 def _set_story(found: model.SetSummary, checks: Iterable[Judged], poses: model.KeyPoses) -> dict[str, Any]:

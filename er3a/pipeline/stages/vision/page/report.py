@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
 from er3a.pipeline.messages.say import bracketed, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
@@ -21,6 +21,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -131,6 +132,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         study,
         stored,
         output,
+        _answer(summary),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
@@ -146,6 +148,37 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         player=player(robot, _motions(robot, results), scene),
         drawing_head=drawing_head(),
     )
+
+
+def _answer(summary: model.VisionSummary) -> Answer:
+    """How many objects can be grasped, and how well the camera's place is known."""
+    grasped = [each for each in summary.objects if each.grasp]
+    caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
+    due, found = len(summary.objects) - len(caught), summary.calibration
+    headline = tr("{count} of {due} objects can be grasped.", count=len(grasped), due=due)
+    if not summary.objects:
+        headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
+    rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""
+    keys = []
+    if found:
+        half = max(found.hand_eye.half_width_mm)
+        keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
+    shown = [_row(each) for each in summary.objects]
+    groups = [Group(tr("Objects"), shown)]
+    if found and (found.suspects or found.warnings):
+        texts = [say(each) for each in (*found.suspects, *found.warnings)]
+        groups.append(
+            Group(tr("Doubts"), [ListRow("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)])
+        )
+    return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
+
+
+def _row(each: model.ObjectResult) -> ListRow:
+    """An object: how surely it is grasped, or why it is not."""
+    if each.grasp is None:
+        return ListRow("fail", each.name, say(each.refusal) if each.refusal else tr("none"), "#objects")
+    note = tr("{percent} % success", percent=fixed(100 * each.grasp.probability, 1))
+    return ListRow("pass", each.name, note, "#objects", (each.name, 0.0))
 
 
 def _image_folder(study: Study, name: str) -> Path:

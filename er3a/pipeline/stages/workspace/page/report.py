@@ -8,12 +8,12 @@ from typing import Any
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS
-from er3a.pipeline.player.player import drawing_head
+from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres, void_text
+from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
@@ -21,6 +21,7 @@ from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
 
@@ -34,17 +35,83 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     context = _context(robot, results, scene, placing, _payload(study, stored) if placing else "")
     if contradicted:
         context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
+    bare = any(each.reason == "tool" for each in summary.assumed)
     render_stage(
         study,
         stored,
         output,
+        _answer(summary, placing, bare=bare),
+        labelled=_labelled(robot, results, scene, placing),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
+        void_texts=void_text(summary, confirmed=stored.rests_on.get("validation") == "pass"),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         wide=100 * summary.proof.width,
         **context,
     )
+
+
+def _labelled(
+    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None
+) -> Picture | None:
+    """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
+    if results.summary.proof.bars or results.summary.hull.volume_m3 <= 0:
+        return None
+    floor = floor_of(scene)
+    floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
+    figure = workspace_figures.labelled(robot, results, floor_mm, placing.tray if placing else None)
+    text = tr("Seen across axis 1, all joints at 0. Blue is reachable; turn axis 1 for the rest.")
+    return Picture(figure, text, text)
+
+
+def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: bool) -> Answer:
+    """How far the arm reaches, its holes, and where the tray goes; ``bare``: without a tool."""
+    reach, volume = summary.reach_m, summary.volume_m3
+    far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
+    holes = summary.enclosed_voids
+    litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    rest = (
+        tr("One hole, {size}.", size=litres)
+        if len(holes) == 1
+        else tr("{count} holes, {size}.", count=len(holes), size=litres)
+    )
+    heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
+    keys = [
+        (with_unit(tr("{low} to {high}", low=heights[0], high=heights[1]), "mm"), tr("height along axis 1")),
+        (
+            with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
+            tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
+        ),
+    ]
+    groups = (
+        Group(tr("Holes and pockets"), [_void_as_row(n, void) for n, void in enumerate(summary.voids, start=1)]),
+        Group(tr("Where the tray goes"), _tray_as_rows(placing)),
+    )
+    point = tr("Of the flange: no tool is given.") if bare else ""
+    return Answer(tr("Reaches {far}.", far=far), rest if holes else tr("No holes."), point, keys, groups)
+
+
+def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
+    """A void: what kind, how large."""
+    kind = word("workspace.void_kind", VOID_KINDS, void.kind)
+    size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
+    note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#void-{number_}")
+
+
+def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
+    """The best place of the tray on each surface; one row that says so where there is none."""
+    if placing is None:
+        return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
+    rows = []
+    for k, tried in enumerate(placing.tried):
+        blocked = sum(map(len, placing.hindered(tried).values()))
+        note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
+        rows.append(
+            ListRow("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement")
+        )
+    return rows
 
 
 def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.collision.along import STEP, first_overlap
+from er3a.collision.pairs import names_of
 from er3a.collision.scene import Box, Scene
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
@@ -178,7 +179,7 @@ def met(robot: Robot, tray: Tray, carried: Scene | None, motions: Iterable[Store
         at = first_inside(each.t, each.points, *tray.corners)
         meetings = [] if at is None else [Meeting(at, tr("tool point"))]
         if len(each.t) and (overlap := first_overlap(robot, scene, each.t, each.q)):
-            first, _, _ = overlap[1].label.partition("/")
+            first, _ = names_of(overlap[1])
             meetings.append(Meeting(overlap[0], body_word(first)))
         if meetings:
             found[each.name] = min(meetings, key=lambda meeting: meeting.t)

@@ -1,0 +1,108 @@
+"""What the index shows of a stage: one number, and what is to be known of it in few words."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.stages.collision.model import CollisionResults
+from er3a.pipeline.stages.dynamics.model import DynamicsResults
+from er3a.pipeline.stages.inverse.model import InverseResults
+from er3a.pipeline.stages.programs.model import ProgramsResults
+from er3a.pipeline.stages.programs.page.played import faults as program_faults
+from er3a.pipeline.stages.trajectory.model import TrajectoryResults
+from er3a.pipeline.stages.trajectory.page.played import faults as path_faults
+from er3a.pipeline.stages.validation.model import ValidationResults
+from er3a.pipeline.stages.vision.model import VisionResults
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.page.tray import sound_motions
+
+Glance = tuple[str, str]
+
+
+@singledispatch
+def glance(results: object) -> Glance:
+    """A stage's number and a note of at most four words, in the page's language.
+
+    Parameters
+    ----------
+    results : of a stage that was computed
+
+    Returns
+    -------
+    value, note : both empty for a stage that says nothing at a glance
+    """
+    return "", ""
+
+
+@glance.register
+def _(results: ValidationResults) -> Glance:
+    summary = results.summary
+    counts, evidence = summary.counts.independent, summary.evidence
+    status = [each.status for each in evidence.entries if each.value is not None] if evidence else []
+    bad = status.count("contradicted")
+    open_ = sum(each in ("open", "weak", "consistent") for each in status)
+    value = f"{counts.passed}/{counts.total}" if counts.total else "–"
+    if summary.verdict.status == "fail":
+        return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
+    return value, tr("sources disagree") if summary.conflicts else tr(
+        "{count} unconfirmed", count=open_
+    ) if open_ else ""
+
+
+@glance.register
+def _(results: WorkspaceResults) -> Glance:
+    summary = results.summary
+    holes = summary.enclosed_voids
+    litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
+    return far, tr("hole {size}", size=litres) if holes else tr("no hole")
+
+
+@glance.register
+def _(results: CollisionResults) -> Glance:
+    free = next((each.value for each in results.summary.figures if each.name == "free_of_collisions"), None)
+    return with_unit(fixed(float(free), 0), "%") if free is not None else "–", tr("joint space free")
+
+
+@glance.register
+def _(results: InverseResults) -> Glance:
+    targets = results.summary.targets
+    met = sum(each.outcome == "reached" for each in targets)
+    caught = sum(each.outcome != "reached" and each.outcome == each.expect for each in targets)
+    return f"{met}/{len(targets) - caught}", _caught(caught)
+
+
+@glance.register(TrajectoryResults)
+@glance.register(ProgramsResults)
+def _(results: TrajectoryResults | ProgramsResults) -> Glance:
+    if isinstance(results, ProgramsResults):
+        count, wrong = len(results.summary.programs), program_faults(results)
+    else:
+        count, wrong = len(results.summary.paths), path_faults(results)
+    caught = sum(fault.meant for fault in wrong)
+    return f"{len(sound_motions(results))}/{count - caught}", _caught(caught)
+
+
+@glance.register
+def _(results: DynamicsResults) -> Glance:
+    motors = results.summary.motors
+    if not motors:
+        return "–", tr("masses unknown")
+    worst = max(motors, key=lambda motor: motor.peak)
+    limited = all(motor.peak_limit is not None for motor in motors)
+    return with_unit(number(worst.peak, 2), worst.unit), f"J{worst.joint}" if limited else tr("no limits known")
+
+
+@glance.register
+def _(results: VisionResults) -> Glance:
+    objects = results.summary.objects
+    caught = sum(not each.grasp and each.outcome == each.expect for each in objects)
+    grasped = sum(bool(each.grasp) for each in objects)
+    simulated = results.summary.calibration is not None and results.summary.calibration.simulated
+    return f"{grasped}/{len(objects) - caught}", tr("simulated") if simulated else _caught(caught)
+
+
+def _caught(count: int) -> str:
+    return tr("{count} caught", count=count) if count else ""

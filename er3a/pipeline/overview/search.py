@@ -1,0 +1,84 @@
+"""What the index searches: all text of all pages, by heading."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Set
+from html.parser import HTMLParser
+from pathlib import Path
+
+from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.messages.say import bracketed, joined
+from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.page import PAGES
+
+INLINE = ("a", "b", "code", "em", "i", "mark", "span", "strong", "sub", "sup", "wbr")  # no blank before or behind
+_NOT_READ = re.compile(r'<(script|style)\b.*?</\1>|\ssrc="data:[^"]*"|\sdata-[\w-]+="[^"]*"', re.DOTALL)
+
+
+class TextOfPage(HTMLParser):
+    """All text of a page's main part, folded or not: by heading, in the page's order, that of each block and row."""
+
+    ROWS = ("caption", "table", "tr")
+    TEXTS = ("dl", "dt", "h2", "h3", "li", "ol", "p", "pre", "ul")
+    BLOCKS = frozenset((*ROWS, *TEXTS, "details", "div", "figcaption", "figure", "img", "main", "section", "summary"))
+    NOT_READ = frozenset(("button", "nav", "select", "svg", "thead"))
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.texts: dict[str, dict[str, None]] = {}
+        self._heads = {"h2": "", "h3": ""}
+        self._depth = dict.fromkeys(("main", "tr", *self.NOT_READ), 0)
+        self._parts = list[str]()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Begin a block or row; what an image shows counts as text."""
+        named = dict(attrs)
+        self._between(tag)
+        if tag in self._depth:
+            self._depth[tag] += 1
+        self.handle_data(named.get("alt") or "")
+
+    def handle_endtag(self, tag: str) -> None:
+        """End a block or row; a heading's text is that of what follows."""
+        if tag in self._depth:
+            self._depth[tag] -= 1
+        if tag in self._heads:
+            self._heads |= {"h3": ""} | {tag: " ".join("".join(self._parts).split())}
+        self._between(tag)
+
+    def handle_data(self, data: str) -> None:
+        """Take text of the main part, but for what is in ``NOT_READ``."""
+        if self._depth["main"] and not any(self._depth[tag] for tag in self.NOT_READ):
+            self._parts.append(data)
+
+    def _between(self, tag: str) -> None:
+        """Where a block begins or ends, what came before is one text; cells and what is in them stay in their row's."""
+        if tag not in self.BLOCKS or self._depth["tr"]:
+            self._parts.append("" if tag in INLINE else " ")
+            return
+        text = " ".join("".join(self._parts).split())
+        if len(text) > 1:
+            self.texts.setdefault(joined([*filter(None, self._heads.values())], " "), {})[text] = None
+        self._parts = []
+
+
+def places(
+    study: Study, folder: Path, contradicted: Set[str]
+) -> Iterator[tuple[str, str, list[tuple[str, list[str]]]]]:
+    """Of each page that is there its address, its title, and by heading all of its text; a title says which robots'
+    tables evidence contradicts."""
+    pages = [(name, stage) for name in study.names for stage in study.pages(name)]
+    warned = {name: tr("never use this table") if name in contradicted else "" for name in study.names}
+    titles = {name: bracketed(own_title(study.robot(name).title), warned[name]) for name in study.names}
+    named = {
+        f"{name}/{stage}.html": tr("{robot}: {page}", robot=titles[name], page=tr(PAGES[stage]))
+        for name, stage in pages
+    }
+    if study.article:
+        named["article.html"] = tr("The article, item by item")
+    for address, title in named.items():
+        if (folder / address).is_file():
+            parser = TextOfPage()
+            parser.feed(_NOT_READ.sub("", (folder / address).read_text(encoding="utf-8")))
+            yield address, title, [(head, list(texts)) for head, texts in parser.texts.items()]

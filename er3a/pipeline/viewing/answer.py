@@ -1,0 +1,127 @@
+"""What a page says first: a headline, key figures, and the list that stands at the picture's side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from er3a.pipeline.language import tr
+
+Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "none"]
+PartMark = Literal["pass", "caution", "fail", "none", "rest"]
+"""Of a stretch of a bar; ``rest`` is what the bar leaves empty."""
+NARROWEST = 0.015  # of a bar, at which a moment is still seen
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch of a bar, from ``start`` to ``end`` in parts of the row's own length, in the colour of a mark."""
+
+    start: float
+    end: float
+    mark: PartMark
+
+    @property
+    def left(self) -> float:
+        """Where it begins, in percent."""
+        return 100 * min(self.start, 1 - NARROWEST)
+
+    @property
+    def width(self) -> float:
+        """How wide it is drawn, in percent."""
+        return 100 * max(self.end - self.start, NARROWEST)
+
+
+@dataclass(frozen=True)
+class ListRow:
+    """One path, program, target, object or entry: its mark, its name, and what is to be known of it in few words.
+
+    Attributes
+    ----------
+    address : where it leads to on the page
+    play : the motion that the page's player shows then, and the time (s); None where nothing is played
+    length : of the bar, in parts of the longest
+    parts : of the bar; without a length there is none
+    """
+
+    mark: Mark
+    name: str
+    note: str
+    address: str = ""
+    play: tuple[str, float] | None = None
+    length: float = 0.0
+    parts: Sequence[Part] = ()
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows under one title; ``count`` is what the title says of how many there are."""
+
+    title: str
+    rows: Sequence[ListRow]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return len(self.rows)
+
+
+@dataclass(frozen=True)
+class Fix:
+    """The one thing to do, and where the page shows it: an address, or a motion's moment."""
+
+    text: str
+    address: str = ""
+    play: tuple[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The first screen of a page.
+
+    Attributes
+    ----------
+    headline : at most twelve words with ``rest``, in the colour of the verdict
+    rest : the second part of the verdict, in plain ink
+    below : one sentence below the verdict, or nothing
+    keys : two or three figures, each with what it is
+    groups : of the list; those without rows are left out
+    """
+
+    headline: str
+    rest: str = ""
+    below: str = ""
+    keys: Sequence[tuple[str, str]] = ()
+    groups: Sequence[Group] = ()
+    fix: Fix | None = None
+
+    @property
+    def shown_groups(self) -> list[Group]:
+        """The groups that have rows."""
+        return [group for group in self.groups if group.rows]
+
+
+def may_run(sound: int, due: int, caught: int, what: str) -> tuple[str, str]:
+    """How many motions may be run, and how many that are meant to fail do.
+
+    Parameters
+    ----------
+    sound : that may be run
+    due : that are expected to
+    caught : that are meant to fail, and do
+    what : their name in plural, in the page's language
+
+    Returns
+    -------
+    headline, rest : of an :class:`Answer`
+    """
+    headline = tr("{sound} of {due} {what} may run.", sound=sound, due=due, what=what)
+    return headline, tr("All {count} faulty ones are caught.", count=caught) if caught else ""
+
+
+def lengths(durations_s: Iterable[float]) -> list[float]:
+    """Durations in parts of the longest, of at least a tenth."""
+    durations = list(durations_s)
+    longest = max(durations, default=0.0) or 1.0
+    return [max(0.1, each / longest) for each in durations]
