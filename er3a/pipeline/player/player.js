@@ -319,7 +319,6 @@ for (const link of document.querySelectorAll("[data-t]")) {
 addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
-goTo(data.opening.name, data.opening.t);
 choose(decodeURIComponent(location.hash.slice(1)));
 if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   goTo(asked.get("play"), Number(asked.get("t")));

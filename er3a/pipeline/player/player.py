@@ -83,30 +83,30 @@ def player(
     scene: Scene | None = None,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
-    opening: tuple[str, float] | None = None,
+    opened: tuple[str, float] | None = None,
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
     Parameters
     ----------
+    opened : the motion and the time (s) that it opens at; None for the worst contact, or else the first start
     beside : further arms, which move at the same time; their bases say where they stand
     signs : what is written below the base of each arm, the first included; nothing if empty
-    opening : the motion and the moment (s) that are shown at first; None for the worst contact, or else the first start
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
     data = _data(robot, shown, scene, words, beside, signs)
-    known = opening if opening and any(motion.name == opening[0] for motion in shown) else None
-    data["opening"] = dict(zip(("name", "t"), known or _worst(robot, shown)))
+    known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
+    data["opened"] = known or _worst(robot, shown)
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still((robot, *beside), next(m for m in shown if m.name == data["opening"]["name"]), data),
+            still=_still((robot, *beside), next(m for m in shown if m.name == data["opened"][0]), data),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -182,7 +182,7 @@ def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
 
 def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
     """The picture at that moment, which the page shows without WebGL."""
-    t = data["opening"]["t"]
+    t = data["opened"][1]
     now = [event for event in motion.events if event.t <= t <= event.until]
     colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
     values = (motion.q, *motion.beside)

@@ -138,7 +138,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         tried=TRIED,
         by_pair=by_pair(results.pairs),
         workspace=workspace(results),
-        player=player(robot, motions(robot, results), scene, opening=worst),
+        player=player(robot, motions(robot, results), scene, opened=worst),
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MAX_ROWS]],
         rows_left_out=len(closest) - MAX_ROWS,

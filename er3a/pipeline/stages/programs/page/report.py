@@ -63,7 +63,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
             summary.assumed_speed, any(each.reason == "own_accelerations" for each in summary.assumed)
         ),
         faults={fault.name: fault for fault in wrong},
-        player=player(robot, played, scene, opening=opened(wrong)),
+        player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],
         solids=solid_rows(scene),
         drawing_head=drawing_head(),

@@ -94,7 +94,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
-        player=player(robot, played, scene, opening=opened(wrong.values())),
+        player=player(robot, played, scene, opened=opened(wrong.values())),
         drawing_head=drawing_head(),
     )
 
