@@ -325,7 +325,7 @@ if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
   dock();
   tell();
   listed();
-}
+} else if (location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");
