@@ -41,15 +41,13 @@ def test_a_contradicted_table_takes_six_screens_and_none_of_its_tables_is_cut(br
 CUT = "return [...document.querySelectorAll('.scroll')].filter((e) => e.scrollWidth > e.clientWidth).map((e) => e.id)"
 
 
-NOT_PROSE = ".verdict p, .tools, .warning, .turns, .pickers, td p"
+NOT_PROSE = ".answer p, .fix, .before, .now-shown, .tools, .warning, .turns, .pickers, td p"
 MEASURES = """
 const size = parseFloat(getComputedStyle(document.documentElement).fontSize);
 const widths = [...document.querySelectorAll(`main p:not(${arguments[0]})`)].map((p) => p.offsetWidth);
 const { paddingLeft, paddingRight } = getComputedStyle(document.body);
 const inner = document.body.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-const contents = document.querySelector(".contents");
-const beside = contents && getComputedStyle(contents).position === "fixed" ? contents.offsetWidth : 0;
-return [size, (inner + beside) / innerWidth, Math.max(0, ...widths)];
+return [size, inner / innerWidth, Math.max(0, ...widths)];
 """
 A4 = (595, 842)  # points
 SHEET = 688  # CSS px that are left of A4 between the margins
@@ -76,21 +74,3 @@ def test_page_prints_on_a4_with_nothing_cut(browser, small_study, page):
         assert browser.find_element(By.CSS_SELECTOR, ".provenance dl").is_displayed()
     if browser.find_elements(By.ID, "turning"):
         assert browser.find_elements(By.CSS_SELECTOR, "#turning canvas"), "drawn for the printer too"
-
-
-@pytest.mark.parametrize("width", [390, 1280])
-def test_what_unfolds_in_a_robots_card_keeps_to_its_width(browser, small_study, width):
-    browser.get((small_study.folder / "reports/index.html").as_uri())
-    with chromium.emulating(browser, width, 900):
-        folds, right, ends = browser.execute_script(UNFOLDED)
-        assert folds > 2
-        assert max(ends) <= right + 1
-
-
-UNFOLDED = """
-const folds = [...document.querySelectorAll(".answers details")];
-for (const fold of folds) fold.open = true;
-const right = document.querySelector(".robot").getBoundingClientRect().right;
-const ends = [...document.querySelectorAll(".answers dd")].map((dd) => dd.getBoundingClientRect().right);
-return [folds.length, right, ends];
-"""

@@ -18,7 +18,10 @@ def test_page_opens_clean(browser, small_study, page):
     browser.get(path.as_uri())
     assert "er3a" in browser.title
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
-    images = browser.execute_script("return [...document.images].map(i => [i.alt, i.complete && i.naturalWidth > 0])")
+    images = browser.execute_script(
+        "return [...document.images].filter((i) => !i.matches('.still'))"
+        ".map((i) => [i.alt, i.complete && i.naturalWidth > 0])"
+    )
     assert all(loaded for _, loaded in images)
     assert all(alt for alt, _ in images)
     figures = browser.execute_script("return document.querySelectorAll('figure, canvas').length")

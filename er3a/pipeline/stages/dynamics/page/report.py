@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
@@ -22,6 +22,7 @@ from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
+from er3a.pipeline.viewing.side_view import seen_arm, side_view
 
 DRAWN = 161
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
@@ -125,6 +126,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         stored,
         output,
         _answer(summary),
+        arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
         payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),

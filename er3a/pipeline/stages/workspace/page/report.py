@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
@@ -61,7 +61,7 @@ def _labelled(
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
     figure = workspace_figures.labelled(robot, results, floor_mm, placing.tray if placing else None)
-    text = tr("Seen across axis 1, all joints at 0. Blue is reachable; turn axis 1 for the rest.")
+    text = tr("All joints at 0; blue is reachable.")
     return Picture(figure, text, text)
 
 
@@ -105,12 +105,11 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     if placing is None:
         return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
     rows = []
-    for k, tried in enumerate(placing.tried):
+    for k, tried in enumerate(placing.tried, start=1):
         blocked = sum(map(len, placing.hindered(tried).values()))
         note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
-        rows.append(
-            ListRow("caution" if blocked else "pass", tried.tray.where or tr("place {k}", k=k + 1), note, "#placement")
-        )
+        name = own_title(tried.tray.below.name) if tried.tray.below else tr("place {k}", k=k)
+        rows.append(ListRow("caution" if blocked else "pass", name, note, "#placement"))
     return rows
 
 
