@@ -156,7 +156,7 @@ def test_each_term_is_explained_once_and_by_its_own_meaning(page):
 
 def test_figure_is_offered_for_download(page):
     link = page.find_element(By.CSS_SELECTOR, "figure .tools a")
-    assert link.get_attribute("download") == "test_page_a_line.svg"
+    assert link.get_attribute("download") == "test_a_line.svg"
     assert link.get_attribute("href").startswith("data:image/svg+xml")
 
 

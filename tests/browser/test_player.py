@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 from selenium.webdriver.common.by import By
-from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
 from er3a.collision.scene import Scene, Sphere
@@ -110,7 +109,7 @@ def test_it_draws_the_poses_of_forward_kinematics(page):
 
 def test_an_event_leads_to_its_moment_and_the_plot_s_cursor_follows(page):
     page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: "1.250 s" in clock(page))
+    until(page, lambda: clock(page).startswith("1.250"))
     assert told(page) == "stretched"
     cursor = page.find_element(By.CSS_SELECTOR, ".cursor")
     image = page.find_element(By.CSS_SELECTOR, "figure[data-panels] img")
@@ -127,7 +126,7 @@ def test_it_plays_to_the_end_and_stops(page):
     page.execute_script("document.querySelector('.player .speed').value = '2'")
     button = page.find_element(By.CSS_SELECTOR, ".player .play")
     button.click()
-    until(page, lambda: clock(page).startswith("t = 2.000 s"))
+    until(page, lambda: clock(page).startswith("2.000"))
     until(page, lambda: button.text == "Play")
     assert told(page) == "It bows."
 
@@ -135,9 +134,10 @@ def test_it_plays_to_the_end_and_stops(page):
 def test_it_plays_no_further_than_the_address_says(page):
     page.get(f"{page.current_url}?play=bow&t=1.7&until=1.9")
     button = page.find_element(By.CSS_SELECTOR, ".player .play")
+    until(page, button.is_displayed)
     button.click()
     until(page, lambda: button.text == "Play")
-    assert clock(page).startswith("t = 1.900 s")
+    assert clock(page).startswith("1.900")
 
 
 def crowded(browser, tmp_path, crowd: int) -> list[tuple[str, float, float, float, float, str]]:
@@ -185,7 +185,7 @@ def test_a_motion_s_start_and_end_are_named(page):
 
 
 JOINTS = """return [...document.querySelectorAll(".player .joints dl > div")].map((cell) => {
-  return [cell.querySelector(".value").innerText, cell.querySelector(".room").innerText, cell.className];
+  return [cell.querySelector(".value").textContent, cell.querySelector(".room").textContent, cell.className];
 })"""
 
 
@@ -193,7 +193,7 @@ def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(pag
     robot = load_robot("er3a_c60")
     lower, upper = np.degrees(robot.lower), np.degrees(robot.upper)
     page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: "1.250 s" in clock(page))
+    until(page, lambda: clock(page).startswith("1.250"))
     q = (0.2 + 0.6 * 1.25 / 2.0) * upper
     room = np.minimum(q - lower, upper - q)
     told = page.execute_script(JOINTS)
@@ -204,20 +204,21 @@ def test_it_tells_the_joint_values_and_how_far_each_is_from_its_nearer_limit(pag
     assert told[0][1].endswith("to limit")
 
 
-NEAREST = "return document.querySelector('.player .joints .nearest').innerText"
+NEAREST = "return document.querySelector('.player .joints .nearest').textContent"
 SIGN = "return getComputedStyle(document.querySelector('.player .joints .least .room'), '::before').content"
 
 
 def test_without_a_fault_the_joint_nearest_its_limit_is_named_and_bears_no_sign_of_one(page):
     page.execute_script("document.querySelector('[data-t]').click()")
-    until(page, lambda: "1.250 s" in clock(page))
+    until(page, lambda: clock(page).startswith("1.250"))
     cells = page.execute_script(JOINTS)
     (least,) = (j for j, (_, _, mark) in enumerate(cells, 1) if mark == "least")
     assert page.execute_script(NEAREST) == f"Nearest its limit: J{least}, {cells[least - 1][1].split()[0]} deg."
     assert page.execute_script(SIGN) == "none"
 
 
-def test_joint_values_keep_their_place_while_it_plays_and_are_reached_by_keys(page):
+def test_joint_values_keep_their_place_while_it_plays(page):
+    page.execute_script("document.querySelector('.player .joints').open = true")
     frame = "const r = document.querySelector('.player .joints').getBoundingClientRect(); return [r.height, r.width]"
     cells = (
         "return [...document.querySelectorAll('.player .joints dl > div')].map((c) => [c.offsetLeft, c.offsetWidth])"
@@ -229,13 +230,9 @@ def test_joint_values_keep_their_place_while_it_plays_and_are_reached_by_keys(pa
             "bar.dispatchEvent(new Event('input'))",
             float(t),
         )
-        until(page, lambda t=t: clock(page).startswith(f"t = {t:.3f}"))
+        until(page, lambda t=t: clock(page).startswith(f"{t:.3f}"))
         met.add(str((page.execute_script(frame), page.execute_script(cells))))
     assert len(met) == 1
-    page.execute_script("document.querySelector('.player .time').focus()")
-    page.switch_to.active_element.send_keys(Keys.TAB)
-    assert page.switch_to.active_element.get_attribute("class") == "joints"
-    assert page.switch_to.active_element.get_attribute("aria-label").startswith("Joint values")
 
 
 def test_a_joint_beyond_its_limit_is_marked(browser, tmp_path):
@@ -251,7 +248,7 @@ def test_a_joint_beyond_its_limit_is_marked(browser, tmp_path):
     browser.get(output.as_uri())
     WebDriverWait(browser, 10).until(lambda _: clock(browser))
     browser.execute_script("document.querySelector('[data-t]').click()")
-    until(browser, lambda: clock(browser).startswith("t = 1.000"))
+    until(browser, lambda: clock(browser).startswith("1.000"))
     assert browser.execute_script(JOINTS)[2] == ["140.0 deg", "35.0 beyond", "least past"]
 
 
@@ -285,13 +282,13 @@ def test_another_motion_starts_at_its_start(page):
         "chooser.value = 'still'; chooser.dispatchEvent(new Event('change'))"
     )
     until(page, lambda: told(page) == "It stands.")
-    assert clock(page) == "t = 0.000 s of 1.000 s"
+    assert clock(page) == "0.000 of 1.000 s"
     assert not page.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
 
 
 def test_the_page_s_address_names_a_moment(page):
     page.get(page.current_url.split("#")[0] + "?play=still&t=0.5")
-    until(page, lambda: clock(page) == "t = 0.500 s of 1.000 s")
+    until(page, lambda: clock(page) == "0.500 of 1.000 s")
     assert told(page) == "It stands."
 
 
@@ -312,10 +309,10 @@ def test_what_is_played_is_framed(page):
     stretch = page.find_element(By.CSS_SELECTOR, ".stretch")
     assert "now" not in stretch.get_attribute("class")
     page.execute_script("arguments[0].click()", stretch)
-    until(page, lambda: clock(page).startswith("t = 4.000 s"))
+    until(page, lambda: clock(page).startswith("4.000"))
     assert "now" in stretch.get_attribute("class")
     page.execute_script("document.querySelector('.player .forward').click()")
-    until(page, lambda: clock(page).startswith("t = 5.000 s"))
+    until(page, lambda: clock(page).startswith("5.000"))
     assert "now" not in stretch.get_attribute("class")
 
 

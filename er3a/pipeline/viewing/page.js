@@ -780,7 +780,8 @@ rows.forEach((row) => row.addEventListener("click", () => {
   mark(row);
   dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
 }));
-mark(rows.find((row) => row.hash === location.hash) ?? rows[0]);
+const played = new URLSearchParams(location.search).get("play");
+mark(rows.find((row) => (played ? row.dataset.play === played : row.hash === location.hash)) ?? rows[0]);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");
