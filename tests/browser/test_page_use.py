@@ -299,8 +299,11 @@ def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     assert all(counts.values()), counts
     browser.get((reports / "inverse.html").as_uri())
     link = browser.find_element(By.CSS_SELECTOR, 'tbody a[href^="teach.html#q="]')
-    shown = [float(angle.replace("−", "-")) for angle in link.get_attribute("textContent").split(",")]
+    shown = [float(angle) for angle in link.get_attribute("href").partition("#q=")[2].split(",")]
     browser.get(link.get_attribute("href"))
+    WebDriverWait(browser, 4 * PAUSE).until(
+        lambda _: browser.execute_script("return performance.getEntriesByName('usable').length")
+    )
     taken = browser.execute_script(
         "return [...document.querySelectorAll('.joint input[type=number]')].map(f => f.valueAsNumber)"
     )

@@ -98,7 +98,9 @@ class Panel:
         )
 
     def clean(self) -> bool:
-        return [entry for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+        """Whether the console has no error but for the marks that an index leaves, where there is none."""
+        severe = [entry["message"] for entry in self.browser.get_log("browser") if entry["level"] == "SEVERE"]
+        return [message for message in severe if "marks.js" not in message] == []
 
 
 @pytest.fixture(scope="module")
@@ -366,7 +368,13 @@ def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypat
         texts = panel.texts()
         assert len(texts) > 100
         words = [text for text in texts if re.search("[A-Za-z]{3}", text) and not re.match("(<p>)?⟦", text)]
-        known = {*BRANCHES.values(), *FOUNDATIONS.values(), FLAT, *(solid.name for solid in scene.solids)}
+        known = {
+            "EFORT ER3A-C60",
+            *BRANCHES.values(),
+            *FOUNDATIONS.values(),
+            FLAT,
+            *(solid.name for solid in scene.solids),
+        }
         assert {text for text in words if text not in assumed} <= known
 
 
@@ -379,7 +387,12 @@ def chinese():
 
 def english(texts: list[str]) -> set[str]:
     told = [re.sub(r"er3a (check-program|check)", "", text) for text in texts]  # commands
-    return {word for text in told for word in re.findall("[A-Za-z]{3,}", text)} - KEYS_AND_CODES - OBSTACLES
+    return (
+        {word for text in told for word in re.findall("[A-Za-z]{3,}", text)}
+        - KEYS_AND_CODES
+        - OBSTACLES
+        - {"EFORT", "WebGL"}
+    )
 
 
 @pytest.mark.parametrize(
