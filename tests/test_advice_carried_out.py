@@ -67,6 +67,13 @@ CARRIED_OUT = {
     "ambiguous_tilt": "test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted",
     "other_convention": OF_SETS,
 }
+CARRIED_OUT |= dict.fromkeys(
+    ("confirm.tool", "confirm.base", "confirm.factor", "confirm.rows"), "test_each_cause_alone_is_named_first"
+)
+CARRIED_OUT |= {
+    "confirm.plan": "test_a_plan_is_safe_and_settles_more_than_chance",
+    "zero_elsewhere": "test_the_corrected_file_that_a_page_advises_is_not_contradicted",
+}
 NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, or takes another picture
     *("clearance_not_proven", "program_not_understood", "singular.elbow", "singular.shoulder", "not_followed.too_far"),
     "program_nothing_moves",
@@ -90,9 +97,7 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Evidence contradicts this table",
         "Run no path or program on the arm",
     ),  # that forbid something
-    *("Run it on the arm only when",),  # likewise
     "Stop: neither table is the arm",  # likewise
-    *("Its table has not been examined", "These pass without the tray"),  # runs of er3a
     "Try other guesses",  # quoted from the article
     "Move the joints and watch the tool",  # the teach panel's use
 }

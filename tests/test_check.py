@@ -14,7 +14,11 @@ from er3a.pipeline.check import SCHEMAS, check_file, check_study
 
 ROOT = Path(__file__).resolve().parents[1]
 INPUTS = sorted(
-    [*ROOT.glob("data/**/*.yaml"), *ROOT.glob("data/**/*.csv"), *ROOT.glob("config/*.yaml")],
+    [
+        *ROOT.glob("data/**/*.yaml"),
+        *(path for path in ROOT.glob("data/**/*.csv") if path.parent.name != "arms"),  # the catalogue is no input
+        *ROOT.glob("config/*.yaml"),
+    ],
 )
 
 

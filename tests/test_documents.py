@@ -50,6 +50,7 @@ STANDS_FOR = {
     "import-calibration": {"ROBOT": "ur5e"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
     "compare": {"A": "er3a_c60", "B": "er3_600", "table.csv": "er3a_c60_article", "arm.urdf": "er3a_c60"},
+    "arms": {"WORD": "irb"},
     "--help": {},
 }
 # Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.

@@ -13,6 +13,7 @@ PAIRS = {
     "README.md": "README.zh-CN.md",
     "docs/new-robot.md": "docs/new-robot.zh-CN.md",
     "docs/paths.md": "docs/paths.zh-CN.md",
+    "docs/confirm.md": "docs/confirm.zh-CN.md",
     "docs/notebooks/article_steps.md": "docs/notebooks/article_steps_zh.md",
 }
 COMMENT = re.compile(r"\s*#.*")

@@ -53,7 +53,7 @@ class Code:
 
 
 @dataclass(frozen=True)
-class Group:
+class CodeGroup:
     """A pair of brackets: where they are, what is in them and what is written before them."""
 
     start: int
@@ -76,9 +76,9 @@ def code_of(text: str) -> Code:
     return Code(_COMMENT.sub(kept, text), comments)
 
 
-def groups_of(text: str) -> list[Group]:
+def groups_of(text: str) -> list[CodeGroup]:
     """All pairs of brackets, in the order of their ends."""
-    found, open_ones = list[Group](), list[int]()
+    found, open_ones = list[CodeGroup](), list[int]()
     for bracket in re.finditer(r"[()\[\]{}]", text):
         place = bracket.start()
         if bracket[0] in _CLOSING:
@@ -88,7 +88,7 @@ def groups_of(text: str) -> list[Group]:
             if place - start > LONGEST_GROUP:
                 continue
             before = text[max(0, start - 80) : start]
-            found.append(Group(start, place, text[start], text[start + 1 : place], before))
+            found.append(CodeGroup(start, place, text[start], text[start + 1 : place], before))
     return found
 
 
@@ -119,7 +119,7 @@ def row_cells(text: str) -> list[str]:
     return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
 
 
-def _rows(group: Group) -> list[list[str]]:
+def _rows(group: CodeGroup) -> list[list[str]]:
     """The rows of a matrix; [] if the group is none."""
     inner = [each for each in parts(group.inside) if each]
     if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
@@ -157,7 +157,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code, groups: list[Group]) -> list[Grid]:
+def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
     rows, unread = list[_Link](), list[int]()
     for each in sorted(groups, key=lambda group: group.start):
@@ -292,7 +292,7 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
     return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
 
 
-def _records(code: Code, groups: list[Group]) -> list[Grid]:
+def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
     rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
     for each in sorted(groups, key=lambda group: group.start):
@@ -350,7 +350,7 @@ def _columns(line: int, lists: dict[str, list[str]]) -> Grid:
 # Matrices and lists ---------------------------------------------------------------------------------------------------
 
 
-def _matrix(code: Code, group: Group) -> Grid:
+def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns, as a comment or the library that takes it says them."""
     rows = _rows(group)
     widths = {len(row) for row in rows}
@@ -370,7 +370,7 @@ def _matrix(code: Code, group: Group) -> Grid:
     return [(0, header), *zip(lines, rows)]
 
 
-def _listed(code: Code, groups: list[Group]) -> list[Grid]:
+def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """A matrix with a line for each row, of YAML: ``joint1: [0, 270, 0, 0]``."""
     rows = list[tuple[int, list[str]]]()
     for group in sorted(groups, key=lambda each: each.start):

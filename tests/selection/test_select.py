@@ -65,8 +65,8 @@ def test_mix_stretches_each_rule_over_its_range(arm, solutions):
     np.testing.assert_allclose(ranking.cost, stretched[0] + 3 * stretched[1])
     assert ranking.chosen == np.flatnonzero(allowed)[ranking.cost[allowed].argmin()]
     assert [measure.rule for measure in ranking.chosen_reason.measures] == ["time", "limits"]
-    assert ranking.chosen_reason.measures[0].value == time[ranking.chosen]
-    assert ranking.chosen_reason.next_best[0].value == time[ranking.order[1]]
+    assert ranking.chosen_reason.measures[0].value.value == time[ranking.chosen]
+    assert ranking.chosen_reason.next_best[0].value.value == time[ranking.order[1]]
 
 
 def test_colliding_solutions_are_refused_with_their_pair(arm, solutions):

@@ -50,7 +50,9 @@ def test_a_sector_s_mesh_and_a_bar_s_are_closed():
 def test_single_changes_of_the_article_s_table():
     upper_2 = relaxed_limit((2,), (1.0,), "upper", "deg", 155.0, (60.0, 1.0))
     found = single_changes(load_robot("er3a_c60_article"), fact("void_disappears", limits=(upper_2,)), 1)
-    left = {(change.entry, change.tried): change.left_litres for change in found if change.left_litres}
+    left = {
+        (f"{change.column}{change.joint}", change.tried): change.left_litres for change in found if change.left_litres
+    }
     assert left["offset2", -90.0][1] < 1 < 150 < left["offset2", 180.0][0]
     assert left["upper2", 215.0][1] < 1
     assert {tried for entry, tried in left if entry == "a2"} == {-650.0, 325.0, 1300.0}

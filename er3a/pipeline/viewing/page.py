@@ -448,7 +448,7 @@ def render_stage(
     study: Study,
     stored: Stored[Any],
     output: Path,
-    answer: Answer,
+    answer: Answer | None = None,
     *,
     head: Head | None = None,
     head_links: Mapping[str, str] | None = None,
@@ -461,16 +461,17 @@ def render_stage(
     study : that the results are of; the command at the page's foot names its file
     stored : what the stage found of a robot
     output : replaced whole, or left as it is
-    answer : its first screen, but where evidence contradicts the table that all rests on
+    answer : its first screen, but where evidence contradicts the table that all rests on; None for the verdict alone
     head : if it is another than the results give
     head_links : addresses that words of the head lead to; of the head that the results give
     context : what the template needs besides, by name
     """
     name, stage = stored.robot, stored.stage
     head = head or head_of(stored, head_links)
+    first = answer or Answer(f"{status_word(head.status)}.", below=language.first_sentence(head.own_text)[0])
     shared: dict[str, Any] = {
         "head": head,
-        "answer": replace(answer, **_void_of_meaning()) if head.no_verdict else answer,
+        "answer": replace(first, **_void_of_meaning()) if head.no_verdict else first,
         "robots": robots_with(study, stage),
         "never": never_text(stage),
         "command": run_command(study, f"{name}/{stage}.html"),
