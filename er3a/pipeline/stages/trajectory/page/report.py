@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_o
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
 from er3a.pipeline.stages.trajectory.page.played import (
@@ -120,16 +122,22 @@ def answer_of(summary: model.TrajectorySummary, wrong: Mapping[str, Fault], play
         if path.name in wrong
     }
     mended = [row for path in paths if path.chosen and (row := fault_rows.get(path.name))]
-    sound = [_sound_row(path, shares[path.name]) for path in paths if path.name not in wrong]
+    others = [path for path in paths if path.name not in wrong]
+    sound = [path for path in others if is_met(path) or not path.expect]
+    unlike = [
+        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        for path in others
+        if path.expect and not is_met(path)
+    ]
     groups = (
-        Group(tr("Don't run as they are"), [row for row in fault_rows.values() if row not in mended]),
+        Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Repaired"), mended),
-        Group(tr("May run"), sound),
+        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
-    clear = [path.clearance.least_mm for path in paths if path.clearance and path.name not in wrong]
-    speeds = [path.max_joint_speed_ratio for path in paths if path.name not in wrong and path.max_joint_speed_ratio]
+    clear = [path.clearance.least_mm for path in sound if path.clearance]
+    speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     return Answer(headline, rest, _in_short(paths, wrong), keys, groups, fix_of(wrong.values()))
