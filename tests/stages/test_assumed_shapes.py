@@ -129,7 +129,7 @@ def test_a_wider_margin_turns_a_pass_into_a_caution():
         paths = study.trajectory.model_copy(update={"assumed_margin_mm": margin})
         wide = study.model_copy(update={"collision": quick, "trajectory": paths})
         verdict = collision(wide, "er3a_c60").summary.verdict
-        assert verdict.finding.assumed
+        assert verdict.finding.shapes_assumed
         assert verdict.status == status
 
 

@@ -1023,6 +1023,6 @@ def test_the_page_shows_what_was_checked_once(study, small_results, tmp_path):
     stored = read_results(small_results("trajectory", ROBOT, study), RESULTS)
     report(study, stored, tmp_path / "page.html")
     body = (tmp_path / "page.html").read_text(encoding="utf-8")
-    table = body[body.index('id="checked"') : body.index("</main>")]
+    table = body[body.index('id="table-checked"') : body.index("</main>")]
     for each in stored.results.summary.checked:
         assert table.count(f">{check_name(each.check)}<") == 1

@@ -9,10 +9,12 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
 import yaml
+from lxml import html
 
 from er3a.collision.pairs import label_of
 from er3a.errors import InputError
@@ -44,7 +46,7 @@ from er3a.pipeline.stages.trajectory.model import (
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, planned_entries, planning_of
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.stages.trajectory.page.record import record
-from er3a.pipeline.stages.trajectory.page.report import report, strategies_shown
+from er3a.pipeline.stages.trajectory.page.report import answer_of, report, strategies_shown
 from er3a.pipeline.stages.workspace.page.tray import Meeting
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.teach import panel
@@ -349,11 +351,11 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     found = stored["er3_600"]
     report(study, found, tmp_path / "trajectory.html")
     record(study, found, tmp_path / "trajectory.rrd")
-    html = (tmp_path / "trajectory.html").read_text()
-    assert "line_wrist" in html
+    page = (tmp_path / "trajectory.html").read_text()
+    assert "line_wrist" in page
     for path in found.results.summary.paths:
-        assert (f'"name": "{path.name}, repaired"' in html) == (path.chosen is not None)
-    assert html.count('<img src="data:image/svg+xml') == len(found.results.summary.paths) + 1
+        assert (f'"name": "{path.name}, repaired"' in page) == (path.chosen is not None)
+    assert page.count('<img src="data:image/svg+xml') == len(found.results.summary.paths) + 1
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
 
 
@@ -370,15 +372,18 @@ def test_the_page_says_first_what_validation_came_to_and_hands_out_no_program_of
     report(study, replace(stored["er3_600"], rests_on={"validation": status}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     body = page[page.index("<body") :]
-    assert ('class="caveat ' in body[: body.index('class="verdict')]) == bool(told)
+    first = body[: body.index("<h1>")]
+    assert ('class="caveat ' in first, (told or "Never use") in first) == (bool(told), bool(told))
+    assert ('<p class="before fail"><a href="validation.html">' in body) == bool(told)
+    signs = re.findall(r'<h1><span class="(\w+)">', body)
+    assert signs == [{"fail": "no_verdict", "pass": stored["er3_600"].results.summary.verdict.status}[status]]
+    assert ('class="fix"' in body) == (status == "pass")
     assert ("data-packed=" in body, "No program is offered" in body) == (status == "pass", status == "fail")
     for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', body):
         text = gzip.decompress(base64.b64decode(packed)).decode()
         first = text[text.find("er3a: ") :].startswith("er3a: Run no path or program on the arm until its table is")
         assert first or file.endswith((".dat", ".var"))
         assert first == ("er3a: assumed: no tool" in text)
-    if told:
-        assert body.index(told) < body.index('class="verdict') < body.index("safe")
 
 
 @pytest.mark.long
@@ -389,24 +394,27 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
         write_results(tmp_path / "results/er3_600" / stage, one, "er3_600", STAGES[stage], absent)
     shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
     write_index(one, tmp_path / "results", tmp_path)
-    index = (tmp_path / "index.html").read_text(encoding="utf-8")
-    cells = index.split('<ul class="cells">')[1].split("\n<li>\n")[1:]
-    assert {re.search('href="er3_600/(.+?).html"', cell)[1] for cell in cells} == set(one.stages("er3_600"))
-    assert index.index('class="decision no') < index.index('<ul class="cells">')
-    cell = next(cell for cell in cells if "er3_600/trajectory.html" in cell)
-    assert "paths pass" in cell
-    meant = stored["er3_600"].results.summary.verdict.finding.demonstrations
+    index = html.parse(str(tmp_path / "index.html"))
+    assert index.xpath("string(//h1/span[@class='measure'])") == "Measure er3_600 first."
+    assert index.xpath("//*[@class='steps']//a/@href") == ["er3_600/validation.html"]
+    cells = index.xpath("//table[@id='decisions']//tr[@id='er3_600']/td[a]")
+    assert {cell.find("a").get("href") for cell in cells} == {
+        f"er3_600/{stage}.html" for stage in one.stages("er3_600")
+    }
+    said = {cell.find("a").get("href"): (cell.get("class"), cell.findtext(".//b")) for cell in cells}
+    found, wrong = stored["er3_600"].results, faults(stored["er3_600"].results)
+    meant, paths = found.summary.verdict.finding.demonstrations, by_name(found)
     assert meant
-    listed = index.split('id="faults-er3_600-trajectory"')[1].split("</table>")[0]
-    assert 'play=line_wrist%2C+repaired&amp;t=0.0#line_wrist">line_<wbr>wrist, repaired</a>' in listed
-    assert "trajectory.html?play=line_clean&amp;t=0#line_clean" in index  # a sound one is named too
-    assert '<details class="faults tight" id="runs-er3_600">' in index
-    assert "Run no path or program on the arm until its table is confirmed" in index
-    for each in meant:
-        t, place = re.search(rf'trajectory.html\?play={each.name}&amp;t=([\d.]+)#(\w+)"', listed).groups()
-        path = next(path for path in stored["er3_600"].results.summary.paths if path.name == each.name)
-        assert 0 <= float(t) <= path.duration_s
-        assert place == each.name
+    own, number = said.pop("er3_600/trajectory.html")
+    assert own == found.summary.verdict.status
+    assert number.split()[1] == f"{len(paths) - len(wrong)}/{len(paths) - len(meant)}"
+    assert {status for status, _ in said.values()} == {"not_computed"}
+    rows = index.xpath("//*[contains(@class, 'tile')]//*[@class='runs']//li")
+    played = [parse_qs(urlsplit(row.find("a").get("href")).query) for row in rows]
+    assert sorted(each["play"][0] for each in played) == sorted(paths)
+    assert all(0 <= float(each["t"][0]) <= paths[each["play"][0]].duration_s for each in played)
+    marks = {each["play"][0]: row.get("class") for each, row in zip(played, rows)}
+    assert {name for name, mark in marks.items() if mark == "pass"} == {*paths} - {fault.name for fault in wrong}
 
 
 @pytest.mark.parametrize(
@@ -509,7 +517,12 @@ def test_paths_that_are_nowhere_reached_have_a_page_too(study, tmp_path):
     changed = with_paths(study, tmp_path, LINE | {"start": far, "end": far})
     run.compute("trajectory", changed, "er3a_c60", tmp_path)
     run.show("report", "trajectory", changed, "er3a_c60", tmp_path, tmp_path / "page.html")
-    assert "No path has a pose that can be reached" in (tmp_path / "page.html").read_text()
+    page = html.parse(str(tmp_path / "page.html"))
+    assert page.xpath("string(//h1/span)") == "0 of 1 paths may run."
+    (row,) = page.xpath("//*[@class='runs']//li")
+    assert (row.get("class"), row.xpath(".//*[@class='bar']"), row.xpath("a/@data-play")) == ("fail", [], [])
+    assert not page.xpath("//*[@id='player']")
+    assert "No point of the path can be reached." in page.xpath("string(//figcaption)")
 
 
 @pytest.mark.long
@@ -650,12 +663,17 @@ def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means
 
 
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
-    """In its row, in the section's answer, beside its programs and in their heads, and in the player."""
+    """In its row, in the section's answer, beside its programs and in their heads, and in the player; it is no fix."""
     met = {"line_limits, repaired": Meeting(0.21, "link 4")}
     monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
     report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 3
+    assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 2
+    assert page.count("<small>meets the tray at 0.21 s: link 4</small>") == 1
+    found = stored["er3_600"].results
+    wrong = {fault.name: fault for fault in faults(found) if fault.name == "line_limits"}
+    assert answer_of(found.summary, wrong, ()).fix
+    assert answer_of(found.summary, wrong, (), met).fix is None
     assert page.count('"text": "meets the tray at 0.21 s: link 4"') == 1
     for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', page):
         text = gzip.decompress(base64.b64decode(packed)).decode()

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from lxml import etree
+from lxml import etree, html
 
 from er3a.collision.bodies import Bodies
 from er3a.files.path_file import load_paths
@@ -98,6 +98,15 @@ CASES = {  # paths besides a safe one, what is expected of them; status, exit co
 }
 
 
+MARKS = {"pass": "✓", "caution": "▲", "fail": "✕"}
+
+
+def cell_of(index: Path) -> tuple[str, str, str]:
+    """What the index's matrix shows of the robot's paths: the cell's status, its mark and number, and its note."""
+    (cell,) = html.parse(str(index)).xpath(f"//table[@id='decisions']//td[a[@href='{ROBOT}/trajectory.html']]")
+    return cell.get("class"), cell.findtext(".//b"), cell.findtext(".//small") or ""
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path, call, case):
@@ -117,32 +126,40 @@ def test_a_fault_ends_with_a_code_and_a_demonstration_is_counted_apart(tmp_path,
     assert report.get("failures") == str(codes[1])
     said = report.findtext(".//system-out") or ""
     assert (f"which fail as expected: {shown}" in said) == bool(shown)
-    cells = (tmp_path / "index.html").read_text(encoding="utf-8").split('class="cells"')[1].split("<li>")
-    (cell,) = (each for each in cells if f"{ROBOT}/trajectory.html" in each)
-    assert f'class="badge {status}' in cell
-    assert (f"{shown} expected to fail, and did" in cell) == bool(shown)
+    passing = 0 if expect.get("line_clean") else 1
+    assert cell_of(tmp_path / "index.html") == (
+        status,
+        f"{MARKS[status]} {passing}/{1 + len(names) - shown}",
+        f"{shown} caught" if shown else "",
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("expect", "scene", "passing", "words"),
+    ("expect", "scene", "status", "passing", "words"),
     [
-        ({}, "data/scenes/table_and_post.yaml", 1, ""),
-        ({"line_clean": "collides"}, "data/scenes/table_and_post.yaml", 0, "not as expected"),
-        ({}, None, 1, "Not checked: collisions with the scene: no scene is given"),
+        ({}, "data/scenes/table_and_post.yaml", "pass", 1, ""),
+        ({"line_clean": "collides"}, "data/scenes/table_and_post.yaml", "fail", 0, "not as expected"),
+        ({}, None, "caution", 1, "no scene is given"),
     ],
 )
-def test_the_index_says_where_it_counts_what_passes_why_that_is_no_pass(tmp_path, expect, scene, passing, words):
+def test_what_passes_and_is_no_pass_is_marked_on_the_index_and_told_on_its_page(
+    tmp_path, expect, scene, status, passing, words
+):
     """A path that is safe although its file expects a collision, and one that was checked without obstacles."""
     study = study_of(tmp_path, "line_clean", expect=expect, settings={"avoidance": "slow", "scene": scene})
-    run.compute("trajectory", study, ROBOT, tmp_path / "results" / ROBOT / "trajectory")
+    results = tmp_path / "results" / ROBOT / "trajectory"
+    run.compute("trajectory", study, ROBOT, results)
     write_index(study, tmp_path / "results", tmp_path)
-    text = (tmp_path / "index.html").read_text(encoding="utf-8")
-    decision, rest = text.split(f"{passing} of 1 paths pass", 1)[1].split("</tr>", 1)
-    shown = decision if scene is None else rest.split("The verdict of each stage")[0]
-    assert words in shown
-    for other in {"not as expected", "Not checked: collisions with the scene"}:
-        assert (other in text) == bool(words and other in words)
+    assert cell_of(tmp_path / "index.html") == (status, f"{MARKS[status]} {passing}/1", "")
+    run.show("report", "trajectory", study, ROBOT, results, tmp_path / "page.html")
+    page = html.parse(str(tmp_path / "page.html"))
+    assert page.xpath("string(//h1/span)") == f"{passing} of 1 paths may run."
+    assert page.xpath("string(//h1/span/@class)") == status
+    ((row, note),) = ((each.get("class"), each.findtext(".//small")) for each in page.xpath("//*[@class='runs']//li"))
+    assert row == ("pass" if passing else "fail")
+    told = {"not as expected": note, "no scene is given": page.xpath("string(//*[@id='table-checked'])")}
+    assert {each for each, text in told.items() if each in text} == ({words} - {""})
 
 
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])

@@ -143,12 +143,12 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
 
     Parameters
     ----------
-    motion : that the player shows; None where it shows none
+    motion : that the player shows; None where it shows none, as of one with no two moments
     duration_s : of the whole motion, s
     length : of its bar, in parts of the longest
     note : in few words why; its verdict if empty
     """
-    seen = fault.moments[0].seen_s
+    seen, motion = fault.moments[0].seen_s, motion if motion and len(motion.t) > 1 else None
     return ListRow(
         "fail" if fault.status == "fail" else "caution",
         fault.name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_o
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
+from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
 from er3a.pipeline.stages.trajectory.page.played import (
@@ -80,7 +82,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         study,
         stored,
         output,
-        answer_of(summary, wrong, played),
+        answer_of(summary, wrong, played, met or {}),
         head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         entered=linked(met),
@@ -109,30 +111,52 @@ def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
     return {fault.name: fault for fault in sorted(faults(results), key=lambda fault: _plainest(results, fault))}
 
 
-def answer_of(summary: model.TrajectorySummary, wrong: Mapping[str, Fault], played: Sequence[PlayedMotion]) -> Answer:
-    """How many paths may be run, each with its bar over time, and what to do about the first of the others."""
+def answer_of(
+    summary: model.TrajectorySummary,
+    wrong: Mapping[str, Fault],
+    played: Sequence[PlayedMotion],
+    met: Mapping[str, Meeting] | None = None,
+) -> Answer:
+    """How many paths may be run, each with its bar over time, and what to do about the first of the others.
+
+    ``met``: when motions meet the tray, by their names; a repair that does is not what to do.
+    """
+    met = met or {}
     motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     fault_rows = {
-        path.name: row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
+        path.name: row_of(
+            wrong[path.name],
+            motions.get(path.name),
+            path.duration_s,
+            shares[path.name],
+            met[repaired(path)].text if path.chosen and repaired(path) in met else "",
+        )
         for path in paths
         if path.name in wrong
     }
     mended = [row for path in paths if path.chosen and (row := fault_rows.get(path.name))]
-    sound = [_sound_row(path, shares[path.name]) for path in paths if path.name not in wrong]
+    others = [path for path in paths if path.name not in wrong]
+    sound = [path for path in others if is_met(path) or not path.expect]
+    unlike = [
+        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        for path in others
+        if path.expect and not is_met(path)
+    ]
     groups = (
-        Group(tr("Don't run as they are"), [row for row in fault_rows.values() if row not in mended]),
+        Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Repaired"), mended),
-        Group(tr("May run"), sound),
+        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
-    clear = [path.clearance.least_mm for path in paths if path.clearance and path.name not in wrong]
-    speeds = [path.max_joint_speed_ratio for path in paths if path.name not in wrong and path.max_joint_speed_ratio]
+    clear = [path.clearance.least_mm for path in sound if path.clearance]
+    speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
-    return Answer(headline, rest, _in_short(paths, wrong), keys, groups, fix_of(wrong.values()))
+    fix = fix_of(fault for fault in wrong.values() if not fault.instead or fault.instead[0] not in met)
+    return Answer(headline, rest, _in_short(paths, wrong), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
