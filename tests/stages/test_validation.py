@@ -678,7 +678,7 @@ def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
     assert any(is_one(fault, "base_elsewhere") for fault in found.diagnosis.faults)
     assert {fault.joint for fault in found.diagnosis.faults if is_one(fault, "wrong_offset")} >= {2, 3}
     assert "the same arm, defined otherwise" in say(found)
-    assert "This is the robot, but its zeros" in page_of(other, stored, tmp_path)
+    assert '<h1><span class="fail">The same arm, defined otherwise.</span>' in page_of(other, stored, tmp_path)
 
 
 @pytest.mark.long
