@@ -62,7 +62,7 @@ def hostile(small_study, tmp_path_factory):
         robot[group]["source"] = HOSTILE
     (folder / f"{ROBOT}.yaml").write_text(yaml.safe_dump(robot), encoding="utf-8")
     study = yaml.safe_load((small_study.folder / "config/small.yaml").read_text(encoding="utf-8"))
-    study["robots"] = {ROBOT: study["robots"][ROBOT] | {"file": str(folder / f"{ROBOT}.yaml")}}
+    study["robots"][ROBOT]["file"] = str(folder / f"{ROBOT}.yaml")
     (folder / "study.yaml").write_text(yaml.safe_dump(study), encoding="utf-8")
     for name, stage in STAGES.items():
         results = folder / "results" / ROBOT / name
