@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from dataclasses import replace
@@ -184,10 +185,12 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, mon
 
     write_index(study, results, reports)
     page = (reports / "index.html").read_text(encoding="utf-8")
-    assert "Not examined yet: workspace, collision, inverse, trajectory, dynamics." in page
-    assert re.findall(r'href="er3_600/(\w+)\.html(?!#entry-)', page) == [
-        *("validation", "validation", "teach", "validation", "validation")
-    ]  # next, badge, panel, table, cell
+    assert cells_of(page, "er3_600") == {
+        "validation": "caution",
+        **dict.fromkeys(("workspace", "collision", "inverse", "trajectory", "dynamics"), "not_computed"),
+    }
+    marks = json.loads((reports / "marks.js").read_text().removeprefix("globalThis.MARKS = ").removesuffix(";\n"))
+    assert marks == {"er3_600": {"validation": "caution"}}
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
     assert len(skipped) == len(others)
 
@@ -198,8 +201,10 @@ def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
     run.compute("dynamics", study, "er3_600", tmp_path / "results/er3_600/dynamics")
     write_index(study, tmp_path / "results", tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "Its table has not been examined yet" in page
-    assert "er3_600/teach.html" not in page
+    assert cells_of(page, "er3_600")["validation"] == "not_computed"
+    assert decision_of(page, "er3_600") == ("measure", "not examined yet")
+    assert re.findall(r'<ol><li><a href="([^"]*)">', page) == ["er3_600/validation.html"]
+    assert '<span class="never">' not in page
 
 
 @pytest.mark.long
@@ -218,20 +223,15 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
         write_index(study, tmp_path / "results", tmp_path)
         return (tmp_path / "index.html").read_text(encoding="utf-8")
 
-    badge = '<span class="badge no_verdict">changed since</span>'
-    before = page()
-    assert "Changed since" not in before
-    assert before.count(badge) == 1  # in the legend
+    assert "Changed since" not in page()
     paths.write_text(paths.read_text(encoding="utf-8") + "# later\n", encoding="utf-8")
     index = page()
     file, said = (
         shown_path(paths),
         "Changed since, so what stands here tells of what was before (run the study again): ",
     )
-    assert index.count(f"{said}{file}.") == 2  # in the table of decisions, and in the arm's section
-    assert f"Changed since, so this tells of what was before (run the study again): {file}." in index
-    assert index.count(badge) == 2
-    assert 'title="changed since">dynamics (changed since)</a>' in index
+    assert index.count("Changed since") == 1
+    assert f'<p class="before caution">er3_600: {said}{file}.</p>' in index
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 
@@ -267,6 +267,23 @@ def test_verdicts_of_another_er3a_are_outdated(study, tmp_path, monkeypatch):
     (after,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
     assert (after.outdated, after.counts("fail")) == (("er3a itself",), True)
     assert "Changed since" in after.text
+
+
+def row_of(page: str, robot: str) -> str:
+    """A robot's row in the index."""
+    return page.split(f'<tr id="{robot}">')[1].split("</tr>")[0]
+
+
+def cells_of(page: str, robot: str) -> dict[str, str]:
+    """The marks of a robot's stages in the index, by stage."""
+    cells = re.findall(rf'<td class="(\w+)"><a href="{robot}/(\w+)\.html"><b>', row_of(page, robot))
+    return {stage: mark for mark, stage in cells}
+
+
+def decision_of(page: str, robot: str) -> tuple[str, str]:
+    """What the index says of a robot: the class and the words."""
+    (found,) = re.findall(r'<small class="decided (\w+)">(.*?)</small>', row_of(page, robot))
+    return found
 
 
 MOVE = "movej([0, -0.2, -0.2, 0, -1.2, 0], a=1, v=0.5)\n"
@@ -336,12 +353,9 @@ def test_every_status_in_one_study_is_the_same_in_index_report_and_exit_codes(tm
                 done = call("verdicts", "--study", tmp_path / "study.yaml", "--results", results, "--fail-on", level)
                 assert done.returncode == code, (name, level)
                 assert "neither passed nor failed: 2 not examined" in done.stderr
-        section = page.split(f'id="{name}"')[1].split("<section")[0].split('class="cells"')[-1]
-        (decided,) = (row for row in page.split("<tr>") if f'<a href="#{name}">' in row)
-        assert ("See why programs fails" in decided) == bool(codes[1]), name
-        cells = [each for each in section.split("<li>") if f'{name}/programs.html"' in each and "badge" in each]
-        assert [f'badge {status}"' in each for each in cells] == [True] * (name != "not_run"), name
-        assert ("as expected" in "".join(cells)) == (name == "fails_as_expected")
+        use, said = decision_of(page, name)
+        assert (use, said == "see Programs") == ("measure", bool(codes[1])), name
+        assert cells_of(page, name)["programs"] == ("not_computed" if name == "not_run" else status), name
     whole = tmp_path / "study.yaml"
     whole.write_text(yaml.safe_dump(content | {"robots": robots}))
     for level, count in (("caution", 4), ("fail", 3)):

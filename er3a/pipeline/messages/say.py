@@ -226,7 +226,7 @@ def say_first(finding: Any) -> str:
     return say(finding)
 
 
-SEPARATORS = (N_("; "), N_(", "), N_(". "), N_(" "), N_(" or "), N_(" and "))
+SEPARATORS = (N_("; "), N_(", "), N_(". "), N_(" "), N_(": "), N_(" or "), N_(" and "))
 
 
 def joined(parts: Iterable[str], separator: str = "; ") -> str:

@@ -170,5 +170,5 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
         if fault.instead and fault.to_do:
-            return Fix(f"{fault.name}: {first_sentence(fault.to_do)[0]}", fault.instead[1])
+            return Fix(joined((fault.name, first_sentence(fault.to_do)[0]), ": "), fault.instead[1])
     return None

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import tr
+from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong", "other"]
@@ -78,7 +79,7 @@ def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None) -> Markup:
     parts += [_arm(arm, BONE * tall) for arm in arms]
     parts += _names(arms, low, high)
     parts.append(_scale(low, wide, LETTERS * tall))
-    said = "; ".join(f"{arm.title}, {arm.note}" for arm in arms)
+    said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     return Markup('<svg class="arms" viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
     )

@@ -17,7 +17,7 @@ from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
-from er3a.pipeline.messages.say import bracketed, say
+from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.player.motions import Fault, PlayedMotion, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
@@ -89,9 +89,8 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     headline, rest = may_run(len(sound), len(known) - caught, caught, tr("programs"))
     clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    fix = next(
-        (Fix(f"{each.name}: {first_sentence(each.to_do)[0]}", f"#{each.name}") for each in wrong if each.to_do), None
-    )
+    mended = next((each for each in wrong if each.to_do), None)
+    fix = mended and Fix(joined((mended.name, first_sentence(mended.to_do)[0]), ": "), f"#{mended.name}")
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix)
 
