@@ -127,7 +127,7 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
     table = heads["validation"].status if "validation" in heads else "not_examined"
     failed = [
-        tr(SHORT_NAMES[stage])
+        tr(SHORT_NAMES.get(stage, stage))
         for stage, head in heads.items()
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     ]
