@@ -90,7 +90,7 @@ TEXTS = texts(
         "confirm.no_orientations": "not examined: orientations, and what turns the tool alone",
         "confirm.plan": (
             "{poses} poses: move there slowly, with the flange as tool and the robot's own base. Write down what the "
-            "pendant shows. Below each pose stands what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
+            "pendant shows. Below each pose is what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
         ),
         "confirm.shown": "the pendant shows: {blanks}",
         "confirm.plan_safe#shapes": "within limits, clear of arm and base, away from singular poses; cell unknown",

@@ -90,7 +90,9 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     mended = next((each for each in wrong if each.to_do), None)
-    fix = mended and Fix(joined((mended.name, first_sentence(mended.to_do)[0]), ": "), f"#{mended.name}")
+    fix = None
+    if mended:
+        fix = Fix(joined((mended.name, first_sentence(mended.to_do)[0]), ": "), f"#{mended.name}")
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix)
 
