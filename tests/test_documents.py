@@ -49,7 +49,15 @@ STANDS_FOR = {
     "predict": {"ROBOT": "er3a_c60", "JOINTS.csv": "measured.csv", "mine_model.json": "corrected_model.json"},
     "import-calibration": {"ROBOT": "ur5e"},
     "hand-eye": {"FILE": "data/vision/fixed_camera.yaml", "R": "er3a_c60"},
-    "compare": {"A": "er3a_c60", "B": "er3_600", "C": "ur5e", "table.csv": "er3a_c60_article", "arm.urdf": "er3a_c60"},
+    "compare": {
+        "A": "er3a_c60",
+        "B": "er3_600",
+        "C": "ur5e",
+        "my_arm": "er3a_c60",
+        "their_arm.urdf": "er3_600",
+        "table.csv": "er3a_c60_article",
+        "arm.urdf": "er3a_c60",
+    },
     "arms": {"WORD": "irb"},
     "--help": {},
 }

@@ -391,7 +391,7 @@ def english(texts: list[str]) -> set[str]:
         {word for text in told for word in re.findall("[A-Za-z]{3,}", text)}
         - KEYS_AND_CODES
         - OBSTACLES
-        - {"EFORT", "WebGL"}
+        - {"EFORT", "WebGL", "made"}
     )
 
 
