@@ -58,7 +58,7 @@ STANDS_FOR = {
         "table.csv": "er3a_c60_article",
         "arm.urdf": "er3a_c60",
     },
-    "arms": {"WORD": "irb"},
+    "arms": {"WORD": "irb", "[WORD]": "irb"},
     "--help": {},
 }
 # Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
