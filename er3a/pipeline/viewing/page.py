@@ -489,6 +489,8 @@ def _void_of_meaning() -> dict[str, Any]:
         "headline": tr("Another arm's table."),
         "rest": tr("Nothing here holds for this robot."),
         "below": "",
+        "keys": (),
+        "groups": (),
         "fix": None,
     }
 
