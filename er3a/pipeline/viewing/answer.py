@@ -69,11 +69,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Fix:
-    """The one thing to do, and where the page shows it: an address, or a motion's moment."""
+    """The one thing to do, and where the page shows it; ``instead`` of what was found wrong, or else next."""
 
     text: str
     address: str = ""
-    play: tuple[str, float] | None = None
+    instead: bool = True
 
 
 @dataclass(frozen=True)

@@ -318,7 +318,7 @@ def _answer(summary: model.ValidationSummary, instead: str | None, has_entries: 
     if instead:
         fix = Fix(tr("use the table of {robot}.", robot=instead), "#table-to-use")
     elif isinstance(found, model.LeftOpen) and found.next_measurement:
-        fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}")
+        fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
     else:
         fix = None
     return Answer(headline, rest, "", keys, (), fix)
@@ -331,13 +331,13 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
         return tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first.")
     if status == "fail":
         another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
-        return another, tr("{count} entries are contradicted.", count=bad) if bad else ""
+        return another, tr("Entries contradicted: {count}.", count=bad) if bad else ""
     if summary.conflicts:
         return tr("Sources disagree."), tr("Measure before you rely on it.")
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
     if unsure:
-        return tr("Nothing contradicts this table."), tr("{count} entries are unconfirmed.", count=unsure)
+        return tr("Nothing contradicts this table."), tr("Entries unconfirmed: {count}.", count=unsure)
     return tr("This table is right."), tr("Documents confirm every entry.")
 
 
