@@ -37,12 +37,13 @@ Results = Mapping[str, Stored[Any]]
 
 @dataclass(frozen=True)
 class StageCell:
-    """A stage of a robot: its verdict, its number, and what is to be known of that in few words."""
+    """A stage of a robot: its verdict, its number, what is to be known of that in few words, and the whole sentence."""
 
     stage: str
     status: str
     value: str
     note: str
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
         entries=entries,
         stages=[name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)],
+        questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, entries, stored),
         keys=_keys(chosen, entries, stored),
         steps=_steps(chosen, stored[chosen.name]),
@@ -165,9 +167,11 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
         return StageCell(stage, "not_computed", "–", tr("not computed yet"))
     head = heads[stage]
     if head.status == "not_computed":
-        return StageCell(stage, "not_computed", "–", tr("not computed"))
+        return StageCell(stage, "not_computed", "–", tr("not computed"), head.text)
     value, note = glance(stored[stage].results)
-    return StageCell(stage, "no_verdict" if head.no_verdict else head.status, value, "" if head.no_verdict else note)
+    if head.no_verdict:
+        return StageCell(stage, "no_verdict", value, "")
+    return StageCell(stage, head.status, value, note, head.text)
 
 
 def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
