@@ -50,7 +50,7 @@ def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRo
     ----------
     branches : the best row of each branch
     """
-    figure, axes = row_of_panels(2, 8.5, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
+    figure, axes = row_of_panels(2, 8.5, 5.75, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
     handles = _draw_arms(axes[0], axes[1], robot, target, branches)
     figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=9)
     alt = tr(
@@ -61,18 +61,7 @@ def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRo
 
 def _conclude(target: model.TargetResult) -> str:
     if target.chosen_deg is not None:
-        counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
-        if not target.collide:
-            return tr(
-                "The bold arm is the chosen solution; {within} of {all} branches are within the limits. A flip "
-                "and a no-flip branch look the same here: they differ in J4, J5 and J6.",
-                **counts,
-            )
-        return tr(
-            "The bold arm is the chosen solution; {within} of {all} branches are within the limits, of which "
-            "{collide} collide. A flip and a no-flip branch look the same here: they differ in J4, J5 and J6.",
-            **counts,
-        )
+        return tr("Bold: the chosen solution. Flip and no-flip look the same here.")
     if target.collide:
         return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
     if target.solutions:
