@@ -29,7 +29,7 @@ from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
@@ -179,14 +179,17 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
     due = len(summary.targets) - len(caught)
     headline = tr("{count} of {due} poses reached.", count=len(met), due=due)
-    rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""
     clear = [each.clearance.least_mm for each in met if each.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     if summary.round_trips:
         keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
     failed = Group(tr("No solution to take"), [_row(each) for each in shown if each.outcome != "reached"])
     return Answer(
-        headline, rest, "", keys, (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met]))
+        headline,
+        all_caught(len(caught)),
+        "",
+        keys,
+        (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met])),
     )
 
 
