@@ -301,4 +301,6 @@ def test_the_page_opens_with_the_answer(tmp_path, call):
     headline = re.search(r'<h1>.*?<span class="(\w+)">', text)
     assert headline
     assert headline[1] == "caution"
-    assert "[20.00, 0.00, 120.00]" in text
+    placed = re.search(r"tool of the controller: \{xyz_mm: \[(\S+), \S+, (\S+)\]", text)
+    assert placed
+    assert [float(each) for each in placed.groups()] == pytest.approx([20, 120], abs=0.05)

@@ -51,7 +51,7 @@ def write_confirmation(
             provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
             title=own_title(robot.title),
             status=STATUS.get(found.verdict, "caution"),
-            headline=re.split("[;；]", headline)[0],  # the figures beside it say the rest
+            headline=re.split("[;；]", headline)[0],  # the key figures say the rest
             lines=[headline, *(line.strip() for line in lines)],
             keys=_keys(found),
             arms=side_view(arms),
@@ -70,8 +70,8 @@ def _bars(found: Confirmation) -> Picture:
     figure, ax = new_figure(width=8.5, height=5.4)
     at = np.arange(len(found.lines))
     rows = (found.before_mm, -0.2, "fail", tr("as it is")), (found.left_mm, 0.2, "pass", tr("explained"))
-    for values, beside, colour, label in rows if found.layers else rows[1:]:
-        ax.bar(at + beside, np.maximum(values, LEAST_MM), 0.4, bottom=0.0, color=VERDICTS[colour], label=label)
+    for values, aside, colour, label in rows if found.layers else rows[1:]:
+        ax.bar(at + aside, np.maximum(values, LEAST_MM), 0.4, bottom=0.0, color=VERDICTS[colour], label=label)
     ax.axhline(found.digits_mm, color="black", linewidth=0.8, linestyle="--", label=tr("rounding explains"))
     ax.set_yscale("log")
     ax.set_ylabel(bracketed(tr("flange off"), "mm"))
