@@ -39,7 +39,9 @@ WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
-BEYOND = 1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
+BEYOND = (
+    1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
+)
 
 
 class Layout(NamedTuple):

@@ -93,7 +93,7 @@ def arm_of(
 
 
 def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
-    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
+    imported = import_urdf(path, base=ends[0], tip=ends[1])
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"

@@ -432,7 +432,7 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
 
 
 def surface_data(tree: TriangleTree) -> dict[str, Any]:
-    """A surface as ``surface.js`` takes it: points (m, to 1 µm), faces, their closed shells (0 for none), and probes."""
+    """A surface as ``surface.js`` takes it: points (m, to 1 µm), faces, their closed shells (0 for none), probes."""
     points, rows = np.unique(np.round(tree.corner.reshape(-1, 3), 6), axis=0, return_inverse=True)
     keys = np.unique(np.append(tree.shell, 0))
     return {
