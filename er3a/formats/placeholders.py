@@ -22,6 +22,7 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Drives, Masses
 from er3a.robots.robot import Robot, Source
 
+ROUNDED_RAD = 2e-3  # half a turn written as 3.14
 SEVERAL = 3  # joints or links, that no maker's arm has alike
 THOUSAND = 1000.0  # N m, of no motor that is known so roundly; generators of URDFs write it
 OUTSIDE_M = 0.25  # m, beyond all that is drawn of a link: more than what is glued to it without a shape explains
@@ -41,7 +42,7 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
     """
     notes = []
     turning = ~robot.slides
-    half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=1e-3)[:, turning & ~robot.continuous]
+    half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=ROUNDED_RAD)[:, turning & ~robot.continuous]
     if half_turns.shape[1] >= SEVERAL and half_turns.all():
         text = "The file gives all joints +-180 deg, which is a placeholder"
         robot = robot.replace(sources={**robot.sources, "limits": Source(text, "inferred")})

@@ -34,9 +34,7 @@ def new(
     tip: options.Tip = None,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a D-H table in any form (- is standard input)")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
-    name: Annotated[
-        str | None, typer.Option(help="the robot's name in the study (default: its file's)")
-    ] = None,
+    name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: its file's)")] = None,
     convention: Annotated[
         Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
     ] = None,

@@ -368,7 +368,7 @@ def _verdict(
     blocked = not all(each.expected for each in found.blocked)
     if not all(each.expected for each in found.colliding) or (blocked and not found.targets):
         return Verdict("fail", home or found)
-    return Verdict("caution" if home or found.undecided or not found.joined or blocked else "pass", home or found)
+    return Verdict("caution" if home or not found.joined or blocked else "pass", home or found)
 
 
 def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:
