@@ -41,8 +41,8 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
     notes : what was found, and what is not judged therefore; in words
     """
     notes = []
-    turning = ~robot.slides
-    half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=ROUNDED_RAD)[:, turning & ~robot.continuous]
+    stated = ~robot.slides & ~robot.continuous
+    half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=ROUNDED_RAD)[:, stated]
     if half_turns.shape[1] >= SEVERAL and half_turns.all():
         text = "The file gives all joints +-180 deg, which is a placeholder"
         robot = robot.replace(sources={**robot.sources, "limits": Source(text, "inferred")})
