@@ -11,8 +11,8 @@ from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.printed_table import table_text
-from er3a.files.robot_library import holds_table, load_robot, robot_of
-from er3a.formats.urdf import urdf_groups, urdf_table
+from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
+from er3a.formats.urdf import import_urdf, urdf_groups, urdf_table
 from er3a.formats.urdf_tree import plain_urdf
 from er3a.robots.robot import Convention, Robot, robot_name
 
@@ -42,6 +42,7 @@ def read_arm(
     xacro: Sequence[str] = (),
     as_printed: bool = False,
     columns: Sequence[str] = (),
+    whole: bool = False,
 ) -> ReadArm:
     """Read an arm's table, limits and speeds.
 
@@ -53,6 +54,7 @@ def read_arm(
     length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
     as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
     columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
 
     Raises
@@ -66,8 +68,11 @@ def read_arm(
         content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
         robot = robot_of(content)
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
-    if path.suffix in (".urdf", ".xacro", ".xml"):
+    if path.suffix in URDF:
         with plain_urdf(path, xacro) as plain:
+            if whole:
+                imported = import_urdf(plain, base=base, tip=tip)
+                return ReadArm(imported.robot.replace(name=robot_name(path)), False, imported.notes)
             robot, assumed = urdf_table(plain, base=base, tip=tip)
             beside = urdf_groups(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")

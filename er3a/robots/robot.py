@@ -332,6 +332,19 @@ class Robot(ByValue, Displayed):
         """
         return self.replace(tool=np.eye(4))
 
+    def with_tool(self, tool: Reals) -> Robot:
+        """The robot with another tool.
+
+        Parameters
+        ----------
+        tool : (4, 4), T_flange_tool, m
+
+        Returns
+        -------
+        robot : a copy; :class:`er3a.Er3aError` for what is no pose
+        """
+        return self.replace(tool=np.asarray(tool, float))
+
     @property
     def flange_is_last_frame(self) -> bool:
         """Whether the table ends at the flange."""
