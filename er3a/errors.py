@@ -37,6 +37,48 @@ class InputError(Er3aError):
         super().__init__(f"{where}: {message}" if where else message)
 
 
+EXTRAS = {
+    "numba": "fast",
+    "cv2": "vision",
+    "xacrodoc": "xacro",
+    "coacd": "meshes",
+    "collada": "meshes",
+}
+"""The extra of er3a that brings a library, by the module's name; all others belong to ``study``."""
+OF_STUDY = ("babel", "coal", "filelock", "libusb_package", "matplotlib", "ompl", "open3d", "pandas", "pinocchio")
+OF_STUDY += ("pyarrow", "rerun", "snakemake", "snakemake_interface_logger_plugins", "toppra")
+
+
+class MissingLibraryError(Er3aError, ImportError):
+    """A library that a part of er3a needs is not installed.
+
+    Parameters
+    ----------
+    module : its name where it is imported
+    extra : of er3a, that brings it
+    """
+
+    def __init__(self, module: str, extra: str):
+        self.module, self.extra = module, extra
+        super().__init__(f"this needs {module}, which is not installed; pip install 'er3a[{extra}]'")
+
+
+def with_extra(error: ModuleNotFoundError) -> ImportError:
+    """The error of an import, naming the extra that brings what is missing.
+
+    Parameters
+    ----------
+    error : as Python raised it
+
+    Returns
+    -------
+    error : itself where no extra brings the module
+    """
+    module = (error.name or "").partition(".")[0]
+    extra = EXTRAS.get(module, "study" if module in OF_STUDY else "")
+    return MissingLibraryError(module, extra) if extra else error
+
+
 def given_bytes(path: Path, most: int, too_large: str) -> bytes:
     """The content of a file that a user gave.
 

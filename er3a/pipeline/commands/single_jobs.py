@@ -19,9 +19,16 @@ from er3a.pipeline.study import Study, load_study
 TEACH = "teach"
 
 
+def _stages(incomplete: str) -> list[str]:
+    return [name for name in STAGES if name.startswith(incomplete)]
+
+
+StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
+
+
 @options.app.command(rich_help_panel=options.JOBS)
 def compute(
-    stage: options.StageName,
+    stage: StageName,
     robot: options.RobotName,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
