@@ -292,6 +292,7 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
             out[start + i, 3, 3] = 1.0
 
 
+@np.errstate(all="ignore")  # as kernels have it
 def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
     out[:] = links[0]
