@@ -38,15 +38,27 @@ class InputError(Er3aError):
 
 
 EXTRAS = {
-    "numba": "fast",
-    "cv2": "vision",
-    "xacrodoc": "xacro",
-    "coacd": "meshes",
-    "collada": "meshes",
+    "fast": ("numba",),
+    "meshes": ("coacd", "collada"),
+    "vision": ("cv2",),
+    "xacro": ("xacrodoc",),
+    "study": (
+        *(
+            "babel",
+            "coal",
+            "contourpy",
+            "filelock",
+            "libusb_package",
+            "matplotlib",
+            "ompl",
+            "open3d",
+            "pandas",
+            "pinocchio",
+        ),
+        *("pyarrow", "rerun", "snakemake", "snakemake_interface_logger_plugins", "toppra"),
+    ),
 }
-"""The extra of er3a that brings a library, by the module's name; all others belong to ``study``."""
-OF_STUDY = ("babel", "coal", "filelock", "libusb_package", "matplotlib", "ompl", "open3d", "pandas", "pinocchio")
-OF_STUDY += ("pyarrow", "rerun", "snakemake", "snakemake_interface_logger_plugins", "toppra")
+"""The extras of er3a with the modules of the libraries that each brings."""
 
 
 class MissingLibraryError(Er3aError, ImportError):
@@ -75,7 +87,7 @@ def with_extra(error: ModuleNotFoundError) -> ImportError:
     error : itself where no extra brings the module
     """
     module = (error.name or "").partition(".")[0]
-    extra = EXTRAS.get(module, "study" if module in OF_STUDY else "")
+    extra = next((extra for extra, modules in EXTRAS.items() if module in modules), "")
     return MissingLibraryError(module, extra) if extra else error
 
 

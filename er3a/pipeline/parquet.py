@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from er3a.pipeline.tables import Column
+
+class Kept(Protocol):
+    """What a file has to know of a column (``er3a.pipeline.tables.Column``)."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the values; ``object`` for texts."""
+        ...
+
+    @property
+    def lists(self) -> bool:
+        """Whether each row holds a list of real numbers."""
+        ...
 
 
-def write_columns(file: Path, columns: Sequence[tuple[str, NDArray[Any], Column, dict[str, str]]]) -> None:
+def write_columns(file: Path, columns: Sequence[tuple[str, NDArray[Any], Kept, dict[str, str]]]) -> None:
     """Write columns to a file; equal ones give equal bytes.
 
     Parameters
@@ -39,7 +51,7 @@ class ParquetColumns:
         self._stored = pq.ParquetFile(pa.BufferReader(content)).read()
         self.names: list[str] = self._stored.column_names
 
-    def values(self, name: str, spec: Column) -> Any:
+    def values(self, name: str, spec: Kept) -> Any:
         """A column's values; its own ``to_numpy`` would load pandas.
 
         Parameters
@@ -58,14 +70,14 @@ class ParquetColumns:
         return tuple(map(np.array, rows) if spec.lists else rows)
 
 
-def _arrow_type(spec: Column) -> pa.DataType:
+def _arrow_type(spec: Kept) -> pa.DataType:
     """How a column is kept in the file."""
     if spec.lists:
         return pa.list_(pa.float64())
     return pa.string() if spec.dtype == object else pa.from_numpy_dtype(spec.dtype)
 
 
-def _arrow(values: NDArray[Any], spec: Column) -> pa.Array:
+def _arrow(values: NDArray[Any], spec: Kept) -> pa.Array:
     """A column for a file, as it lies in memory: ``pa.array`` would load pandas, a quarter of a second in each job."""
     kind = _arrow_type(spec)
     if spec.lists:
