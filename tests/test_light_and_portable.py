@@ -55,8 +55,8 @@ for file in sorted(root.rglob("*.py")):
 """
 POSIX = "fcntl resource pwd grp termios tty pty syslog"
 LINUX_WHEELS = "pinocchio coal ompl toppra libusb_package"
-EXTRAS = """babel contourpy cv2 coacd collada filelock libusb_package llvmlite matplotlib networkx numba open3d pandas psutil
-pyarrow rerun snakemake snakemake_interface_logger_plugins xacro xacrodoc"""
+EXTRAS = """babel contourpy cv2 coacd collada filelock libusb_package llvmlite matplotlib networkx numba open3d pandas
+psutil pyarrow rerun snakemake snakemake_interface_logger_plugins xacro xacrodoc"""
 OF_STUDIES = (
     "er3a.numerics.machine_code",
     "er3a.pipeline.article",

@@ -176,6 +176,19 @@ def read_bytes(path: Path) -> bytes:
         raise ResultError(path, f"can't be read ({error.strerror})") from None
 
 
+def from_here(path: str | Path) -> str:
+    """A path as seen from the working folder.
+
+    Returns
+    -------
+    path : relative; on Windows the whole one where it is on another drive
+    """
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return os.path.abspath(path)
+
+
 def shown_path(path: Path) -> str:
     """A path from the project's root or the study's folder, so that results name no machine.
 

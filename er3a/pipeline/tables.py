@@ -185,7 +185,8 @@ def _columns(table: type[Table]) -> dict[str, Column]:
         spec: Column = each.metadata["column"]
         of_joints = spec.pattern == PER_JOINT and not spec.parts
         pattern = _numbered(each.name) if of_joints else spec.pattern or each.name
-        numbers = get_args(get_args(hints[each.name])[1])[0]
+        last = get_args(hints[each.name])[-1]  # numpy before 2.5: the dtype of the numbers; since then their type
+        numbers = last if isinstance(last, type) else get_args(last)[0]
         found[each.name] = replace(spec, pattern=pattern, unit=spec.unit or unit_text(pattern), dtype=np.dtype(numbers))
     return found
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import os
 import platform
 import re
 import shlex
@@ -23,7 +22,7 @@ import jinja2
 from markupsafe import Markup, escape
 
 from er3a.errors import ResultError
-from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_text
+from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
 from er3a.finding import Finding
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
@@ -596,7 +595,7 @@ def run_command(study: Study, page: str) -> str | None:
     """
     if study.file is None:
         return None
-    file = os.path.relpath(study.file)
+    file = from_here(study.file)
     if INSTALLED:
         return shlex.join(["er3a", "run", "--study", file, f"reports/{page}"])
     return shlex.join(["make", "run", f"STUDY={file}", f"ARGS=reports/{page}"])
