@@ -54,7 +54,9 @@ def checked(function: Function) -> Function:
 
 
 def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
-    hints = get_type_hints(function)
+    # Without what it returns, which may be of a library that is not installed.
+    own = {name: hint for name, hint in function.__annotations__.items() if name != "return"}
+    hints = get_type_hints(type("Parameters", (), {"__annotations__": own}), function.__globals__)
     found = []
     for place, (name, parameter) in enumerate(signature(function).parameters.items()):
         check = _check_of(name, hints[name], function.__name__ in LOOK_FOR_CROSSED_LIMITS)

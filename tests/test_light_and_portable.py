@@ -52,6 +52,11 @@ for file in sorted(root.rglob("*.py")):
         if not isinstance(with_extra(error), MissingLibraryError):
             raise
         print(name, error.name.partition(".")[0])
+for name in er3a.__all__:
+    try:
+        getattr(er3a, name)
+    except MissingLibraryError as error:
+        print(f"er3a.{name}", error.module)
 """
 POSIX = "fcntl resource pwd grp termios tty pty syslog"
 LINUX_WHEELS = "pinocchio coal ompl toppra libusb_package"
@@ -88,6 +93,7 @@ def test_every_module_imports_where_nothing_of_posix_is():
 def test_the_core_imports_without_the_libraries_of_extras():
     lacking = missing(WITHOUT + IMPORT_ALL, f"{EXTRAS} {LINUX_WHEELS}")
     assert {"er3a.pipeline.run_study", "er3a.pipeline.parquet"} <= lacking.keys()
+    assert lacking.pop("er3a.plot") == "matplotlib"
     assert [name for name in lacking if OF_STAGES not in name and not name.startswith(OF_STUDIES)] == []
 
 
