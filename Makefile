@@ -76,8 +76,8 @@ release-check: $(VENV)/run.stamp  ## an error unless the papers of a release agr
 
 lock: $(VENV)/uv.stamp  ## resolve the locked requirements again
 	@$(UV) pip compile pyproject.toml --extra build --extra dev --extra peers $(LOCK_FLAGS) -o requirements/dev.txt
-	@$(UV) pip compile pyproject.toml --extra build -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
-	@$(UV) pip compile pyproject.toml --extra build --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra study -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/run.txt
+	@$(UV) pip compile pyproject.toml --extra build --extra study --extra docs -c requirements/dev.txt $(LOCK_FLAGS) -o requirements/docs.txt
 	@echo uv >$(VENV)/uv.in
 	@$(UV) pip compile $(VENV)/uv.in $(LOCK_FLAGS) -o requirements/uv.txt
 

@@ -129,7 +129,10 @@ __all__ = list(_PUBLIC)
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'er3a' has no attribute '{name}'")
-    found = getattr(import_module(_PUBLIC[name]), name)
+    try:
+        found = getattr(import_module(_PUBLIC[name]), name)
+    except ModuleNotFoundError as error:
+        raise import_module("er3a.errors").with_extra(error) from None
     if not isinstance(found, type):
         found = import_module("er3a.public").checked(found)
     globals()[name] = found  # so that it is the same object from now on

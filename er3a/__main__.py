@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from io import TextIOWrapper
 
 from er3a.pipeline.working_folder import distrust
 
@@ -12,6 +14,10 @@ def main() -> None:
     distrust()
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
         os.environ.setdefault(name, "1")
+    os.environ.setdefault("PYTHONUTF8", "1")  # of jobs and viewers, whatever the console's code page
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
+        if sys.platform == "win32" and isinstance(stream, TextIOWrapper):
+            stream.reconfigure(encoding="utf-8")
     from er3a.pipeline.cli import main as command_line
 
     command_line()

@@ -37,6 +37,60 @@ class InputError(Er3aError):
         super().__init__(f"{where}: {message}" if where else message)
 
 
+EXTRAS = {
+    "fast": ("numba",),
+    "meshes": ("coacd", "collada"),
+    "vision": ("cv2",),
+    "xacro": ("xacrodoc",),
+    "study": (
+        *(
+            "babel",
+            "coal",
+            "contourpy",
+            "filelock",
+            "libusb_package",
+            "matplotlib",
+            "ompl",
+            "open3d",
+            "pandas",
+            "pinocchio",
+        ),
+        *("pyarrow", "rerun", "snakemake", "snakemake_interface_logger_plugins", "toppra"),
+    ),
+}
+"""The extras of er3a with the modules of the libraries that each brings."""
+
+
+class MissingLibraryError(Er3aError, ImportError):
+    """A library that a part of er3a needs is not installed.
+
+    Parameters
+    ----------
+    module : its name where it is imported
+    extra : of er3a, that brings it
+    """
+
+    def __init__(self, module: str, extra: str):
+        self.module, self.extra = module, extra
+        super().__init__(f"this needs {module}, which is not installed; pip install 'er3a[{extra}]'")
+
+
+def with_extra(error: ModuleNotFoundError) -> ImportError:
+    """The error of an import, naming the extra that brings what is missing.
+
+    Parameters
+    ----------
+    error : as Python raised it
+
+    Returns
+    -------
+    error : itself where no extra brings the module
+    """
+    module = (error.name or "").partition(".")[0]
+    extra = next((extra for extra, modules in EXTRAS.items() if module in modules), "")
+    return MissingLibraryError(module, extra) if extra else error
+
+
 def given_bytes(path: Path, most: int, too_large: str) -> bytes:
     """The content of a file that a user gave.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from er3a.errors import ArgumentError
+from er3a.errors import ArgumentError, with_extra
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_joint_values, check_robot
 
@@ -43,7 +43,10 @@ def checked(function: Function) -> Function:
                 check_joint_values(args[0], args[place], name)
             elif named.get(name) is not None:
                 check_joint_values(args[0] if args else named["robot"], named[name], name)
-        return function(*args, **named)
+        try:
+            return function(*args, **named)
+        except ModuleNotFoundError as error:
+            raise with_extra(error) from None
 
     update_wrapper(public, function)
     public.__module__ = "er3a"  # where a pickle finds it
@@ -51,7 +54,9 @@ def checked(function: Function) -> Function:
 
 
 def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
-    hints = get_type_hints(function)
+    # Without what it returns, which may be of a library that is not installed.
+    own = {name: hint for name, hint in function.__annotations__.items() if name != "return"}
+    hints = get_type_hints(type("Parameters", (), {"__annotations__": own}), function.__globals__)
     found = []
     for place, (name, parameter) in enumerate(signature(function).parameters.items()):
         check = _check_of(name, hints[name], function.__name__ in LOOK_FOR_CROSSED_LIMITS)

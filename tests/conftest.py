@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import gc
 import os
 import re
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from filelock import FileLock
 from hypothesis import settings
 from numba.core.registry import CPUDispatcher
 
@@ -304,8 +304,7 @@ def small_results(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, st
 def once(folder: Path) -> Iterator[bool]:
     """Whether this process is the one to make the folder; the others wait until it is made."""
     finished = folder.with_suffix(".finished")
-    with open(folder.with_suffix(".lock"), "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(folder.with_suffix(".lock")):
         if not finished.exists():
             shutil.rmtree(folder, ignore_errors=True)
             yield True

@@ -28,7 +28,8 @@ def test_the_conda_recipe_has_the_package_s_version_programs_and_dependencies():
     programs = dict(entry.split(" = ") for entry in recipe["build"]["python"]["entry_points"])
     assert programs == project["scripts"]
     wanted = {"python": project["requires-python"]}
-    for line in project["dependencies"]:
+    study = project["optional-dependencies"]
+    for line in (*project["dependencies"], *study["study"][1:], *study["fast"]):
         name, bounds = re.match(r"([\w-]+)([^;]*)", line).groups()
         name = IN_CONDA.get(name, name)
         wanted[name] = "" if name in UNBOUNDED else bounds.strip()

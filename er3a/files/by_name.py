@@ -6,12 +6,9 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from er3a.calibration import calibrate as calibration
 from er3a.calibration.calibrate import Calibration
@@ -35,6 +32,9 @@ from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MAX_JOINTS, Robot, Source
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
@@ -351,6 +351,9 @@ def load_table(path: str | Path) -> pd.DataFrame:
     InputError
         if the file is missing or is not a table of er3a
     """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     remedy = "Give a .parquet file of a study's results"
     try:
         stored = pq.ParquetFile(pa.BufferReader(Path(path).read_bytes())).read()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -98,13 +99,35 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             write(temporary)
-            with temporary.open("rb") as written:
+            with temporary.open("r+b") as written:  # Windows flushes only what may be written
                 os.fsync(written.fileno())
-            os.replace(temporary, path)
+            _replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise WriteError(path, error) from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text atomically, as UTF-8 with the same line ends on all systems.
+
+    Raises
+    ------
+    WriteError
+        as :func:`write_atomically`
+    """
+    write_atomically(path, lambda file: file.write_bytes(text.encode()))
+
+
+def _replace(temporary: Path, path: Path) -> None:
+    """Rename a file over another one; Windows refuses while a scanner or a reader has that one open."""
+    for wait in (0.05, 0.2, 1.0) if os.name == "nt" else ():
+        try:
+            os.replace(temporary, path)
+            return
+        except PermissionError:
+            time.sleep(wait)
+    os.replace(temporary, path)
 
 
 def half_written(folder: Path) -> list[Path]:
@@ -151,6 +174,19 @@ def read_bytes(path: Path) -> bytes:
         raise ResultError(path, "missing", "Run the study, which writes it") from None
     except OSError as error:
         raise ResultError(path, f"can't be read ({error.strerror})") from None
+
+
+def from_here(path: str | Path) -> str:
+    """A path as seen from the working folder.
+
+    Returns
+    -------
+    path : relative; on Windows the whole one where it is on another drive
+    """
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return os.path.abspath(path)
 
 
 def shown_path(path: Path) -> str:

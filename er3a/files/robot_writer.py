@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from er3a.errors import InputWarning
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import write_atomically, write_text
 from er3a.files.robot_file import (
     MIN_LONGEST_MM,
     RESIDUE_MM,
@@ -266,7 +266,7 @@ def write_robot(robot: Robot, path: Path) -> None:
     text = robot_text(robot_file(robot, path))
     for place, content in surface_files(robot.meshes).items():
         write_atomically(path.parent / place, partial(Path.write_bytes, data=content))
-    write_atomically(path, lambda file: file.write_text(text, encoding="utf-8"))
+    write_text(path, text)
 
 
 def robot_text(content: RobotFile) -> str:

@@ -13,7 +13,7 @@ import json
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
-from contextlib import redirect_stdout, suppress
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +45,12 @@ def main(file: str, arguments: str) -> None:
 
 
 def _limit() -> None:
-    with suppress(ImportError):  # Windows has no such limits
-        import resource
+    if sys.platform == "win32":  # has no such limits
+        return
+    import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
 
 def _expanded(path: Path, values: dict[str, str]) -> str:

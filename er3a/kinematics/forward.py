@@ -13,7 +13,7 @@ from er3a.errors import ArgumentError, ShapeError
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts, row_values
 from er3a.numerics.arrays import Flags, Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import inner_kernel, is_compiled, kernel
 from er3a.robots.robot import Robot
 
 Row = tuple[float, float, float, float]
@@ -52,7 +52,7 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous and writeable")
     links = constant_links(robot, frame)
-    _forward(*_motion(robot, q), links, out.reshape(-1, 4, 4))
+    _fill_poses(*_motion(robot, q), links, out.reshape(-1, 4, 4))
     return out
 
 
@@ -68,7 +68,7 @@ def forward_of_rows(robot: Robot, u: Reals) -> Reals:
     T : (N, 4, 4), T_base_tool, m
     """
     out = np.empty((len(u), 4, 4))
-    _forward(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
+    _fill_poses(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
     return out
 
 
@@ -290,6 +290,25 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
                 out[start + i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
             out[start + i, 3, 0], out[start + i, 3, 1], out[start + i, 3, 2] = 0.0, 0.0, 0.0
             out[start + i, 3, 3] = 1.0
+
+
+@np.errstate(all="ignore")  # as kernels have it
+def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+    """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
+    out[:] = links[0]
+    for k, link in enumerate(links[1:]):
+        u = direction[k] * q[:, k]
+        step = np.tile(np.eye(4), (len(q), 1, 1))
+        if sliding[k]:
+            step[:, 2, 3] = u
+        else:
+            cosine, sine = np.cos(u + start_at[k]), np.sin(u + start_at[k])
+            step[:, 0, 0], step[:, 0, 1], step[:, 1, 0], step[:, 1, 1] = cosine, -sine, sine, cosine
+        out[:] = out @ step @ link
+    out[:, 3] = 0.0, 0.0, 0.0, 1.0
+
+
+_fill_poses = _forward if is_compiled() else _forward_by_arrays
 
 
 @inner_kernel

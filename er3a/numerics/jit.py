@@ -1,30 +1,32 @@
 """How this package compiles kernels, and divides the rows of a batch among threads.
 
-Kernels are numba's, and so is the cache of their machine code. numba does not notice when a kernel in one file calls
-one in another file that changed, and would serve stale machine code; so they are kept in a folder that is named by the
-content of all files with kernels. An edit of one of them compiles all kernels again as they are needed.
+Kernels are compiled by numba. Where it is not installed (``er3a[fast]``) they run as Python: slower, with the same
+results up to rounding. numba does not notice when a kernel in one file calls one in another file that changed, and
+would serve stale machine code; so it is kept in a folder that is named by the content of all files with kernels. An
+edit of one of them compiles all kernels again as they are needed.
 """
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import os
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, wraps
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-import numba
-from numba.core import event
-from numba.core.caching import UserProvidedCacheLocator
+import numpy as np
 
 from er3a.errors import Er3aError
+
+try:
+    from er3a.numerics import machine_code
+except ModuleNotFoundError:  # no numba
+    machine_code = None  # type: ignore[assignment]
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
@@ -43,6 +45,16 @@ def cache_folder() -> Path:
     return Path(home) / "er3a"
 
 
+def is_compiled() -> bool:
+    """Whether kernels are compiled here.
+
+    Returns
+    -------
+    compiled : False where numba is not installed, or ``NUMBA_DISABLE_JIT`` switches it off
+    """
+    return machine_code is not None and machine_code.is_on()
+
+
 @cache
 def kernels_folder() -> Path:
     """Folder of the kernels of this version, named by the content of all files that hold some.
@@ -58,54 +70,6 @@ def kernels_folder() -> Path:
     return cache_folder() / f"kernels-{digest.hexdigest()[:16]}"
 
 
-class SharedByCopies(UserProvidedCacheLocator):
-    """Numba's folders below a named one, by the place of a file in this package instead of the place of the package:
-    copies of a checkout share what one of them has compiled."""
-
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Folder for the kernels of a file, below the folder of this version. numba calls it.
-
-        Parameters
-        ----------
-        py_file : path of a source file in this package
-
-        Returns
-        -------
-        name : the module's full name, such as ``er3a.kinematics.chain``
-        """
-        return ".".join(Path(py_file).resolve().relative_to(_PACKAGE.parent).with_suffix("").parts)
-
-
-class _Waiting(event.Listener):
-    """Counts the time in which numba compiles or loads kernels; nothing is collected in it.
-
-    Compiling makes millions of objects that live until it ends: going through them takes a tenth of it.
-    """
-
-    def __init__(self) -> None:
-        self.seconds, self._depth, self._start, self._collects = 0.0, 0, 0.0, False
-
-    def on_start(self, event: event.Event) -> None:
-        """Called by numba as it starts to compile or load one more kernel, which another one may need."""
-        if not self._depth:
-            self._start, self._collects = time.monotonic(), gc.isenabled()
-            gc.disable()
-        self._depth += 1
-
-    def on_end(self, event: event.Event) -> None:
-        """Called by numba as one kernel is ready; after the outermost one, collecting garbage goes on."""
-        self._depth -= 1
-        if not self._depth:
-            self.seconds += time.monotonic() - self._start
-            if self._collects:
-                gc.enable()
-
-
-_waiting = _Waiting()
-event.register("numba:compiler_lock", _waiting)  # type: ignore[no-untyped-call]
-
-
 def compile_seconds() -> float:
     """Time that this process has waited for kernels so far, compiled or loaded.
 
@@ -113,7 +77,7 @@ def compile_seconds() -> float:
     -------
     seconds : s, wall time; nested compilations count once
     """
-    return _waiting.seconds
+    return machine_code.waiting.seconds if machine_code else 0.0
 
 
 def kernel(function: Function) -> Function:
@@ -132,7 +96,7 @@ def kernel(function: Function) -> Function:
     No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
     release the interpreter's lock, so threads can run them side by side.
     """
-    return _compiled(function)
+    return machine_code.compiled(function, kernels_folder()) if is_compiled() else _in_python(function)
 
 
 def inner_kernel(function: Function) -> Function:
@@ -150,24 +114,20 @@ def inner_kernel(function: Function) -> Function:
     -----
     Leaving the entry out spares a sixth of the compiling.
     """
-    return _compiled(function, no_cpython_wrapper=True)
+    if not is_compiled():
+        return function
+    return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True)
 
 
-def _compiled(function: Function, **wrappers: bool) -> Function:
-    """A function compiled by numba, its machine code kept in the folder of this version."""
-    config: Any = numba.config
-    compiling: Any = numba.njit
-    options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}
-    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-    config.CACHE_DIR = str(kernels_folder())
-    config.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedByCopies.__name__}"
-    try:
-        compiled: Function = compiling(function, cache=True, **options)
-    except RuntimeError:  # no folder to write into: compiled again by each process
-        compiled = compiling(function, **options)
-    finally:  # other packages keep what they compile where they always do
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
-    return compiled
+def _in_python(function: Function) -> Function:
+    """A kernel as the Python that it is written in; like machine code, it says nothing of infinities and NaN."""
+
+    @wraps(function)
+    def quiet(*values: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return function(*values)
+
+    return cast(Function, quiet)
 
 
 # Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.

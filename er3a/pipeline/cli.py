@@ -11,27 +11,15 @@ import re
 import signal
 import sys
 import warnings
-from importlib import import_module
 from types import FrameType
 from typing import Any
 
 import typer
 
-from er3a.errors import Er3aError
+from er3a.errors import Er3aError, with_extra
 from er3a.pipeline.commands.options import app, print_error, print_warning
 
 _UsageError: Any = typer.BadParameter.__base__  # click's, which some versions of typer carry with them
-
-for _room in (
-    "studies",
-    "compare_arms",
-    "known_arms",
-    "confirm",
-    "robot_files",
-    "programs",
-    "single_jobs",
-):  # in the order of --help; each registers its commands
-    import_module(f"er3a.pipeline.commands.{_room}")
 
 
 def main() -> None:
@@ -58,9 +46,12 @@ def main() -> None:
     except MemoryError:
         _complain_of_memory()
     except ImportError as error:
-        if "failed to map" not in str(error):
+        if "failed to map" in str(error):
+            _complain_of_memory()
+        elif isinstance(error, ModuleNotFoundError) and isinstance(named := with_extra(error), Er3aError):
+            print_error(named)
+        else:
             raise
-        _complain_of_memory()
     except BrokenPipeError:  # the reader closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None

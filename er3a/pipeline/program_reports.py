@@ -25,6 +25,7 @@ from er3a.collision.pairs import PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import DoubtfulUnit, InputError
+from er3a.files.kept_files import from_here
 from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
 from er3a.finding import fact, is_one
@@ -265,7 +266,7 @@ def shown(file: Path | None) -> str:
     """
     if file is None:
         return "program"
-    near = os.path.relpath(file)
+    near = from_here(file)
     return str(file) if near.startswith("..") else near
 
 
@@ -575,7 +576,7 @@ def _uri(file: Path | None) -> str:
 
 def _uri_from_here(file: Path | None) -> str:
     """A path from the folder that the command runs in, upwards too where the file lies beside it."""
-    return quote(os.path.relpath(file or "program").replace(os.sep, "/"))
+    return quote(from_here(file or "program").replace(os.sep, "/"))
 
 
 CHECKS_PER_SAMPLE = 5

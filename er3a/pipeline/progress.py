@@ -71,7 +71,7 @@ def time_limit(seconds: float) -> Iterator[None]:
     TimeOverError
         in the block, once the time is over; only in the main thread, and not on Windows
     """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
 

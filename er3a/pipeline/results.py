@@ -29,7 +29,7 @@ from pydantic import ValidationError
 from er3a.by_value import KINDS, ByValue
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
-from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically
+from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically, write_text
 from er3a.finding import AnyFinding, Finding, fact, plain
 from er3a.finding import Finding as Found
 from er3a.pipeline.code_digest import numbers_digest
@@ -251,7 +251,7 @@ def write_results(
     text = json.dumps(content | {"provenance": plain(origin)}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     if kind is not AbsentResults:
         _parsed(folder / SUMMARY, json.loads(text), kind)  # what is written can be read
-    write_atomically(folder / SUMMARY, lambda file: file.write_text(text, encoding="utf-8"))
+    write_text(folder / SUMMARY, text)
     # Last, so that a folder that was left half-written is not taken for whole.
     write_checksums(folder)
 
@@ -416,7 +416,7 @@ def write_checksums(folder: Path) -> None:
     """
     files = sorted(path for path in folder.iterdir() if path.is_file() and path.name[0] != ".")
     sums = "".join(f"{sha256(path)}  {path.name}\n" for path in files if path.name != CHECKSUMS)
-    write_atomically(folder / CHECKSUMS, lambda file: file.write_text(sums, encoding="utf-8"))
+    write_text(folder / CHECKSUMS, sums)
 
 
 def checksums(folder: Path) -> dict[str, str]:
@@ -569,7 +569,7 @@ def write_checksum(path: Path) -> None:
     path : of the page or recording
     """
     checksum = sha256(path)
-    write_atomically(checksum_file(path), lambda file: file.write_text(checksum, encoding="ascii"))
+    write_text(checksum_file(path), checksum)
 
 
 def check_checksum(path: Path) -> None:

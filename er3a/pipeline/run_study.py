@@ -9,12 +9,10 @@ its own log into ``.snakemake/log/`` besides.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import re
 import shutil
-import signal
 import sys
 import time
 from argparse import Namespace
@@ -30,6 +28,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from filelock import FileLock, Timeout
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
@@ -68,6 +67,7 @@ def corrupted(study: Study, results: Path, reports: Path) -> Iterator[tuple[Path
                 yield path, error
 
 
+SIGKILL = 9
 MARKS = {"pass": "✓", "caution": "!", "fail": "✗"}
 NO_VERDICT = "–"
 _JOB_ENDED = re.compile(r"2> (\S+)' (?:died with <Signals\.\w+: (\d+)>|returned non-zero exit status (\d+))")
@@ -134,7 +134,7 @@ class RunLog(LogHandlerBase):
             name, logs = self._job_name(job), [str(log) for log in job.get("log") or ()]
             self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
             if logs and (number := self._killed.get(logs[0], 0)) and (log := Path(logs[0])).is_file():
-                why = "; out of memory?" if number == signal.SIGKILL else ""
+                why = "; out of memory?" if number == SIGKILL else ""
                 with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
                     told.write(f"\nerror: {name}: killed (signal {number}{why})\n")
         elif event == LogEvent.ERROR:
@@ -223,7 +223,7 @@ def run_study(study_file: Path, results: Path, reports: Path, words: Sequence[st
         until_done.callback(os.environ.pop, "ER3A_STAGES")
         if asked.dryrun:
             return _dry_run(study_file, results, reports, words, asked)
-        until_done.callback(os.close, _taken_lock())
+        until_done.callback(_taken_lock().release)
         refuse_links_outside(results, reports, _LOGS)
         try:
             done = _run(study_file, results, reports, words, asked)
@@ -433,17 +433,16 @@ def _dry_run(study_file: Path, results: Path, reports: Path, words: Sequence[str
     return _snakemake([*words, "--nolock", *_of_er3a(study_file, asked)])
 
 
-def _taken_lock() -> int:
+def _taken_lock() -> FileLock:
     """The lock that one run at a time holds, until its process ends."""
+    lock = FileLock(_STATE / "er3a.lock", timeout=0)
     try:
         _STATE.mkdir(exist_ok=True)
-        lock = os.open(_STATE / "er3a.lock", os.O_RDWR | os.O_CREAT)
+        lock.acquire()
+    except Timeout:
+        raise RunError("another run is active in this folder; wait for its end, or stop it") from None
     except OSError as error:
         raise RunError(f"{error.filename}: {error.strerror}; a run writes into this folder") from None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise RunError("another run is active in this folder; wait for its end, or stop it") from None
     return lock
 
 

@@ -26,8 +26,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
@@ -40,8 +38,6 @@ if TYPE_CHECKING:
 
 Texts = NDArray[np.object_]
 Findings = NDArray[np.object_]
-
-_ARROW_TEXT = pa.string()
 
 
 @dataclass(frozen=True)
@@ -64,13 +60,6 @@ class Column:
     kind: Any = None
     lists: bool = False
     heading: str = ""
-
-    @property
-    def arrow_type(self) -> pa.DataType:
-        """How a column is kept in the file."""
-        if self.lists:
-            return pa.list_(pa.float64())
-        return _ARROW_TEXT if self.dtype == object else pa.from_numpy_dtype(self.dtype)
 
     @property
     def is_group(self) -> bool:
@@ -196,7 +185,8 @@ def _columns(table: type[Table]) -> dict[str, Column]:
         spec: Column = each.metadata["column"]
         of_joints = spec.pattern == PER_JOINT and not spec.parts
         pattern = _numbered(each.name) if of_joints else spec.pattern or each.name
-        numbers = get_args(get_args(hints[each.name])[1])[0]
+        last = get_args(hints[each.name])[-1]  # numpy before 2.5: the dtype of the numbers; since then their type
+        numbers = last if isinstance(last, type) else get_args(last)[0]
         found[each.name] = replace(spec, pattern=pattern, unit=spec.unit or unit_text(pattern), dtype=np.dtype(numbers))
     return found
 
@@ -360,11 +350,9 @@ class Table(ByValue):
         ----------
         file : which is replaced
         """
-        schema, arrays = [], []
-        for name, values, spec in self._flat():
-            schema.append(pa.field(name, spec.arrow_type, metadata=self._described(name, spec)))
-            arrays.append(_arrow(values, spec))
-        pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema)), file, compression="zstd")
+        from er3a.pipeline.parquet import write_columns
+
+        write_columns(file, [(name, values, spec, self._described(name, spec)) for name, values, spec in self._flat()])
 
     @classmethod
     def read(cls, content: bytes) -> Self:
@@ -379,16 +367,18 @@ class Table(ByValue):
         KeyError
             naming a column that is missing
         """
-        stored = pq.ParquetFile(pa.BufferReader(content)).read()
+        from er3a.pipeline.parquet import ParquetColumns
+
+        stored = ParquetColumns(content)
         arrays: dict[str, Any] = {}
         slides: tuple[bool, ...] = ()
         for name, spec in cls.columns().items():
-            names = spec.found_in(stored.column_names)
+            names = spec.found_in(stored.names)
             if spec.is_group and not spec.parts and any("_mm" in each for each in names):
                 slides = tuple("_mm" in each for each in names)
             if not names or (spec.parts and len(names) != len(spec.parts)):
                 raise KeyError(spec.pattern)
-            parts = [_values(stored[part], spec) for part in names]
+            parts = [_array(stored.values(part, spec), replace(spec, pattern="")) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
             if spec.kind:
                 arrays[name] = [_decoded(spec.kind, text) for text in parts[0]]
@@ -405,41 +395,6 @@ def _array(values: Any, spec: Column) -> NDArray[Any]:
     array = np.empty(len(values), object)
     array[:] = values
     return array
-
-
-def _arrow(values: NDArray[Any], spec: Column) -> pa.Array:
-    """A column for a file, as it lies in memory: ``pa.array`` would load pandas, a quarter of a second in each job."""
-    kind = spec.arrow_type
-    if spec.lists:
-        items = pa.py_buffer(np.concatenate([np.empty(0), *values]))
-        whole = pa.Array.from_buffers(pa.float64(), items.size // 8, [None, items])
-        return pa.Array.from_buffers(kind, len(values), [None, _ends(map(len, values))], children=[whole])
-    if spec.dtype == object:
-        there = np.array([text is not None for text in values], bool)
-        texts = [(text or "").encode() for text in values]
-        marks = None if there.all() else _bits(there)
-        return pa.Array.from_buffers(kind, len(texts), [marks, _ends(map(len, texts)), pa.py_buffer(b"".join(texts))])
-    return pa.Array.from_buffers(
-        kind, len(values), [None, _bits(values) if spec.dtype == bool else pa.py_buffer(np.ascontiguousarray(values))]
-    )
-
-
-def _bits(flags: NDArray[Any]) -> pa.Buffer:
-    return pa.py_buffer(np.packbits(flags, bitorder="little"))
-
-
-def _ends(lengths: Iterable[int]) -> pa.Buffer:
-    """Where rows of different lengths begin, and the last ends, in the values of all of them."""
-    return pa.py_buffer(np.cumsum([0, *lengths]).astype(np.int32))
-
-
-def _values(stored: pa.ChunkedArray, spec: Column) -> NDArray[Any]:
-    """A column of a file; its own ``to_numpy`` would load pandas."""
-    whole = stored.combine_chunks()
-    if pa.types.is_integer(whole.type) or pa.types.is_floating(whole.type):
-        return np.array(np.from_dlpack(whole))
-    rows = whole.to_pylist()
-    return _array(tuple(map(np.array, rows) if spec.lists else rows), replace(spec, pattern=""))
 
 
 def _coded(findings: NDArray[Any]) -> NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -179,6 +180,10 @@ def memory_budget() -> int:
     -------
     budget : bytes; the other half is left to the rest of the process and to other jobs
     """
+    if sys.platform == "win32":
+        import psutil
+
+        return int(psutil.virtual_memory().total // 2)
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
 
 

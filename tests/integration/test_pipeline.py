@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import html
 import json
@@ -17,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 from typer.testing import CliRunner
 
 from er3a.errors import ResultError
@@ -229,8 +229,7 @@ def test_bad_input_is_one_error_before_anything_runs(small_study):
 
 
 def test_two_runs_at_once_are_refused(small_study):
-    with open(small_study.folder / ".snakemake/er3a.lock") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with FileLock(small_study.folder / ".snakemake/er3a.lock"):
         done = small_study.make_run(check=False)
     assert done.returncode == 2
     assert done.stderr == "error: another run is active in this folder; wait for its end, or stop it\n"

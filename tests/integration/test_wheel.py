@@ -61,7 +61,7 @@ def er3a(wheel, tmp_path_factory):
     """Calls the er3a of the wheel, installed in an environment of its own, in a folder."""
     place = tmp_path_factory.mktemp("fresh") / "venv"
     assert run([sys.executable, "-m", "venv", "--without-pip", place]).returncode == 0
-    uv("pip", "install", "--python", place / "bin/python", wheel)
+    uv("pip", "install", "--python", place / "bin/python", f"{wheel}[study]")
 
     def call(folder: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
         return run([place / "bin/er3a", *words], cwd=folder, env=STRANGER)
@@ -96,6 +96,30 @@ def test_an_sdist_installed_as_a_tool_is_what_the_wheel_holds(built, wheel, tmp_
     assert installed == held
     exported = run([tmp_path / "bin/er3a", "export-urdf", "er3_600", "--output", "a.urdf"], cwd=tmp_path, env=STRANGER)
     assert exported.returncode == 0, exported.stderr
+
+
+def test_the_core_is_light_and_answers_without_extras(wheel, tmp_path):
+    assert wheel.name.endswith("-py3-none-any.whl")
+    assert wheel.stat().st_size <= 3_000_000
+    place = tmp_path / "venv"
+    assert run([sys.executable, "-m", "venv", "--without-pip", place]).returncode == 0
+    uv("pip", "install", "--python", place / "bin/python", "--compile-bytecode", wheel)
+    files = {(each.stat().st_ino, each.stat().st_size) for each in place.rglob("*") if each.is_file()}
+    assert sum(size for _, size in files) <= 350e6
+    (tmp_path / "table.csv").write_text(DH, encoding="utf-8")
+    for code, words in (
+        (1, ("compare", "table.csv", "irb120")),
+        (0, ("arms", "irb120")),
+        (0, ("check", "table.csv")),
+        (0, ("confirm", "table.csv", "--plan")),
+        (0, ("teach", "table.csv")),
+        (0, ("check-program", ROOT / "data/programs/pick_place.src", "--robot", "er3a_c60")),
+        (0, ("calibrate", "er3_600", "--help")),
+        (2, ("run",)),
+    ):
+        done = run([place / "bin/er3a", *words], cwd=tmp_path, env=STRANGER)
+        assert done.returncode == code, done.stderr
+    assert "er3a[study]" in done.stderr
 
 
 def test_commands_without_a_study_work_in_an_empty_folder(er3a, tmp_path):

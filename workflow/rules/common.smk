@@ -7,7 +7,7 @@ from pathlib import Path
 
 from er3a.pipeline.code_digest import code_digest, numbers_digest
 from er3a.errors import Er3aError
-from er3a.files.kept_files import view_command
+from er3a.files.kept_files import from_here, view_command
 from er3a.files.units import noted_doubts
 from er3a.pipeline.commands.options import print_warning
 from er3a.pipeline import language
@@ -47,7 +47,7 @@ language.use(LANGUAGE, STUDY.own_titles())
 def catalogues(code):
     """The catalogues that pages in a language show: of our words, and of people's texts beside their files."""
     own = [] if code == "en" else (catalogue_file(code), *STUDY.own_catalogues(code))
-    return [os.path.relpath(file) for file in own]
+    return [from_here(file) for file in own]
 
 
 CATALOGUES = catalogues(LANGUAGE)
@@ -72,23 +72,29 @@ def _for_shell(path):
 
 
 # Jobs find the commands of the environment that Snakemake runs in, read the same study, and use one thread each:
-# the pipeline runs jobs side by side instead.
-shell.prefix(
-    f"export PATH={_for_shell(Path(sys.executable).parent)}:$PATH ER3A_STUDY={_for_shell(STUDY_FILE)} "
-    "OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONHASHSEED=0; "
-)
+# the pipeline runs jobs side by side instead. A shell of Windows takes the settings from this process.
+SINGLE = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1") | {"PYTHONHASHSEED": "0"}
+if os.name == "nt":
+    os.environ |= SINGLE | {"ER3A_STUDY": STUDY_FILE}
+    ER3A = f'"{sys.executable}" -P -m er3a'.replace("{", "{{").replace("}", "}}")
+else:
+    settings = " ".join(f"{name}={value}" for name, value in SINGLE.items())
+    shell.prefix(
+        f"export PATH={_for_shell(Path(sys.executable).parent)}:$PATH ER3A_STUDY={_for_shell(STUDY_FILE)} {settings}; "
+    )
+    ER3A = "exec er3a"
 
 
 def told(start):
     """The lines with this start that jobs of this run have told, each once."""
     logs = [path for path in Path("logs").rglob("*.log") if path.stat().st_mtime >= STARTED - 1]
-    lines = [line for path in sorted(logs) for line in path.read_text(errors="replace").splitlines()]
+    lines = [line for path in sorted(logs) for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
     return list(dict.fromkeys(line for line in lines if line.startswith(start)))
 
 
 def inputs(robot, stage):
     """The files that a stage, or the teach panel, reads for a robot."""
-    return [os.path.relpath(path) for path in STUDY.inputs(robot, stage)]
+    return [from_here(path) for path in STUDY.inputs(robot, stage)]
 
 
 def results_of(robot, stage):

@@ -26,7 +26,7 @@ for stage in STAGES.values():
         message:
             f"{{wildcards.robot}}: compute {stage.name}"
         shell:
-            "exec er3a compute {params.stage} {wildcards.robot} 2> {log}"
+            ER3A + " compute {params.stage} {wildcards.robot} 2> {log}"
 
     rule:
         name:

@@ -12,7 +12,7 @@ import numpy as np
 from babel import Locale
 from markupsafe import Markup, escape
 
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import write_text
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import skeleton
 from er3a.pipeline import language
@@ -66,7 +66,7 @@ def write_article(study: Study, tables: ArticleTables, results: Path, folder: Pa
     """
     numbers = article_numbers(study, tables, results)
     text = json.dumps(asdict(numbers) | {"agreements": agreements(numbers)}, indent=1) + "\n"
-    write_atomically(results / "article.json", lambda file: file.write_text(text, encoding="utf-8"))
+    write_text(results / "article.json", text)
     pages = study.article_pages()
     for code in language.LANGUAGES:  # a page of another run would be of other results, and of no language now
         for old in {"article.html", f"article_{code}.html"} - {*pages.values()}:

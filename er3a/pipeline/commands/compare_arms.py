@@ -12,13 +12,12 @@ import typer
 
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
+from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
-    Angles,
     AsJson,
     Base,
     Columns,
-    Lengths,
     Tip,
     Xacro,
     app,

@@ -5,14 +5,13 @@ from __future__ import annotations
 import shlex
 import sys
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from er3a.errors import Er3aError, InputError
-from er3a.files.kept_files import names, write_atomically
+from er3a.files.kept_files import names, write_text
 from er3a.pipeline.commands.options import ROBOT_FILES, AsJson, Base, Tip, app, print_json, print_note
 
 if TYPE_CHECKING:
@@ -138,7 +137,7 @@ def _print_plan(robot: Robot, output: Path | None, programs: Path | None) -> Non
     print("\n".join(plan_lines(found, robot)))
     if output is not None:
         text = table_to_fill(found, robot)
-        write_atomically(output, partial(Path.write_text, data=text, encoding="utf-8"))
+        write_text(output, text)
         print(f"{output}: written; fill it in, then: er3a confirm {robot.name} {output}")
     if programs is not None:
         for path in _write_programs(found, robot, programs):
@@ -161,5 +160,5 @@ def _write_programs(found: Plan, robot: Robot, folder: Path) -> list[Path]:
             continue
         for suffix, text in write_program(listing, name, WriteOptions(robot, found.q[0])).files.items():
             written.append(folder / f"confirm{suffix}")
-            write_atomically(written[-1], partial(Path.write_text, data=text, encoding="utf-8"))
+            write_text(written[-1], text)
     return written

@@ -13,20 +13,15 @@ from typing import Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, InputWarning
-from er3a.files.dh_table import AngleUnit, LengthUnit
 from er3a.files.kept_files import given_file
-from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.study import load_study
+from er3a.pipeline.commands.names import FIRST, JOBS, PROGRAMS, ROBOT_FILES, app
 from er3a.version import __version__
+
+__all__ = ["FIRST", "JOBS", "PROGRAMS", "ROBOT_FILES", "app"]
 
 DEFAULT_STUDY = Path("config/config.yaml")
 DEFAULT_RESULTS = Path("results")
 DEFAULT_REPORTS = Path("reports")
-
-FIRST = "Studies"
-ROBOT_FILES = "Robot files"
-PROGRAMS = "Robot programs"
-JOBS = "Single jobs, called by the workflow"
 
 _START = """\
 er3a: can this kinematic model of a serial robot be trusted, and what can the robot do?
@@ -38,12 +33,6 @@ er3a: can this kinematic model of a serial robot be trusted, and what can the ro
   er3a view                       play the 3-D recordings
 
 All commands: er3a --help. Options of one command: er3a run --help."""
-
-app = typer.Typer(
-    name="er3a",
-    help="Can this kinematic model of a serial robot be trusted, and what can the robot do?",
-    pretty_exceptions_enable=False,
-)
 
 
 class FailOn(StrEnum):
@@ -66,11 +55,9 @@ def start(
         print(_START)
 
 
-def _stages(incomplete: str) -> list[str]:
-    return [name for name in STAGES if name.startswith(incomplete)]
-
-
 def _robots(context: typer.Context, incomplete: str) -> list[str]:
+    from er3a.pipeline.study import load_study
+
     try:
         study = load_study(context.params.get("study") or DEFAULT_STUDY)
     except (Er3aError, OSError):
@@ -85,7 +72,6 @@ def given_files(files: Any) -> Any:
     return files and given_file(files)
 
 
-StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
 RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study", autocompletion=_robots)]
 SomeRobot = Annotated[
     str | None, typer.Argument(metavar="[ROBOT]", help="a robot of the study (default: all)", autocompletion=_robots)
@@ -96,10 +82,6 @@ Results = Annotated[Path, typer.Option(help="folder of the results")]
 Reports = Annotated[Path, typer.Option(help="folder of the reports")]
 Base = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm begins (default: the root)")]
 Tip = Annotated[str | None, typer.Option(help="the link of a URDF at which the arm ends, if there are several ends")]
-Lengths = Annotated[
-    LengthUnit | None, typer.Option(help="unit of lengths in a D-H table (default: that of its columns)")
-]
-Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in a D-H table (default: that of its columns)")]
 Columns = Annotated[
     str | None,
     typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (-: not read)"),

@@ -204,9 +204,9 @@ def write(
 
 
 def _write(file: Path, text: str) -> None:
-    from er3a.files.kept_files import write_atomically
+    from er3a.files.kept_files import write_text
 
-    write_atomically(file, lambda path: path.write_text(text, encoding="utf-8"))
+    write_text(file, text)
 
 
 def _joints(text: str | None, robot: Robot) -> Reals | None:

@@ -74,7 +74,7 @@ def export_urdf(
     ] = None,
 ):
     """Write a robot as URDF."""
-    from er3a.files.kept_files import write_atomically
+    from er3a.files.kept_files import write_text
     from er3a.files.robot_library import load_robot
     from er3a.formats.urdf import assumed_pairs, export_srdf, pairs_not_checked
     from er3a.formats.urdf import export_urdf as urdf_text
@@ -90,7 +90,7 @@ def export_urdf(
     if arm.combined:
         options.print_note(f"{output}: limits on sums of joints are left out, as a URDF has no place for them")
     for file, text in texts.items():
-        write_atomically(file, partial(Path.write_text, data=text, encoding="utf-8"))
+        write_text(file, text)
         print(f"{file}: written")
 
 
@@ -175,12 +175,12 @@ def _renamed(found: Calibration, name: str) -> Robot:
 
 def _write_calibrated(corrected: Robot, record: dict[str, object], output: Path) -> Path:
     """Write the robot file, and beside it the whole model, whose path is returned."""
-    from er3a.files.kept_files import write_atomically
+    from er3a.files.kept_files import write_text
     from er3a.files.robot_writer import write_robot
 
     write_robot(corrected, output)
     model = output.with_name(f"{output.stem}_model.json")
-    write_atomically(model, partial(Path.write_text, data=options.as_json_text(record) + "\n", encoding="utf-8"))
+    write_text(model, options.as_json_text(record) + "\n")
     return model
 
 
@@ -347,15 +347,14 @@ def schema(
     docs: Annotated[Path, typer.Option(help="folder for the documents about results")] = Path("docs/results"),
 ):
     """Write the JSON schemas of input files, and the data dictionary."""
+    from er3a.files.kept_files import write_text
     from er3a.pipeline.check import SCHEMAS
     from er3a.pipeline.dictionary import data_dictionary
 
     schemas = {folder / f"{kind}.schema.json": model.model_json_schema() for kind, model in SCHEMAS.items()}
     for file, content in schemas.items():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    docs.mkdir(parents=True, exist_ok=True)
-    (docs / "dictionary.md").write_text(data_dictionary(), encoding="utf-8")
+        write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    write_text(docs / "dictionary.md", data_dictionary())
 
 
 DIGITS = 6
@@ -373,7 +372,7 @@ def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: 
     import numpy as np
 
     from er3a.collision.meshes import convex_pieces
-    from er3a.files.kept_files import sha256, write_atomically
+    from er3a.files.kept_files import sha256, write_text
     from er3a.files.pieces_file import PiecesFile, checksum_of
     from er3a.formats.mesh_file import read_mesh
 
@@ -395,5 +394,5 @@ def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: 
         pieces_mm=rounded,
     )
     text = json.dumps(content.model_dump(), indent=1) + "\n"
-    write_atomically(output, lambda file: file.write_text(text, encoding="utf-8"))
+    write_text(output, text)
     return content

@@ -12,6 +12,7 @@ import typer
 from er3a.errors import Er3aError
 from er3a.pipeline import language
 from er3a.pipeline.commands import options
+from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.results import write_checksum
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
@@ -20,9 +21,16 @@ from er3a.robots.robot import Convention
 TEACH = "teach"
 
 
+def _stages(incomplete: str) -> list[str]:
+    return [name for name in STAGES if name.startswith(incomplete)]
+
+
+StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
+
+
 @options.app.command(rich_help_panel=options.JOBS)
 def compute(
-    stage: options.StageName,
+    stage: StageName,
     robot: options.RobotName,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
@@ -109,8 +117,8 @@ def teach(
     ] = None,
     *,
     convention: Annotated[Convention, typer.Option(help="of a D-H table")] = "standard",
-    length_unit: options.Lengths = None,
-    angle_unit: options.Angles = None,
+    length_unit: Lengths = None,
+    angle_unit: Angles = None,
     base: options.Base = None,
     tip: options.Tip = None,
     xacro: options.Xacro = None,

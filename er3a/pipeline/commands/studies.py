@@ -15,6 +15,7 @@ import typer
 
 from er3a.errors import Er3aError, ResultError
 from er3a.pipeline.commands import options
+from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
@@ -38,8 +39,8 @@ def new(
     convention: Annotated[
         Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
     ] = None,
-    length_unit: options.Lengths = None,
-    angle_unit: options.Angles = None,
+    length_unit: Lengths = None,
+    angle_unit: Angles = None,
     column: options.Columns = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""

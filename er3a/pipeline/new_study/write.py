@@ -12,7 +12,7 @@ import jinja2
 
 from er3a.collision.pairs import label_of
 from er3a.errors import Er3aError
-from er3a.files.kept_files import ROOT, write_atomically
+from er3a.files.kept_files import ROOT, write_atomically, write_text
 from er3a.files.reference_sets import FORMATS
 from er3a.files.robot_writer import surface_files, yaml_text
 from er3a.files.scene_file import SceneFile
@@ -84,7 +84,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
     aids = [HELP, *(f"config/{kind}.schema.json" for kind in SCHEMAS)]
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
-        write_atomically(folder / place, partial(Path.write_text, data=text, encoding="utf-8"))
+        write_text(folder / place, text)
     for surface, content in surface_files(arm.robot.meshes).items():
         write_atomically(folder / "data" / "robots" / surface, partial(Path.write_bytes, data=content))
     return WrittenStudy(tuple(folder / place for place in texts if place not in aids), found.shortcomings)

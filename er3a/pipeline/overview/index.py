@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from er3a.files.kept_files import write_atomically
+from er3a.files.kept_files import write_text
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
@@ -257,4 +257,4 @@ def _write_marks(stored: Mapping[str, Results], file: Path) -> None:
     """What each stage of each robot came to, for the marks in the headers of their pages."""
     marks = {robot: {stage: head_of(each).status for stage, each in stages.items()} for robot, stages in stored.items()}
     text = f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n"
-    write_atomically(file, lambda part: part.write_text(text, encoding="utf-8"))
+    write_text(file, text)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import os
 import platform
 import re
 import shlex
@@ -17,15 +16,13 @@ from importlib import import_module
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 from markupsafe import Markup, escape
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from er3a.errors import ResultError
-from er3a.files.kept_files import INSTALLED, ROOT, view_command, write_atomically
+from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
 from er3a.finding import Finding
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
@@ -56,8 +53,11 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer
-from er3a.pipeline.viewing.figures import readings, svg_data_uri
 from er3a.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _HERE = Path(__file__).parent
 SHOWN_VERSIONS = ("numpy", "scipy", "numba", "open3d-cpu", "rerun-sdk", "matplotlib")
@@ -155,6 +155,8 @@ class Picture:
     @property
     def uri(self) -> str:
         """The image as a data address."""
+        from er3a.pipeline.viewing.figures import svg_data_uri  # Matplotlib, which few pages need
+
         return svg_data_uri(self.figure)
 
     @property
@@ -167,6 +169,8 @@ class Picture:
     @property
     def readings(self) -> list[dict[str, Any]]:
         """Of a figure that was drawn: what the pointer reads in it."""
+        from er3a.pipeline.viewing.figures import readings
+
         return readings(self.figure)
 
     @property
@@ -401,7 +405,7 @@ def render(
         )
     )
     html = closed_up(html) if language.current() == "zh" else html
-    write_atomically(output, lambda file: file.write_text(html, encoding="utf-8"))
+    write_text(output, html)
 
 
 def page_environment(*folders: Path) -> jinja2.Environment:
@@ -591,7 +595,7 @@ def run_command(study: Study, page: str) -> str | None:
     """
     if study.file is None:
         return None
-    file = os.path.relpath(study.file)
+    file = from_here(study.file)
     if INSTALLED:
         return shlex.join(["er3a", "run", "--study", file, f"reports/{page}"])
     return shlex.join(["make", "run", f"STUDY={file}", f"ARGS=reports/{page}"])

@@ -28,6 +28,7 @@ DISTANCE, AZIMUTH, ELEVATION = 3.7, -1.0, 0.35  # as in orbit.js
 LAMP = np.array([0.9, -1.3, 2.4]) / np.linalg.norm([0.9, -1.3, 2.4])
 AMBIENT, SHADOW, PALE = 0.62, 0.16, 0.28
 SIDES, BELTS, GRID_STEPS = 40, 10, 8
+PIECES = 32  # of a line of the grid: painting looks at all that is in the rectangle around each
 NEARER = 1.002  # a line is painted as if it were nearer, so that the surface that it lies on does not cut it
 LETTER = 17  # px, height of words
 PLACES = ((0, -1), (0, 1), (0.7, 0), (-0.7, 0), (0, -2), (0, 2), (0.7, -1), (-0.7, 1), (0, -3), (0, 3))
@@ -115,7 +116,8 @@ class Still:
         half = GRID_STEPS * step
         for at in np.arange(-GRID_STEPS, GRID_STEPS + 1) * step:
             for ends in (((at, -half), (at, half)), ((-half, at), (half, at))):
-                self.line(np.array([[centre[0] + x, centre[1] + y, self.floor] for x, y in ends]), GRID, 1.0)
+                first, last = np.array([[centre[0] + x, centre[1] + y, self.floor] for x, y in ends])
+                self.line(np.linspace(first, last, PIECES + 1), GRID, 1.0)
 
     def dot(self, point: Reals, colour: str, radius: float, rings: bool = False) -> None:
         """A dot at a point (3,), and rings around it where it is to be found at once; a colour of the page's style."""

@@ -25,6 +25,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from sysconfig import get_path
 from tempfile import TemporaryDirectory
 from urllib.parse import urlencode
 
@@ -48,8 +49,7 @@ def viewer_command(recordings: Sequence[Path], *words: str) -> list[str]:
     -------
     command : bound to the loopback address; by itself the viewer would listen on all of the machine's addresses
     """
-    viewer = Path(sys.executable).with_name("rerun")
-    return [str(viewer), *map(str, recordings), "--bind", LOOPBACK, *words]
+    return [str(Path(get_path("scripts"), "rerun")), *map(str, recordings), "--bind", LOOPBACK, *words]
 
 
 def free_port() -> int:
@@ -77,7 +77,7 @@ def viewer_running(
     messages : file for its errors
     """
     limited = ["timeout", str(LONGEST_S)] if shutil.which("timeout") else []
-    stderr = messages.open("w") if messages else subprocess.DEVNULL
+    stderr = messages.open("wb") if messages else subprocess.DEVNULL
     with without_statistics() as environment:
         viewer = subprocess.Popen(
             [*limited, *viewer_command(recordings, *words)],
@@ -89,11 +89,19 @@ def viewer_running(
         try:
             yield viewer
         finally:
-            with suppress(ProcessLookupError):
-                os.killpg(viewer.pid, signal.SIGKILL)
+            _end_all(viewer)
             viewer.wait()
             if not isinstance(stderr, int):
                 stderr.close()
+
+
+def _end_all(viewer: subprocess.Popen[bytes]) -> None:
+    """End a viewer, and on all systems but Windows, where it starts none, its processes."""
+    if sys.platform == "win32":
+        viewer.kill()
+        return
+    with suppress(ProcessLookupError):
+        os.killpg(viewer.pid, signal.SIGKILL)
 
 
 def has_display() -> bool:
@@ -267,7 +275,7 @@ def _picture(recording: Path, moment: float | None) -> bytes:
             try:
                 _shoot(port, viewer, shot, moment)
             except EOFError:
-                raise Er3aError(_why(messages.read_text(errors="replace"))) from None
+                raise Er3aError(_why(messages.read_text(encoding="utf-8", errors="replace"))) from None
         image = Image.open(shot).convert("RGB")
         views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
         encoded = io.BytesIO()

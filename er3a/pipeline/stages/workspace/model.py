@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import contourpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -513,6 +512,8 @@ def border(proven: Proven) -> Border:
     -------
     border : closed lines in the section, m, numbered from 1; none for bars
     """
+    import contourpy
+
     found, lines = proven.section, list[Any]()
     if proven.proof.bar == 0:
         high = proven.proof.cells[:, [1, 3]].max(axis=0)

@@ -1,0 +1,14 @@
+"""Options of commands that read D-H tables; kept out of ``options.py``, so that help needs no reader of tables."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from er3a.files.dh_table import AngleUnit, LengthUnit
+
+Lengths = Annotated[
+    LengthUnit | None, typer.Option(help="unit of lengths in a D-H table (default: that of its columns)")
+]
+Angles = Annotated[AngleUnit | None, typer.Option(help="unit of angles in a D-H table (default: that of its columns)")]

@@ -1,0 +1,135 @@
+"""The application, and its commands by name: a command's module is imported when the command is called.
+
+So ``er3a --help`` and each command start without the numerics of all others. A test holds the lines here to the first
+sentences of the commands themselves.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+FIRST = "Studies"
+ROBOT_FILES = "Robot files"
+PROGRAMS = "Robot programs"
+JOBS = "Single jobs, called by the workflow"
+
+COMMANDS = {
+    "new": (
+        "studies",
+        FIRST,
+        "Write a study for an arm: robot file, scene, targets and paths that the arm can do, README.",
+    ),
+    "check": (
+        "studies",
+        FIRST,
+        "Check input files: print the kind of each file, or its error. Exit code 1 if a unit is in doubt.",
+    ),
+    "run": ("studies", FIRST, "Run the study in this folder; finished parts are not run again."),
+    "verdicts": ("studies", FIRST, "Print the verdict of each stage of each robot."),
+    "view": (
+        "studies",
+        FIRST,
+        "Open the recordings in the Rerun viewer, or, without a desktop, serve them to a browser.",
+    ),
+    "compare": (
+        "compare_arms",
+        ROBOT_FILES,
+        "Do A and B describe the same arm? Lists the entries that differ. Without B: which known arm is A?",
+    ),
+    "arms": (
+        "known_arms",
+        ROBOT_FILES,
+        "List known arms by name, with maker, joints, reach and source. All commands take their names.",
+    ),
+    "confirm": (
+        "confirm",
+        ROBOT_FILES,
+        "Does the model agree with the controller? Compares joint values and poses as the pendant shows them.",
+    ),
+    "import-urdf": (
+        "robot_files",
+        ROBOT_FILES,
+        "Write a robot file (D-H table, directions, offsets, limits) from a URDF.",
+    ),
+    "export-urdf": ("robot_files", ROBOT_FILES, "Write a robot as URDF."),
+    "import-calibration": (
+        "robot_files",
+        ROBOT_FILES,
+        "Write a robot file from a factory calibration; huge d values that cancel become Hayati parameters.",
+    ),
+    "mesh": ("robot_files", ROBOT_FILES, "Split a mesh into convex pieces, for robot and scene files."),
+    "calibrate": (
+        "robot_files",
+        ROBOT_FILES,
+        "Estimate corrections to a robot's table, base and tool from measured positions; write the corrected robot "
+        "file.",
+    ),
+    "predict": (
+        "robot_files",
+        ROBOT_FILES,
+        "Print where a calibrated arm's tool is at commanded joint values, by the whole model with all its terms: a "
+        "CSV with position and roll, pitch and yaw.",
+    ),
+    "hand-eye": (
+        "robot_files",
+        ROBOT_FILES,
+        "Estimate the pose of a camera, with 95 % intervals; name samples and conventions that can't be right.",
+    ),
+    "schema": ("robot_files", ROBOT_FILES, "Write the JSON schemas of input files, and the data dictionary."),
+    "teach": (
+        "single_jobs",
+        ROBOT_FILES,
+        "Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.",
+    ),
+    "check-program": (
+        "programs",
+        PROGRAMS,
+        "Check each motion of robot programs. Findings are lines: file:line: level: message \\[code].",
+    ),
+    "program": ("programs", PROGRAMS, "Write robot programs from paths."),
+    "compute": ("single_jobs", JOBS, "Compute a stage: tables and summary.json."),
+    "views": ("single_jobs", JOBS, "Write a robot's recordings (always in English) and pages from results."),
+    "index": ("single_jobs", JOBS, "Write the index."),
+    "article": (
+        "single_jobs",
+        JOBS,
+        "Write the page on the article from results; `er3a run --study config/article.yaml` also computes them.",
+    ),
+}
+"""By name, in the order of ``--help``: the module that registers it, its panel in the help, its first sentence."""
+
+
+class CommandsByName(TyperGroup):
+    """Commands that only have a name and a line of help until one of them is called."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        shown = {
+            name: TyperCommand(name, help=line, rich_help_panel=panel) for name, (_, panel, line) in COMMANDS.items()
+        }
+        self.commands = {**shown, **self.commands}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names, its module imported now.
+
+        Parameters
+        ----------
+        ctx : of the group
+        args : words that follow er3a's own options
+        """
+        if args[0] in COMMANDS:
+            import_module(f"er3a.pipeline.commands.{COMMANDS[args[0]][0]}")
+            self.commands.update(typer.main.get_group(app).commands)
+        return super().resolve_command(ctx, args)
+
+
+app = typer.Typer(
+    name="er3a",
+    cls=CommandsByName,
+    help="Can this kinematic model of a serial robot be trusted, and what can the robot do?",
+    pretty_exceptions_enable=False,
+)
