@@ -27,7 +27,7 @@ from er3a.geometry.vectors import TURN, signed_angle, wrap_to_pi
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.forward import forward, frames, jacobian
-from er3a.kinematics.singularity import SingularityType
+from er3a.kinematics.singularity import SingularityType, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import nearest_equivalent, within
@@ -38,6 +38,7 @@ SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 
 ALMOST_IN_LINE = 1e-3  # sine between axes 4 and 6 beyond which no small motion aligns them
 NO_DIRECTION = 1e-13  # sine between two axes below which their common normal is rounding
 MOVING = [0, 1, 2, 5]  # joints that make up for joint 5; joint 4 would only turn with joint 6
+REGULAR_RAD, REGULAR_M = 0.05, 1e-3
 MAX_STEPS, ROUNDING, SETTLED, INDEPENDENT = 8, 1e-14, 0.01, 1e-9
 
 
@@ -299,6 +300,8 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
     -------
     families : nearest to the reference first within each kind
     """
+    if is_regular(robot, q):
+        return ()
     found: list[Family] = []
     for pair, on_line in aligned_arms(robot, T, q):
         _add(found, _wrist_families(robot, T, on_line, q_ref, pair))
@@ -309,6 +312,23 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
             if np.linalg.norm(moved[:3, 3] - T[:3, 3]) < SOLVES_M and (joint == 0 or arm_folds_fully(robot)):
                 _add(found, _curve_families(robot, moved, kind, q_ref, (int(slot), int(slot) + step)))
     return tuple(found)
+
+
+def is_regular(robot: Robot, q: Reals) -> bool:
+    """Whether all solutions of a pose are so far from singular poses that no joint can move with the tool at rest.
+
+    Parameters
+    ----------
+    q : (8, 6), rad, its closed-form solutions, NaN where a slot has none
+
+    Returns
+    -------
+    regular : by the factors of the Jacobian's determinant, far beyond where two branches or a family could meet
+    """
+    factors = determinant_factors(robot, q)
+    bent = np.abs(wrap_to_pi(2 * factors.elbow)) / 2 if arm_folds_fully(robot) else np.inf
+    near = (np.abs(factors.wrist) < REGULAR_RAD) | (np.abs(factors.shoulder) < REGULAR_M) | (bent < REGULAR_RAD)
+    return not near.any()
 
 
 def _add(found: list[Family], new: list[Family]) -> None:

@@ -104,18 +104,17 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     """Rows of an arm with a spherical wrist: each branch once per turn, and the nearest member of each self-motion."""
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
     continua = families(robot, T, q, q_ref)
-    q = _free_joints_near(robot, T, q, q_ref, continua)
-
-    slots: list[int] = []
-    for slot in np.flatnonzero(fault == REACHED).tolist():
-        if not any(np.abs(wrap_to_pi(q[slot] - q[other])).max() < SAME_JOINTS for other in slots):
-            slots.append(slot)
-    rows = [_rows_of_branch(robot, q[slot], q_ref) for slot in slots]
+    if continua:
+        q = _free_joints_near(robot, T, q, q_ref, continua)
+    slots = np.flatnonzero(fault == REACHED)
+    away = np.abs(wrap_to_pi(q[slots, None] - q[slots])).max(axis=2, initial=0.0)
+    slots = slots[~np.triu(away < SAME_JOINTS, 1).any(axis=0)]
+    rows, of = equivalents_within(robot, q[slots], q_ref)
+    branches = slots[of]
     for family in continua:
         if family.within_limits and _distance(rows, family.q0) > SAME_MEMBER:
-            slots.append(family.branches[0])
-            rows.append(family.q0[None])
-    return _Found(*_stacked(slots, rows, 6), solutions.CLOSED_FORM, _unsolved(robot, fault, gap), continua)
+            rows, branches = np.concatenate([rows, family.q0[None]]), np.append(branches, family.branches[0])
+    return _Found(rows, branches, solutions.CLOSED_FORM, _unsolved(robot, fault, gap), continua)
 
 
 def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> solutions.Solutions:
@@ -158,10 +157,15 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
     )
 
 
-def _stacked(branches: list[int], rows: list[Reals], joints: int) -> tuple[Reals, Integers]:
-    """The rows (k, n) of all branches, and each row's branch (k,)."""
-    q = np.concatenate([np.empty((0, joints)), *rows])
-    return q, np.repeat(np.array(branches, dtype=int), [len(turns) for turns in rows])
+def _with_rows(
+    robot: Robot, T: Reals, found: tuple[Reals, Integers], turned: Reals, least: float
+) -> tuple[Reals, Integers]:
+    """Rows (k, n), and the branch of each, with one more arm in all its turns (t, n), if ``least`` away from all."""
+    rows, branches = found
+    if min(_distance(rows, row) for row in turned) <= least:
+        return found
+    own = np.full(len(turned), by_class.slot_of(robot, T, turned[0]))
+    return np.concatenate([rows, turned]), np.concatenate([branches, own])
 
 
 def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, self_motion_rows: bool) -> _Found:
@@ -180,47 +184,38 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
     if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
         apart = np.abs(shortest_move(robot, slots[filled, None] - slots[filled])).max(axis=2, initial=0.0)
         filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
-    branches: list[int] = filled.tolist()
-    rows = [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
+    rows, of = equivalents_within(robot, slots[filled], q_ref)
+    branches = filled[of]
     for motion in motions:
-        if motion.within_limits:
-            members = (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,)
-            _list_members(robot, T, members, branches, rows)
+        members = (motion.q0, motion.max_margin_member) if solver.parameters else (motion.q0,)
+        for member in members if motion.within_limits else ():
+            rows, branches = _with_rows(robot, T, (rows, branches), member[None], SAME_MEMBER)
     certain = bool(is_complete(robot, found.certainty)[0])
     if not certain and isinstance(solver, LinkedRows):  # the rows found may be members that the linkage can't make
         for row in all_found(robot, T, STARTS):
-            if _distance(rows, row) > MISSED:
-                branches.append(by_class.slot_of(robot, T, row))
-                rows.append(_rows_of_branch(robot, row, q_ref))
+            turned, _ = equivalents_within(robot, row[None], q_ref)
+            rows, branches = _with_rows(robot, T, (rows, branches), turned, MISSED)
     if len(solver.parameters) == 1 and np.abs(forward(robot, q_ref) - T).max() <= SOLVES:
         # the self-motion through the reference is traced from there: without a first step it is missing
         certain = certain and by_class.arm_solver(robot).poses_at(T).moves(to_rows(robot, q_ref))
     unsolved: tuple[solutions.Unsolved, ...] = ()
-    if not branches:
+    if not len(branches):
         near = missed_row(robot, T, q_ref)
         # The class missed it, or the reference's parameters do.
         if near.solved and not (solver.parameters and redundancy is not None):
-            branches, rows = _near_solved(robot, T, near.q, q_ref)
+            rows, branches = _near_solved(robot, T, near.q, q_ref)
             certain = False
         else:
             position, rotation = (float(np.asarray(error)) for error in (near.position_error, near.rotation_error))
             miss = fact("nearest_miss", position_mm=position * 1000, rotation_deg=float(np.degrees(rotation)))
             unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=miss)),)
     method = fact("by_class", arm_class=solver.code, certain=bool(certain), named=bool(solutions.slot_labels(robot)))
-    return _Found(*_stacked(branches, rows, robot.joints), method, unsolved, traced)
+    return _Found(rows, branches, method, unsolved, traced)
 
 
-def _distance(rows: list[Reals], q: Reals) -> float:
-    """How far joint values (n,) are from the nearest of all rows, each (k, n); infinite if there are none."""
-    return min((max_joint_move(each, q).min() for each in rows), default=np.inf)
-
-
-def _list_members(robot: Robot, T: Reals, members: Sequence[Reals], branches: list[int], rows: list[Reals]) -> None:
-    """Add members (n,) of a self-motion to the rows, with their branches, unless rows are the same but for rounding."""
-    for member in members:
-        if _distance(rows, member) > SAME_MEMBER:
-            branches.append(by_class.slot_of(robot, T, member))
-            rows.append(member[None])
+def _distance(rows: Reals, q: Reals) -> float:
+    """How far joint values (n,) are from the nearest of rows (k, n); infinite if there are none."""
+    return float(max_joint_move(rows, q).min(initial=np.inf))
 
 
 def is_complete(robot: Robot, certainty: Integers) -> Flags:
@@ -260,23 +255,24 @@ def missed_row(robot: Robot, T: Reals, q_ref: Reals) -> solutions.Solutions:
     return inside if inside.solved else near
 
 
-def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[list[int], list[Reals]]:
-    """Branches and rows of a pose that joint values (n,) solve: all at their redundancy parameters, else they."""
+def _near_solved(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Reals, Integers]:
+    """Rows and branches of a pose that joint values (n,) solve: all at their redundancy parameters, else they."""
     if by_class.parameters_of(robot):
         slots = by_class.slots_of_class(
             robot, T[None], q_ref[None], by_class.checked_parameters(robot, None, q[None], 1)
         ).q[0]
-        if branches := np.flatnonzero(np.isfinite(slots[:, 0])).tolist():
-            return branches, [_rows_of_branch(robot, slots[slot], q_ref) for slot in branches]
-    return [0], [_rows_of_branch(robot, q, q_ref)]
+        if len(filled := np.flatnonzero(np.isfinite(slots[:, 0]))):
+            rows, of = equivalents_within(robot, slots[filled], q_ref)
+            return rows, filled[of]
+    return equivalents_within(robot, q[None], q_ref)
 
 
 def _by_iteration(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     """Rows that random starts find, for chains of no class."""
     arms = all_found(robot, T, starts_of(robot))
-    rows = _stacked(list(range(len(arms))), [_rows_of_branch(robot, q, q_ref) for q in arms], robot.joints)
+    rows, branches = equivalents_within(robot, np.reshape(arms, (-1, robot.joints)), q_ref)
     unsolved = () if len(arms) else solve(robot, T, respect_limits=False).unsolved
-    return _Found(*rows, fact("iteration", starts=starts_of(robot), lacking=missing_class(robot)), unsolved)
+    return _Found(rows, branches, fact("iteration", starts=starts_of(robot), lacking=missing_class(robot)), unsolved)
 
 
 def starts_of(robot: Robot) -> int:
@@ -349,12 +345,6 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
     again = again[np.arange(len(q)), np.arange(len(q))]
     away, away_again = (np.abs(wrap_to_pi(rows - q_ref)).max(axis=1) for rows in (q, again))
     return np.where((moved & (away_again < away))[:, None], again, q)
-
-
-def _rows_of_branch(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """One branch in all turns within the limits (k, n), the nearest to the reference first."""
-    rows = equivalents_within(robot, q, q_ref)
-    return rows[np.argsort(max_joint_move(rows, q_ref), kind="stable")]
 
 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:

@@ -283,8 +283,7 @@ class Judge:
         if not len(rows):
             checked.add(fact("target_out_of_reach", reasons=inverse(checked.arm, pose, reference).unsolved))
             return None
-        inside = [equivalents_within(checked.arm, row, reference) for row in rows]
-        rows = np.concatenate([each for each in inside if len(each)] or [rows])
+        rows, _ = equivalents_within(checked.arm, rows, reference)
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
             met = solutions_meant(target.branch, checked.arm, rows)
             if not met.any():

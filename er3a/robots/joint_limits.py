@@ -8,8 +8,8 @@ import numpy as np
 
 from er3a.errors import Er3aError
 from er3a.finding import Amount, Finding, fact, turned_or_moved
-from er3a.geometry.vectors import TURN, wrap_to_pi
-from er3a.numerics.arrays import Flags, Reals
+from er3a.geometry.vectors import TURN, max_joint_move, wrap_to_pi
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
 
@@ -200,27 +200,33 @@ def _nearest_rows(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     return nearest_rows(robot, rows, refs)[0].reshape(shape)
 
 
-def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """The same arm pose by all turns that keep all limits, or, if there are none, by :func:`nearest_equivalent`.
+def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> tuple[Reals, Integers]:
+    """The same arm poses by all turns that keep all limits, or, if there are none, by :func:`nearest_equivalent`.
 
     Parameters
     ----------
-    q : (n,), rad or m
+    q : (N, n), rad or m
     q_ref : (n,), rad or m; of continuous joints only turns near to it count
 
     Returns
     -------
-    rows : (k, n), rad or m, k of at least 1
+    rows : (k, n), rad or m, those of one pose after the other, of each the nearest to the reference first
+    of : (k,), which pose each is of; at least one of each
 
     Raises
     ------
     Er3aError
         if the limits allow more than ``MAX_ROWS``
     """
-    rows = rows_within(robot, q, q_ref, MAX_ROWS)
-    if len(rows) > MAX_ROWS:
+    rows, counts = rows_within(robot, q, q_ref, MAX_ROWS)
+    if (counts > MAX_ROWS).any():
         raise Er3aError(f"{robot.name}: the limits allow more than {MAX_ROWS} turns of one pose; narrow them")
-    return rows if len(rows) else nearest_equivalent(robot, q, q_ref)[None]
+    of = np.repeat(np.arange(len(q)), counts)
+    if len(beyond := np.flatnonzero(counts == 0)):
+        rows = np.concatenate([rows, nearest_equivalent(robot, q[beyond], q_ref)])
+        of = np.concatenate([of, beyond])
+    order = np.lexsort((max_joint_move(rows, q_ref), of))
+    return rows[order], of[order]
 
 
 def unwound(robot: Robot, q: Reals) -> Reals:

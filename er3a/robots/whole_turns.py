@@ -20,7 +20,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.numerics.arrays import Flags, Reals, copy_values
+from er3a.numerics.arrays import Flags, Integers, Reals, copy_values
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot, derived
 
@@ -167,23 +167,25 @@ def shortest_move(robot: Robot, move: Reals) -> Reals:
     return move - turns_in(robot, move)
 
 
-def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> Reals:
-    """The same arm pose by all turns that keep all limits, of joints and of sums.
+def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> tuple[Reals, Integers]:
+    """The same arm poses by all turns that keep all limits, of joints and of sums.
 
     Parameters
     ----------
-    q : (n,), rad or m
+    q : (N, n), rad or m
     q_ref : (n,), rad or m; a continuous joint counts only within half of what a turn of each row moves it by
-    most : at most one more than this is searched for
+    most : at most one more than this is searched for, of each pose
 
     Returns
     -------
-    rows : (k, n), rad or m, k of ``most`` + 1 at most
+    rows : (k, n), rad or m, of one pose after the other
+    counts : (N,), how many are of each, ``most`` + 1 at most
     """
     lower, upper = _windows(robot, q_ref[None], 1.0)
-    found = np.empty((most + 1, robot.joints))
-    count = _all_within(q, _lattice(robot), (lower[0], upper[0], np.zeros(lower.shape[1])), found)
-    return found[:count]
+    found, counts = np.empty((len(q) * (most + 1), robot.joints)), np.empty(len(q), dtype=np.int64)
+    limits = lower[0], upper[0], np.zeros(lower.shape[1])
+    total = _all_within_each(np.ascontiguousarray(q), _lattice(robot), limits, most + 1, (found, counts))
+    return found[:total], counts
 
 
 def nearest_rows(
@@ -374,6 +376,18 @@ def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int
             count += 1
         i -= 1
     return count
+
+
+@kernel
+def _all_within_each(Q: Reals, lattice: Lattice, limits: Limits, most: int, out: tuple[Reals, Integers]) -> int:
+    """:func:`_all_within` for rows (N, n), with room for ``most`` of each: all found, how many of each; returns the
+    sum."""
+    found, counts = out
+    total = 0
+    for pose in range(Q.shape[0]):
+        counts[pose] = _all_within(Q[pose], lattice, limits, found[total : total + most])
+        total += counts[pose]
+    return total
 
 
 @kernel

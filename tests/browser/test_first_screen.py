@@ -8,9 +8,9 @@ from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES, STAGE_PAGES
 
 WIDTH, HEIGHT = 1400, 1000
-HEADLINE, READ = 12, 50  # words of the verdict, and in runs of eight or more on the first screen
-PICTURE = {"index.html": 0.15, "validation.html": 0.2, "inverse.html": 0.25}  # of the first screen, at least
-USUAL_PICTURE = 0.3
+HEADLINE, READ = 12, 40  # words of the verdict, and in runs of eight or more on the first screen
+PICTURE = {"index.html": 0.3}  # of the first screen, at least
+USUAL_PICTURE = 0.4
 VISIBLE, UNFOLDED = 9000, 38_000  # words of all pages
 
 MEASURES = """

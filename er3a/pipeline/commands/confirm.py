@@ -99,12 +99,16 @@ def _print_found(found: Confirmation, robot: Robot, named: tuple[str, str], *, e
 
 
 def _nearest(corrected: Robot, own: str) -> str:
-    """The arm among those of er3a that a corrected table is."""
+    """The arm among er3a's robots and its catalogue that a corrected table is."""
     from er3a.comparison.compare import best_of
+    from er3a.comparison.nearest import likely
+    from er3a.files.arm_catalogue import known_arms
     from er3a.files.robot_library import load_robot
 
-    others = {name: load_robot(name) for name in names("data/robots", "*.yaml") if name != own}
-    name, found = best_of(corrected, others)[0]
+    arms = {name: arm.robot for name, arm in known_arms().items()}
+    arms |= {name: load_robot(name) for name in names("data/robots", "*.yaml")}
+    arms.pop(own, None)
+    name, found = best_of(corrected, {each: arms[each] for each in likely(corrected, arms)})[0]
     return name if found.verdict in ("equal", "same_arm") else ""
 
 

@@ -77,11 +77,11 @@ def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) 
 
     recording = reports / robot / f"{stage}.rrd"
     picture, problem = recording.with_suffix(".webp"), ""
-    run.show("record", stage, study, robot, results / robot / stage, recording)
+    moment = run.show("record", stage, study, robot, results / robot / stage, recording)
     if robot in study.variants:
         write_empty(picture)
     else:
-        problem = draw_preview(recording, picture) or ""
+        problem = draw_preview(recording, picture, moment) or ""
     write_checksum(recording)
     write_checksum(picture)
     return problem

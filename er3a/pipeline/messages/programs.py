@@ -56,7 +56,7 @@ REASONS: dict[NotFollowedReason, str] = {
     "depth": N_("too many calls are within each other"),
     "unreached": N_("nothing leads to it"),
 }
-NEARER = N_("Move the target or the workpiece nearer to the arm, or tilt the tool towards the arm.")
+NEARER = N_("Move the target nearer to the arm, or tilt the tool towards it.")
 OTHER_SOLUTION = N_(
     "Correct the target's joint values; if it is given as a pose, give it another orientation or place."
 )
@@ -124,7 +124,7 @@ TEXTS = texts(
         "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
-        "zone_too_large": "zone of {zone_mm:.1f} mm exceeds half of a motion of {motion_mm:.1f} mm",
+        "zone_too_large": "zone {zone_mm:.1f} mm, motion only {motion_mm:.1f} mm",
         "target_out_of_reach": "target out of reach: {reasons:; }",
         "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons:; }",
         "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",

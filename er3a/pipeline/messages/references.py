@@ -92,13 +92,10 @@ TEXTS = texts(
         "reach": "{extreme:extreme} distance of the {point:point} from axis {axis}",
         "motion_of_joint": "+J{joint}: {motion}",
         "entry_of_table": "{column}{joint}, measured",
-        "read_limit": "read J{joint}'s {side:side} in the controller's settings; don't drive there",
-        "time_joint": ("in a cleared cell, time a long turn of J{joint} at full speed, to ±{half_width_deg_s:g} deg/s"),
+        "read_limit": "read J{joint}'s {side:side} in the controller's settings",
+        "time_joint": "in a cleared cell, time a long turn of J{joint} (±{half_width_deg_s:g} deg/s)",
         "measure_entry": "measure {own_entry} to ±{half_width:g}: {what}",
-        "look_at_motion": (
-            "in a cleared cell, at reduced speed (T1), jog +J{joint} a few degrees from {start} and see, from behind "
-            "the arm, whether {motion}"
-        ),
+        "look_at_motion": ("in a cleared cell, at T1, jog +J{joint} from {start}: seen from behind the arm, {motion}?"),
         "not_the_robot_described": (
             "This is not the robot that these describe: {against:own; }. Positions differ by up to "
             "{mismatch_mm:.0f} mm; {tried} corrections of one or two entries leave {left_mm:.1f} mm or more."

@@ -116,8 +116,8 @@ TEXTS = texts(
             "workpiece nearer{first:!}]"
         ),
         "advice.end": (
-            "End it at t = {t_s:.4g} s, x, y, z = {xyz_mm:.1f, } mm: [{margin:.1f} mm clear, also in a stop of "
-            "{stop_s:.2f} s][{margin:!}{left_s:.2f} s before the first fault; a stop takes {stop_s:.2f} s]"
+            "End it at t = {t_s:.4g} s, ({xyz_mm:.1f, }) mm: [{margin:.1f} mm clear after a stop of {stop_s:.2f} s"
+            "][{margin:!}{left_s:.2f} s before the first fault; a stop takes {stop_s:.2f} s]"
         ),
         "advice.slow_there": "Slow down from t = {start:.2f} to {end:.2f} s, to {percent} % at the slowest",
         "advice.no_part": "Run no part of it",

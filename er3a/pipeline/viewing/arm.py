@@ -1,7 +1,8 @@
 """Draws an arm and its scene in recordings: solid links, joints as drums on their axes, the tool frame.
 
 Entities below ``entity`` (``arm`` by default): ``base``, ``link_1`` .. ``link_6`` (each turns with its joint) and
-``tool``. Collision bodies and scene solids are separate shapes.
+``tool``. Each is fixed in the frame of its name; ``frames`` holds the kinematic tree, each frame in the one before it.
+Collision bodies and scene solids are separate shapes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import rerun.blueprint as rrb
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Plane, Solid, Sphere
 from er3a.collision.shapes import Body, arm_bodies, hull_faces, solid_pieces
+from er3a.geometry.transforms import inverted
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -25,7 +27,9 @@ from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import LinkMesh, Robot
 
 TIMELINE = "t"
-ARM = "/arm/**"
+ARM_ENTITY, ARM = "arm", "/arm/**"
+FRAMES = "frames"
+WORLD = "tf#/"  # how the viewer calls the frame of the root
 LABEL = (200, 90, 0)  # of labels: about as legible on the viewer's dark ground as on its light one
 LABEL_AT = 0.6  # of the axis arrow: off the drum, and short of the next joint
 MAX_DISTANCE = 2.5  # of the arm's size from the base: what a view shows at most when it opens
@@ -74,7 +78,9 @@ def arm_view(
     return rrb.Spatial3DView(origin="/", contents=list(contents), name=name, eye_controls=eye, overrides=hidden or None)
 
 
-def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = "arm", ghost: bool = False) -> None:
+def log_arm(
+    stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str = ARM_ENTITY, ghost: bool = False
+) -> None:
     """Log the arm's shapes, standing at joint angles (6,) in rad.
 
     Parameters
@@ -120,31 +126,48 @@ def log_arm(stream: rr.RecordingStream, robot: Robot, q: np.ndarray, entity: str
             stream.log(f"{path}/axis", axis, tip, static=True)
     if not ghost:
         stream.log(f"{entity}/tool", rr.TransformAxes3D(radius * 3), static=True)
-    for path, T in zip(_moving_entities(robot, entity), frames(robot, q)):
-        stream.log(path, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), static=True)
+    for name, before, T in _tree(robot, q, entity):
+        stream.log(f"{entity}/{name}", rr.Transform3D(parent_frame=_frame(entity, name)), static=True)
+        placed = rr.Transform3D(
+            translation=T[:3, 3], mat3x3=T[:3, :3], parent_frame=before, child_frame=_frame(entity, name)
+        )
+        stream.log(f"{entity}/{FRAMES}/{name}", placed, static=True)
+
+
+def _frame(entity: str, name: str) -> str:
+    """What the frame of a link is called: ``link_3``, and of a further arm ``corrected link_3``."""
+    return name if entity == ARM_ENTITY else f"{entity.rpartition('/')[2]} {name}"
+
+
+def _tree(robot: Robot, q: Reals, entity: str) -> Iterator[tuple[str, str, Reals]]:
+    """Base, links and tool: each with the frame that it is placed in, and where, (..., 4, 4), m."""
+    name, before, placed = "base", WORLD, np.broadcast_to(robot.base, (*q.shape[:-1], 4, 4))
+    yield name, before, placed
+    poses = frames(robot, q)
+    for k in range(robot.rows + 1):
+        before, name = _frame(entity, name), "tool" if k == robot.rows else f"link_{k + 1}"
+        yield name, before, inverted(placed) @ poses[..., k, :, :]
+        placed = poses[..., k, :, :]
 
 
 def send_motion(
-    stream: rr.RecordingStream, robot: Robot, times: np.ndarray, q: np.ndarray, entity: str = "arm"
+    stream: rr.RecordingStream, robot: Robot, times: Sequence[rr.TimeColumn], q: np.ndarray, entity: str = ARM_ENTITY
 ) -> None:
     """Animate the arm in a recording.
 
     Parameters
     ----------
     stream : of the recording, into which the arm's shapes have been logged
-    times : (N,), s on the recording's timeline
+    times : of N moments, on each timeline
     q : (N, n), rad or m, without NaN
     entity : below which the arm's links are
     """
-    poses = frames(robot, q)
-    for k, path in enumerate(_moving_entities(robot, entity)):
-        T = poses[:, k]
-        columns = rr.Transform3D.columns(translation=T[:, :3, 3], mat3x3=T[:, :3, :3])
-        stream.send_columns(path, [seconds(times)], columns)
-
-
-def _moving_entities(robot: Robot, entity: str) -> list[str]:
-    return [*(f"{entity}/link_{k + 1}" for k in range(robot.rows)), f"{entity}/tool"]
+    for name, before, T in [*_tree(robot, q, entity)][1:]:
+        parents, children = [before] * len(q), [_frame(entity, name)] * len(q)
+        columns = rr.Transform3D.columns(
+            translation=T[:, :3, 3], mat3x3=T[:, :3, :3], parent_frame=parents, child_frame=children
+        )
+        stream.send_columns(f"{entity}/{FRAMES}/{name}", times, columns)
 
 
 def _log_visuals(stream: rr.RecordingStream, robot: Robot, visuals: Sequence[LinkMesh], entity: str) -> None:
@@ -158,7 +181,6 @@ def _log_visuals(stream: rr.RecordingStream, robot: Robot, visuals: Sequence[Lin
 
 
 def _log_base(stream: rr.RecordingStream, robot: Robot, entity: str, radius: float, plate: bool) -> None:
-    stream.log(f"{entity}/base", rr.Transform3D(translation=robot.base[:3, 3], mat3x3=robot.base[:3, :3]), static=True)
     if plate:
         height = radius * 0.9
         disc = rr.Cylinders3D(

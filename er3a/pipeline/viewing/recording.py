@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,9 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import ARM, TIMELINE, arm_view, body_shape, log_arm, seconds, send_motion, solid_shapes
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
 from er3a.robots.joint_limits import joint_names, size_of
+from er3a.robots.joint_limits import shown as in_units
 from er3a.robots.robot import Robot
+from er3a.version import __version__
 
 PAUSE_S = 1.0  # between two runs
 SHOWN_S = rr.TimeRange(
@@ -42,6 +44,12 @@ LEVELS: dict[Weight, rr.TextLogLevel] = {
     "caution": rr.TextLogLevel.WARN,
     "fail": rr.TextLogLevel.ERROR,
 }
+LANE_COLOURS: dict[Weight, str] = {**{each: VERDICTS[each] for each in ("caution", "fail")}, "plain": VERDICTS["pass"]}
+NOTHING = "nothing found"  # of a run, as long as no event is on
+WEIGHTS: tuple[Weight, ...] = ("plain", "caution", "fail")
+LIMIT_ALPHA, LIMIT_WIDTH = 110, 1.0
+SPACE_SHARE = 9.0  # of the height that a view of space has, a lane 1
+NEAR_LIMIT = 0.75  # of the way from the middle of a range to its end: from there on the limit is drawn
 GONE = rr.Clear(recursive=False)
 Logged = rr.AsComponents | Sequence[rr.AsComponents]
 
@@ -56,6 +64,7 @@ class Curves:
     title : with the unit
     names, colours : of each curve; the joints' by default
     whole : show all of the time, not some seconds around the moment
+    limits : lower and upper, (2, k), in the unit of the title; drawn where a curve comes near; NaN for none
     """
 
     entity: str
@@ -63,6 +72,7 @@ class Curves:
     names: Sequence[str] = JOINT_NAMES
     colours: Sequence[str] = JOINTS
     whole: bool = False
+    limits: Reals | None = None
 
     @classmethod
     def of_joints(cls, robot: Robot, entity: str, name: str, per: str = "") -> Curves:
@@ -75,12 +85,15 @@ class Curves:
         name : "angle" or "velocity"
         per : of the unit, such as "/s"
         """
-        if robot.slides.all():
-            return cls(entity, f"Joint {'position' if name == 'angle' else name} (mm{per})")
+        ends = np.stack([-robot.speed, robot.speed] if per else [robot.lower, robot.upper])
         slides = ", ".join(joint for joint, is_slide in zip(joint_names(robot), robot.slides) if is_slide)
-        if slides:  # short enough for the head of a panel
-            return cls(entity, f"{name.capitalize()} (deg{per}, {slides}: mm{per})")
-        return cls(entity, f"Joint {name} (deg{per})")
+        if robot.slides.all():
+            title = f"Joint {'position' if name == 'angle' else name} (mm{per})"
+        elif slides:  # short enough for the head of a panel
+            title = f"{name.capitalize()} (deg{per}, {slides}: mm{per})"
+        else:
+            title = f"Joint {name} (deg{per})"
+        return cls(entity, title, limits=in_units(robot, ends))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +110,7 @@ class Run(PlayedMotion):
     columns : by entity what Rerun's ``columns`` make of N values, one for each time
     shapes : (s, entity, what is to be seen there from then on); gone when the next run starts
     texts : (s, Markdown) that takes the place of ``text``
+    lanes : by name, (s, state, its weight) from then on; a lane "verdict" is made of the events
     pause_s : until the next run
     """
 
@@ -106,6 +120,7 @@ class Run(PlayedMotion):
     columns: Mapping[str, Any] = field(default_factory=dict)
     shapes: Sequence[tuple[float, str, Logged]] = ()
     texts: Sequence[tuple[float, str]] = ()
+    lanes: Mapping[str, Sequence[tuple[float, str, Weight]]] = field(default_factory=dict)
     pause_s: float = PAUSE_S
 
 
@@ -123,6 +138,7 @@ class Recorded:
     points : arrays (N, 3), m, to be in sight when the views open, besides the arm
     ghost : a further arm, see-through, that moves along; at ``<stage>/corrected``
     now : title of the text on what is shown now
+    verdict : of the stage, for who reads the recording's properties
     """
 
     robot: Robot
@@ -138,15 +154,22 @@ class Recorded:
     points: Sequence[Reals] = ()
     ghost: Robot | None = None
     now: str = "Now"
+    verdict: str = ""
 
 
-def write_recording(shown: Recorded, output: Path) -> None:
+def write_recording(shown: Recorded, output: Path) -> float | None:
     """Write a recording of a stage; it opens at the start of the first run.
+
+    The joint values have a panel of their own in every recording; the events make a lane of states.
 
     Parameters
     ----------
     shown : the arm, its runs one after another, and curves
     output : the recording, written whole or not at all
+
+    Returns
+    -------
+    look_s : when the first fault is on, s on the recording's timeline; None where there is none
 
     Raises
     ------
@@ -154,10 +177,14 @@ def write_recording(shown: Recorded, output: Path) -> None:
         if the disk is full or permission is missing
     """
     robot, stage = shown.robot, shown.stage
+    shown = replace(shown, curves=[Curves.of_joints(robot, "angle", "angle"), *shown.curves])
+    shown = replace(shown, runs=[_with_angles(robot, run) for run in shown.runs])
     starts = np.cumsum([0.0, *(_end(run) + run.pause_s for run in shown.runs)]).tolist()
     title = f"{robot.title}: {stage}"
     first = (0.0, _end(shown.runs[0])) if shown.runs else None
     with recording(output, shown.name, stage, _layout(shown), title, first) as stream:
+        said = rr.AnyValues(robot=robot.title, stage=stage, verdict=shown.verdict, version=__version__)
+        stream.send_property("er3a", said)
         _log_text(stream, f"{stage}/note", shown.note + _timetable(shown.runs, starts))
         q = np.concatenate([run.q for run in shown.runs] or [np.empty((0, robot.joints))])
         known = q[np.isfinite(q).all(axis=1)]
@@ -169,14 +196,82 @@ def write_recording(shown: Recorded, output: Path) -> None:
         for entity, shape in shown.shapes.items():
             _log(stream, stage, entity, shape, static=True)
         for curves in _panels(shown):
-            count = max(
-                (run.curves[curves.entity].shape[1] for run in shown.runs if curves.entity in run.curves), default=0
-            )
-            lines = rr.SeriesLines(names=curves.names[:count], colors=[rgb(each) for each in curves.colours[:count]])
-            stream.log(f"{stage}/curves/{curves.entity}", lines, static=True)
+            _log_styles(stream, shown, curves)
+        _log_lanes(stream, shown)
         before: set[str] = set()
         for run, start in zip(shown.runs, starts):
             before = _log_run(stream, shown, run, start, before)
+    return next((start + t for run, start in zip(shown.runs, starts) if (t := _first_fault(run)) is not None), None)
+
+
+def _with_angles(robot: Robot, run: Run) -> Run:
+    return replace(run, curves={"angle": in_units(robot, run.q), **run.curves}) if len(run.t) else run
+
+
+def _first_fault(run: Run) -> float | None:
+    return min((each.t for each in run.events if each.status == "fail"), default=None)
+
+
+def _log_styles(stream: rr.RecordingStream, shown: Recorded, curves: Curves) -> None:
+    """Names and colours of a panel's curves, and of the limits that some run comes near."""
+    entity = f"{shown.stage}/curves/{curves.entity}"
+    count = max((run.curves[curves.entity].shape[1] for run in shown.runs if curves.entity in run.curves), default=0)
+    colours = [rgb(each) for each in curves.colours[:count]]
+    stream.log(entity, rr.SeriesLines(names=curves.names[:count], colors=colours), static=True)
+    if len(near := _limits_near(shown, curves)):
+        names, tints = zip(*((f"{curves.names[j]} limit", (*rgb(curves.colours[j]), LIMIT_ALPHA)) for j, _ in near))
+        stream.log(f"{entity}/limits", rr.SeriesLines(names=names, colors=tints, widths=LIMIT_WIDTH), static=True)
+
+
+def _limits_near(shown: Recorded, curves: Curves) -> list[tuple[int, float]]:
+    """Joints (from 0) and limits that a curve comes near or passes: all of them would flatten what there is to see."""
+    values = np.concatenate([run.curves[curves.entity] for run in shown.runs if curves.entity in run.curves])
+    if curves.limits is None or not np.isfinite(values).any():
+        return []
+    found = []
+    for j, ends in enumerate(curves.limits.T[: values.shape[1]]):
+        if not np.isfinite(ends).all():
+            continue
+        middle, known = ends.mean(), values[:, j][np.isfinite(values[:, j])]
+        shares = (known - middle) / (ends[1] - middle)
+        found += [(j, end) for side, end in zip((-1, 1), ends) if (side * shares > NEAR_LIMIT).any()]
+    return found
+
+
+def _log_lanes(stream: rr.RecordingStream, shown: Recorded) -> None:
+    """The colours of the states that the runs' lanes go through."""
+    weights: dict[str, dict[str, Weight]] = {}
+    for run in shown.runs:
+        for lane, changes in _lanes(run).items():
+            known = weights.setdefault(lane, {})
+            for _, state, weight in changes:  # one colour for a state: that of its worst
+                known[state] = max(known.get(state, weight), weight, key=WEIGHTS.index)
+    for lane, states in weights.items():
+        colours = [rgb(LANE_COLOURS[weight]) for weight in states.values()]
+        stream.log(f"{shown.stage}/states/{lane}", rr.StateConfiguration(values=[*states], colors=colours), static=True)
+
+
+def _lanes(run: Run) -> dict[str, list[tuple[float, str, Weight]]]:
+    """The states of a run by lane, each from its time on; none of a run without a course."""
+    if len(run.t) < 2:
+        return {}
+    own = {lane: [*changes] for lane, changes in run.lanes.items() if changes}
+    return ({"verdict": _verdicts(run)} if run.events or run.outcome else {}) | own
+
+
+def _verdicts(run: Run) -> list[tuple[float, str, Weight]]:
+    """At each time the worst of what is on then, by the word before its colon; without events how the run ends."""
+    quiet = (NOTHING, WEIGHTS[0]) if run.events or run.status == "plain" else (run.outcome, run.status)
+    ends = {each.t: each.until for each in run.events}
+    times = sorted({0.0, *ends, *(until for until in ends.values() if until < _end(run))})
+    changes: list[tuple[float, str, Weight]] = []
+    for t in times:
+        on = [each for each in run.events if each.t <= t < max(each.until, each.t + BRIEFLY_S)]
+        worst = max(on, key=lambda each: WEIGHTS.index(each.status), default=None)
+        state, weight = (worst.text.partition(":")[0], worst.status) if worst else quiet
+        if not changes or changes[-1][1:] != (state, weight):
+            changes.append((t, state, weight))
+    return changes
 
 
 @contextmanager
@@ -247,17 +342,22 @@ def escaped(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>#!|~])", r"\\\1", " ".join(text.split()))
 
 
-def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **shown: Any) -> None:
+def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **shown: Any) -> float | None:
     """Write the recording of a stage.
 
     Parameters
     ----------
     note : with places for the robot's ``title`` and the verdict's ``findings``
     shown : what else :class:`Recorded` holds
+
+    Returns
+    -------
+    look_s : when the first fault is on, s on the recording's timeline; None where there is none
     """
     robot, findings = study.robot(stored.robot), say_all(stored.results.summary.verdict.findings)
     text = note.format(title=escaped(robot.title), findings=escaped(findings))
-    write_recording(Recorded(robot, stored.robot, stored.stage, text, **shown), output)
+    shown = {"robot": robot, "verdict": stored.results.summary.verdict.status} | shown
+    return write_recording(Recorded(name=stored.robot, stage=stored.stage, note=text, **shown), output)
 
 
 def _end(run: Run) -> float:
@@ -301,10 +401,13 @@ def _layout(shown: Recorded) -> rrb.Container:
     texts = rrb.Vertical(*words, name="Words")
     if len(views) > 2:
         return rrb.Grid(*views, texts, grid_columns=2, name=stage)
-    left = views[0] if len(views) == 1 else rrb.Vertical(*views)  # side by side they would cut the arm off
+    lanes = {lane for run in runs for lane in _lanes(run)}
+    seen = [*views, rrb.StateTimelineView(origin=f"/{stage}/states", name="States")] if lanes else views
+    shares = [SPACE_SHARE] * len(views) + [1.0 + len(lanes)] * bool(lanes)
+    left = rrb.Vertical(*seen, row_shares=shares)  # side by side they would cut the arm off
     if len(curves) > 1:
-        shares = [2.0, 1.0, 1.3]
-        return rrb.Horizontal(left, rrb.Vertical(*curves, name="Curves"), texts, column_shares=shares, name=stage)
+        beside = rrb.Vertical(*curves, name="Curves")
+        return rrb.Horizontal(left, beside, texts, column_shares=[2.0, 1.0, 1.3], name=stage)
     return rrb.Horizontal(left, rrb.Vertical(*curves, *words, name="Words"), column_shares=[2.0, 1.3], name=stage)
 
 
@@ -339,45 +442,87 @@ def _log_scene(stream: rr.RecordingStream, shown: Recorded) -> None:
 
 def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float, before: set[str]) -> set[str]:
     """Log a run; returns the entities of its shapes, which go when the next one starts, as those ``before`` go now."""
-    stage, times, known = shown.stage, start + run.t, np.isfinite(run.q).all(axis=1)
+    stage, clock, known = shown.stage, Clock(run, start), np.isfinite(run.q).all(axis=1)
     if known.any():
         for robot, entity in ((shown.robot, "arm"), (shown.ghost, f"{stage}/corrected")):
             if robot is not None:
-                send_motion(stream, robot, times[known], run.q[known], entity)
+                send_motion(stream, robot, clock.columns(run.t[known]), run.q[known], entity)
     for entity, columns in run.columns.items():
-        stream.send_columns(entity[1:] if entity.startswith("/") else f"{stage}/{entity}", [seconds(times)], columns)
-    for entity, values in run.curves.items():
-        _send_curves(stream, f"{stage}/curves/{entity}", times, values)
-    _send_texts(stream, f"{stage}/now", start, [(0.0, run.text), *run.texts])
-    _send_events(stream, f"{stage}/events", run, start)
+        path = entity[1:] if entity.startswith("/") else f"{stage}/{entity}"
+        stream.send_columns(path, clock.columns(run.t), columns)
+    for curves in _panels(shown):
+        if curves.entity in run.curves:
+            _send_curves(stream, f"{stage}/curves/{curves.entity}", clock, run.curves[curves.entity])
+            if near := _limits_near(shown, curves):
+                both = rr.Scalars.columns(scalars=np.tile([end for _, end in near], (2, 1)))
+                ends = clock.columns(run.t[[0, -1]])
+                stream.send_columns(f"{stage}/curves/{curves.entity}/limits", ends, both)
+    for lane, changes in _lanes(run).items():
+        states = [*changes, (_end(run), "", WEIGHTS[0])]
+        times = clock.columns(np.array([t for t, _, _ in states]))
+        columns = rr.StateChange.columns(state=[state for _, state, _ in states])
+        stream.send_columns(f"{stage}/states/{lane}", times, columns)
+    _send_texts(stream, f"{stage}/now", clock, [(0.0, run.text), *run.texts])
+    _send_events(stream, f"{stage}/events", clock)
     marks = _marks(run.marks, size_of(shown.robot))
     shapes = [*run.shapes, *marks, *_touching(shown, run.events)]
     at_once = {entity for t, entity, _ in shapes if t == 0}
     for t, entity, shape in [*((0.0, entity, GONE) for entity in sorted(before - at_once)), *shapes]:
-        stream.set_time(TIMELINE, duration=start + t)
-        _log(stream, stage, entity, shape)
+        with clock.at(stream, t):
+            _log(stream, stage, entity, shape)
     return {entity for _, entity, _ in shapes}
 
 
-def _send_curves(stream: rr.RecordingStream, entity: str, times: Reals, values: Reals) -> None:
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """The times of a run: on the timeline of all runs, where it begins at ``start`` (s), and on one of its own."""
+
+    run: Run
+    start: float
+
+    def columns(self, times: Reals) -> list[rr.TimeColumn]:
+        """Time columns for ``send_columns``.
+
+        Parameters
+        ----------
+        times : (N,), s from the run's start
+        """
+        own = [rr.TimeColumn(self.run.name, duration=times)] if len(self.run.t) > 1 else []
+        return [seconds(self.start + times), *own]
+
+    @contextmanager
+    def at(self, stream: rr.RecordingStream, t: float) -> Iterator[None]:
+        """What is logged meanwhile is at ``t`` (s from the run's start)."""
+        stream.set_time(TIMELINE, duration=self.start + t)
+        if len(self.run.t) > 1:
+            stream.set_time(self.run.name, duration=t)
+        yield
+        stream.reset_time()
+
+
+def _send_curves(stream: rr.RecordingStream, entity: str, clock: Clock, values: Reals) -> None:
     """Curves, with a gap after the last point, so that the next run's don't join them."""
     known: Flags = np.asarray(np.isfinite(values).all(axis=1))
-    stream.send_columns(entity, [seconds(times[known])], rr.Scalars.columns(scalars=values[known]))
+    times = clock.run.t
+    if known.any():
+        stream.send_columns(entity, clock.columns(times[known]), rr.Scalars.columns(scalars=values[known]))
     gaps = times[~known & np.append(True, known[:-1])]
     if known[-1]:
         gaps = np.append(gaps, times[-1] + BRIEFLY_S)
-    cleared = rr.Clear.columns(is_recursive=np.zeros(len(gaps), dtype=bool))  # type: ignore[arg-type]
-    stream.send_columns(entity, [seconds(gaps)], cleared)
+    if len(gaps):  # a chunk without rows makes the viewer panic
+        cleared = rr.Clear.columns(is_recursive=np.zeros(len(gaps), dtype=bool))  # type: ignore[arg-type]
+        stream.send_columns(entity, clock.columns(gaps), cleared)
 
 
-def _send_texts(stream: rr.RecordingStream, entity: str, start: float, texts: Sequence[tuple[float, str]]) -> None:
+def _send_texts(stream: rr.RecordingStream, entity: str, clock: Clock, texts: Sequence[tuple[float, str]]) -> None:
     last = dict(texts)  # of several at one time
     columns = rr.TextDocument.columns(text=list(last.values()), media_type=[rr.MediaType.MARKDOWN] * len(last))
-    stream.send_columns(entity, [seconds(start + np.array(list(last)))], columns)
+    stream.send_columns(entity, clock.columns(np.array(list(last))), columns)
 
 
-def _send_events(stream: rr.RecordingStream, entity: str, run: Run, start: float) -> None:
+def _send_events(stream: rr.RecordingStream, entity: str, clock: Clock) -> None:
     """The run's outcome, then its events, each with its time here and on the run's own clock."""
+    run, start = clock.run, clock.start
     rows: list[tuple[float, str, Weight]] = (
         [(0.0, f"{start:.3f} s: {run.name}: {run.outcome}", run.status)] if run.outcome else []
     )
@@ -389,7 +534,7 @@ def _send_events(stream: rr.RecordingStream, entity: str, run: Run, start: float
             level=[str(LEVELS[status]) for _, _, status in rows],
             color=[legible(VERDICTS["pass" if status == "plain" else status]) for _, _, status in rows],
         )
-        stream.send_columns(entity, [seconds(start + np.array([t for t, _, _ in rows]))], columns)
+        stream.send_columns(entity, clock.columns(np.array([t for t, _, _ in rows])), columns)
 
 
 def _marks(marks: Sequence[Mark], size: float) -> Iterator[tuple[float, str, Logged]]:

@@ -18,7 +18,8 @@ from er3a.robots.robot import Robot
 Kind = Literal["right", "wrong", "other"]
 MARGIN = 0.06  # of the larger side
 LETTERS = 0.034  # of the height
-WIDE = 1.25  # at least, of the height
+WIDE, UPRIGHT = 1.25, 0.77  # at least, of the height
+FLATTEST = 1.6  # width, of the height: letters stay legible over a level arm
 BONE = 0.045  # an arm's thickness, of the height of what is drawn
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
@@ -49,13 +50,14 @@ def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence
     return SeenArm(title, note, kind, skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000, reach_mm)
 
 
-def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None) -> Markup:
+def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None, least_wide: float = WIDE) -> Markup:
     """The drawing as SVG.
 
     Parameters
     ----------
     arms : drawn in this order, later ones over earlier ones
     floor_mm : height of the floor; None where there is none
+    least_wide : how wide it is at least, of its height
 
     Returns
     -------
@@ -65,10 +67,13 @@ def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None) -> Markup:
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
-    high[1] += len(arms) * 1.7 * LETTERS * (high[1] - low[1])  # for the names above
+    flat = max(0.0, float(high[0] - low[0]) / FLATTEST - float(high[1] - low[1])) / 2
+    low[1], high[1] = low[1] - flat, high[1] + flat
+    names, scale = (lines * 1.7 * LETTERS * (high[1] - low[1]) for lines in (len(arms), 1.2))
+    low[1], high[1] = low[1] - scale, high[1] + names  # room for both
     wide, tall = high - low
-    low[0] -= max(0.0, WIDE * tall - wide) / 2
-    wide = max(wide, WIDE * tall)
+    low[0] -= max(0.0, least_wide * tall - wide) / 2
+    wide = max(wide, least_wide * tall)
     parts = [_reach(arm) for arm in arms]
     if floor_mm is not None:
         parts.append(

@@ -228,15 +228,19 @@ QUALITY = 75
 PATIENCE_S = 60
 
 
-def draw_preview(recording: Path, output: Path) -> str | None:
+def draw_preview(recording: Path, output: Path, moment: float | None = None) -> str | None:
     """Draw a recording as a WebP picture.
+
+    Parameters
+    ----------
+    moment : s on the recording's timeline, that the picture shows; None for how it opens
 
     Returns
     -------
     why it could not be drawn, None if it was; what could not be drawn becomes an empty file
     """
     try:
-        picture = _picture(recording)
+        picture = _picture(recording, moment)
     except Er3aError as error:
         write_empty(output)
         return str(error)
@@ -254,14 +258,14 @@ def write_empty(output: Path) -> None:
     write_atomically(output, lambda file: file.write_bytes(b""))
 
 
-def _picture(recording: Path) -> bytes:
+def _picture(recording: Path, moment: float | None) -> bytes:
     with TemporaryDirectory(prefix="er3a-preview-") as folder:
         shot, messages, port = Path(folder) / "shot.png", Path(folder) / "messages", free_port()
         size = "x".join(map(str, WINDOW))
         words = ("--headless", "--port", str(port), "--window-size", size, "--hide-welcome-screen")
         with viewer_running([recording], *words, messages=messages) as viewer:
             try:
-                _shoot(port, viewer, shot)
+                _shoot(port, viewer, shot, moment)
             except EOFError:
                 raise Er3aError(_why(messages.read_text(errors="replace"))) from None
         image = Image.open(shot).convert("RGB")
@@ -271,7 +275,7 @@ def _picture(recording: Path) -> bytes:
         return encoded.getvalue()
 
 
-def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
+def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path, moment: float | None) -> None:
     """Have the viewer save pictures until one is like the one before: everything is loaded then.
 
     Raises
@@ -296,6 +300,8 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path) -> None:
                 continue
             if not bare:
                 client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
+                if moment is not None:
+                    client.set_time(duration=moment)
                 bare = True
             client.save_screenshot(str(shot))
         except (ConnectionError, RuntimeError):

@@ -21,9 +21,9 @@ from er3a.robots.robot import Robot
 
 BODY_ALPHA = 70
 NOTE = """# Where it is free of collisions
-{findings}
-
 **Look first** at the points: places that the tool can be brought to.
+
+{findings}
 
 - green: with an arm free of collisions, joined to home by a motion that is free of them too
 - blue: with such an arm, not joined to home
@@ -36,11 +36,11 @@ curve shows how far they are apart. Below 0 they overlap.
 """
 
 
-def record(study: Study, stored: Stored[CollisionResults], output: Path) -> None:
+def record(study: Study, stored: Stored[CollisionResults], output: Path) -> float | None:
     """Write the recording from the stage's results."""
     name, results = stored.robot, stored.results
     robot = study.robot(name)
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,

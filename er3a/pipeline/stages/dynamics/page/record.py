@@ -23,9 +23,9 @@ LONGEST = 0.35  # of the arm's size, the arrow of the maximum torque
 WIDTH = 0.012  # of the arm's size
 CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 NOTE = """# {title}: torques
-{findings}
-
 **Look first** at the arrow that is longest while the arm runs: that joint's drive needs the most torque.
+
+{findings}
 
 - arrow on an axis: the drive's torque, along the axis by the right-hand rule; all to one scale (forces of joints that \
 slide to one of their own)
@@ -33,26 +33,35 @@ slide to one of their own)
 """
 
 
-def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> None:
+def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> float | None:
     """Write the dynamics recording of a robot."""
     results, robot = stored.results, study.robot(stored.robot)
     titles = {path.name: path.title for path in results.summary.paths}
     unit = shared_unit(FORCE if slides else TORQUE for slides in robot.slides)
     scale = _arrow_scales(robot, results.torques.torque)
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,
         NOTE,
         runs=[_run(robot, motion, titles[motion.name], results, scale) for motion in motions(robot, results)],
         curves=[
-            Curves("torque", f"Drive torque ({unit})"),
+            Curves("torque", f"Drive torque ({unit})", limits=_limits(robot, results)),
             Curves("gravity", f"Part against gravity ({unit})"),
             Curves("power", "Power (W)"),
         ],
         views={"Arm and torques": ["**"]},
         now="This path",
     )
+
+
+def _limits(robot: Robot, results: DynamicsResults) -> Reals:
+    """What each drive can do either way, (2, n); NaN where not known."""
+    peaks = np.full(robot.joints, np.nan)
+    for motor in results.summary.motors:
+        if motor.peak_limit is not None:
+            peaks[motor.joint - 1] = motor.peak_limit
+    return np.stack([-peaks, peaks])
 
 
 def _arrow_scales(robot: Robot, torques: Reals) -> Reals:

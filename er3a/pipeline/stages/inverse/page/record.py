@@ -22,10 +22,10 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 NOTE = """# Joint solutions of each target
-{findings}
-
 **Look first** at how differently the arm can reach one and the same tool pose. Each target has one second: drag the
 time, or press play.
+
+{findings}
 
 - solid arm: the solution taken; where none is, the arm where it comes from
 - translucent arms: the other branches within the limits, coloured as on the page
@@ -38,11 +38,11 @@ tree on the left. A flip and a no-flip branch lie on one another.
 """
 
 
-def record(study: Study, stored: Stored[InverseResults], output: Path) -> None:
+def record(study: Study, stored: Stored[InverseResults], output: Path) -> float | None:
     """Write the recording from the stage's results."""
     name, solutions = stored.robot, stored.results.solutions
     robot, targets = study.robot(name), shown_targets(stored.results.summary.targets)
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,

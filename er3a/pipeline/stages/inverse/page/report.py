@@ -29,7 +29,7 @@ from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
@@ -50,7 +50,7 @@ def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRo
     ----------
     branches : the best row of each branch
     """
-    figure, axes = row_of_panels(2, 8.5, 4.9, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
+    figure, axes = row_of_panels(2, 8.5, 5.75, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
     handles = _draw_arms(axes[0], axes[1], robot, target, branches)
     figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=9)
     alt = tr(
@@ -61,18 +61,7 @@ def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRo
 
 def _conclude(target: model.TargetResult) -> str:
     if target.chosen_deg is not None:
-        counts = {"within": target.within_limits, "all": target.solutions, "collide": target.collide}
-        if not target.collide:
-            return tr(
-                "The bold arm is the chosen solution; {within} of {all} branches are within the limits. A flip "
-                "and a no-flip branch look the same here: they differ in J4, J5 and J6.",
-                **counts,
-            )
-        return tr(
-            "The bold arm is the chosen solution; {within} of {all} branches are within the limits, of which "
-            "{collide} collide. A flip and a no-flip branch look the same here: they differ in J4, J5 and J6.",
-            **counts,
-        )
+        return tr("Bold: the chosen solution. Flip and no-flip look the same here.")
     if target.collide:
         return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
     if target.solutions:
@@ -190,14 +179,17 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
     due = len(summary.targets) - len(caught)
     headline = tr("{count} of {due} poses reached.", count=len(met), due=due)
-    rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""
     clear = [each.clearance.least_mm for each in met if each.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     if summary.round_trips:
         keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
     failed = Group(tr("No solution to take"), [_row(each) for each in shown if each.outcome != "reached"])
     return Answer(
-        headline, rest, "", keys, (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met]))
+        headline,
+        all_caught(len(caught)),
+        "",
+        keys,
+        (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met])),
     )
 
 

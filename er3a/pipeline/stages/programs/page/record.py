@@ -18,7 +18,7 @@ from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, Progra
 from er3a.pipeline.stages.programs.page.played import WEIGHTS, of_line, stretches, touching
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import VERDICTS, rgb
-from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
+from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
 from er3a.robots.joint_limits import meant
@@ -27,10 +27,10 @@ from er3a.robots.robot import Robot
 AROUND = 4  # lines of the listing before and after the one that is carried out
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
 NOTE = """# {title}: programs
-{findings}
-
 **Look first** at the red stretches of the tool's path. Press play: the arm carries out one program after another, and \
 the text beside it shows the line that it is at.
+
+{findings}
 
 - line: the tool's path, green where the motion passes, amber where it wants caution, red where it fails
 - red bodies: they overlap somewhere on that motion
@@ -38,16 +38,15 @@ the text beside it shows the line that it is at.
 """
 
 
-def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> None:
+def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> float | None:
     """Write the recording of a robot's programs."""
     results, robot = stored.results, study.robot(stored.robot)
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,
         NOTE,
         runs=[_run(robot, results, program) for program in results.summary.programs],
-        curves=[Curves.of_joints(robot, "angle", "angle")],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
         points=[results.motion.xyz_mm / 1000],
@@ -59,10 +58,11 @@ def _run(robot: Robot, results: ProgramsResults, program: ProgramSummary) -> Run
     rows = results.motion.take(results.motion.program == program.name)
     listing = results.lines.text[results.lines.program == program.name].tolist()
     outcome = "passes in the model" if program.outcome == "pass" else outcome_word(program.outcome)
-    texts, events, seen = [], [], set()
+    texts, events, lines, seen = [], [], [], set()
     for line, level, t0, t1 in stretches(rows):
         found = of_line(program, line)
         texts.append((t0, _document(program, line, listing, found, level)))
+        lines.append((t0, f"{program.name}:{line}", WEIGHTS[level]))
         bodies = touching(program, line)
         for each in [] if line in seen and not bodies else found:
             text = f"{program.name}:{line}: {say(each.finding)}"
@@ -76,9 +76,9 @@ def _run(robot: Robot, results: ProgramsResults, program: ProgramSummary) -> Run
         events=events,
         outcome=f"{outcome} ({LANGUAGES[program.language].title})",
         status=WEIGHTS[program.outcome],
-        curves={"angle": rows.q_deg} if len(rows) else {},
         shapes=[(0.0, "way", _way(rows))],
         texts=texts,
+        lanes={"line": lines},
     )
 
 

@@ -36,10 +36,10 @@ OF_THE_ARM = (
     Curves("smallest", "Smallest singular value", ["smallest singular value"], [REFERENCE]),
 )
 NOTE = """# {title}: paths
-{findings}
-
 **Look first** at the velocity curves where an event is listed: a spike is the price of passing near a singular pose. \
 Press play: the arm runs along one path after another.
+
+{findings}
 
 - line: the path, dark where the arm is badly conditioned, grey where it can't go
 - trail behind the tool: magenta as programmed, blue on a second run, repaired
@@ -49,17 +49,16 @@ Press play: the arm runs along one path after another.
 """
 
 
-def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> None:
+def record(study: Study, stored: Stored[TrajectoryResults], output: Path) -> float | None:
     """Write the trajectory recording of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,
         NOTE,
         runs=[run for path in results.summary.paths for run in runs_of_path(robot, results, path)],
         curves=(
-            Curves.of_joints(robot, "angle", "angle"),
             Curves.of_joints(robot, "velocity", "velocity", "/s"),
             *OF_THE_ARM,
         ),
@@ -104,7 +103,6 @@ def _moved(robot: Robot, rows: MotionRows) -> dict[str, Any]:
     """A run's times, joint values and curves."""
     condition = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
     curves = {
-        "angle": rows.q_deg,
         "velocity": rows.q_deg_s,
         "condition": np.log10(condition)[:, None],
         "smallest": rows.smallest_singular_value[:, None],

@@ -126,9 +126,7 @@ def evidence_section(
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
     read = _read_pose(robot, evidence)
-    by_pose = tr(
-        "{measurement}; or, when the directions are checked, read the pose on the pendant, as below the other table"
-    )
+    by_pose = tr("{measurement}; or read a pose on the pendant (“What would settle it”)")
     proposals = {
         proposal.entry: by_pose.format(measurement=say(proposal))
         if read and is_one(proposal, "measure_angle")

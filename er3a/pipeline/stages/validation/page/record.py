@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,9 @@ import rerun as rr
 import er3a.pipeline.messages.validation  # noqa: F401
 from er3a.finding import fact
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.player.motions import Weight
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.validation.model import Axes, KeyPoses, ValidationResults, model_of
+from er3a.pipeline.stages.validation.model import Axes, Checks, KeyPoses, ValidationResults, model_of
 from er3a.pipeline.stages.validation.page.validation_figures import corrected_robot
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
@@ -25,28 +27,30 @@ HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 MIN_ARROW_MM = 0.1
 NOTE = """# Key poses of {title}
 
+{look}
 {text}
 """
+LOOK = """**Look first** at the largest deviation of each pose, a curve below: go to the pose where it is highest. The
+arm stops {hold:g} s at each pose that a reference names; press play, or drag the time.
+"""
 POSES = """
-**Look first** at the curve below, the largest deviation at each pose: go to the pose where it is highest. The arm stops
-{hold:g} s at each pose that a reference names; press play, or drag the time.
-
 - blue ball: the model's flange or wrist centre
 - orange ball (magenta for claims): where the reference has it; the arrow is the deviation (from 0.1 mm on)
 - orange lines at the start: joint axes that references state, in the zero pose
 """
 
 
-def record(study: Study, stored: Stored[ValidationResults], output: Path) -> None:
+def record(study: Study, stored: Stored[ValidationResults], output: Path) -> float | None:
     """Write the recording from the stage's results."""
     results, robot = stored.results, model_of(study, stored.robot)
     axes, poses = results.axes, results.key_poses
     stations = _stations(robot, poses)
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
-    note = NOTE.format(title=escaped(robot.title), text=say(results.summary.verdict.finding))
-    note += POSES.format(hold=HOLD_S) if len(poses) else ""
+    look = LOOK.format(hold=HOLD_S) if len(poses) else ""
+    note = NOTE.format(title=escaped(robot.title), look=look, text=say(results.summary.verdict.finding))
+    note += POSES if len(poses) else ""
     note += f"- see-through arm: the same table, {fault}\n" if corrected is not None else ""
-    runs = [_run(robot, rows, following) for rows, following in zip(stations, [*stations[1:], None])]
+    runs = [_run(robot, rows, following, results.checks) for rows, following in pairwise([*stations, None]) if rows]
     shown = Recorded(
         robot=robot,
         name=stored.robot,
@@ -59,8 +63,9 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> Non
         points=[points / 1000 for points in (poses.point_mm, poses.model_point_mm, axes.point_mm)],
         ghost=corrected,
         now="This pose",
+        verdict=results.summary.verdict.status,
     )
-    write_recording(shown, output)
+    return write_recording(shown, output)
 
 
 def _stations(robot: Robot, poses: KeyPoses) -> list[KeyPoses]:
@@ -89,7 +94,7 @@ def _stations(robot: Robot, poses: KeyPoses) -> list[KeyPoses]:
     return [poses.take((rounded == pose).all(axis=1)) for pose in dict.fromkeys(map(tuple, rounded))]
 
 
-def _run(robot: Robot, rows: KeyPoses, following: KeyPoses | None) -> Run:
+def _run(robot: Robot, rows: KeyPoses, following: KeyPoses | None, checks: Checks) -> Run:
     """Hold at a station, then move smoothly to the next."""
     share = np.linspace(0, 1, STEPS + 1) if following is not None else np.empty(0)
     here, then = (meant(robot, each.q_deg[0]) for each in (rows, following or rows))
@@ -104,10 +109,23 @@ def _run(robot: Robot, rows: KeyPoses, following: KeyPoses | None) -> Run:
         t=times,
         q=np.concatenate([[here, here], here + (share**2 * (3 - 2 * share))[:, None] * (then - here)]),
         outcome=f"off by {worst[0, 0]:.2f} mm at most" if stated.any() else "",
+        status=_status(rows, checks),
         curves={"deviation": worst} if stated.any() else {},
         shapes=_points(rows, 0.012 * size_of(robot)),
         pause_s=0.0,
     )
+
+
+def _status(rows: KeyPoses, checks: Checks) -> Weight:
+    """Whether points are farther off than lengths of the same reference set may be, and documents say so."""
+    of_lengths = checks.unit == "mm"
+    allowed = [
+        np.nanmax(checks.tolerance[of_lengths & (checks.reference_set == each)], initial=0.0)
+        for each in rows.reference_set
+    ]
+    too_far = rows.deviation_mm > np.array(allowed)
+    by_documents = np.isin(rows.grade, [*AUTHORITATIVE_GRADES])
+    return "fail" if (too_far & by_documents).any() else "caution" if too_far.any() else "plain"
 
 
 def _text(rows: KeyPoses, pose: str) -> str:

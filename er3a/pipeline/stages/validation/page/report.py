@@ -40,7 +40,7 @@ from er3a.pipeline.viewing.page import (
     render_stage,
     text_address,
 )
-from er3a.pipeline.viewing.side_view import seen_arm, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, seen_arm, side_view
 from er3a.references.subjects import SegmentInclination
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
@@ -293,7 +293,7 @@ def _both_arms(robot: Robot, other: Robot | None) -> Markup:
     arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "wrong" if differs else "right")]
     if other is not None and differs:
         arms.append(seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
-    return side_view(arms)
+    return side_view(arms, least_wide=UPRIGHT)
 
 
 def _answer(summary: model.ValidationSummary, instead: str | None, has_entries: bool) -> Answer:

@@ -13,7 +13,6 @@ from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, SampleRows, VisionResults, VisionSummary
 from er3a.pipeline.study import Study
@@ -25,15 +24,16 @@ from er3a.robots.robot import Robot
 
 MAGNIFIED = 50.0
 SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
+IMAGE = 1280  # pixels, the width of the picture that the viewer shows through the camera
 STEP_S, SAMPLE_S = 0.1, 0.5
 NOTE = f"""# Camera, samples and grasps
-{{findings}}
-
 **Look first** at the arrows at the boards: they lead from where the arm puts the board to where the camera sees it,
 {MAGNIFIED:g} times as long as they are. Short arrows in all directions are noise; long ones, or all in one direction,
 are a fault.
 
-- orange pyramid: what the camera sees
+{{findings}}
+
+- orange pyramid: what the camera sees; a double click on it looks through
 - blue dots and arrows: samples that the calibration rests on; magenta: samples left out
 - boxes with axes: the objects, as the camera places them; red balls around them: 95 % of errors
 - grey solids: the scene
@@ -42,7 +42,7 @@ Press play: the arm goes through the samples, then to each object that it can gr
 """
 
 
-def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
+def record(study: Study, stored: Stored[VisionResults], output: Path) -> float | None:
     """Write the recording from the stage's results."""
     results, summary, robot = stored.results, stored.results.summary, study.robot(stored.robot)
     size = size_of(robot)
@@ -54,7 +54,7 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> None:
     for each in summary.objects:
         shapes |= _object(each, size)
     fixed = found is not None and found.setup == "eye_to_hand"
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,
@@ -83,12 +83,15 @@ def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str,
     if not fixed:
         camera = forward(robot.without_tool(), meant(robot, np.array(task.picture_deg or task.home_deg))) @ camera
     half = np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
-    far = SIGHT * task.view.farthest_mm / 1000
-    corners = [[sx * half[0] * far, sy * half[1] * far, far] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    strips = [[[0, 0, 0], corner] for corner in corners] + [[*corners, corners[0]]]
     place = rr.Transform3D(translation=camera[:3, 3], mat3x3=camera[:3, :3])
-    lines = rr.LineStrips3D(strips, radii=0.002, colors=rgb(REFERENCE), labels=[pose_words(found.setup)[0]])
-    shapes: dict[str, Logged] = {"camera": [place, lines]}
+    sight = rr.Pinhole(
+        resolution=IMAGE * half / half[0],
+        focal_length=float(IMAGE / 2 / half[0]),
+        camera_xyz=rr.ViewCoordinates.RDF,
+        image_plane_distance=SIGHT * task.view.farthest_mm / 1000,
+        color=rgb(REFERENCE),
+    )
+    shapes: dict[str, Logged] = {"camera": [place, sight]}
     if not fixed:
         board = _placed(found.board)
         place = rr.Transform3D(translation=board[:3, 3], mat3x3=board[:3, :3])

@@ -21,7 +21,7 @@ from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -158,7 +158,7 @@ def _answer(summary: model.VisionSummary) -> Answer:
     headline = tr("{count} of {due} objects are graspable.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
-    rest = tr("All {count} faulty ones are caught.", count=len(caught)) if caught else ""
+    rest = all_caught(len(caught))
     keys = []
     if found:
         half = max(found.hand_eye.half_width_mm)

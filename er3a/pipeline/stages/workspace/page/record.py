@@ -12,6 +12,7 @@ from matplotlib import colormaps
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
+from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
@@ -22,29 +23,45 @@ _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 
 
 NOTE = """# Workspace of {title}
+**Look first** at the voids inside the hull, below: enclosed ones in magenta, open pockets in orange.
+
 {findings}
 
-**Look first** at the voids inside the hull, right: enclosed ones in magenta, open pockets in orange.
-
-- left: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: near-singular.
+- magenta box: where the tray goes, on its stand; grey solids: the scene
+- above: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: near-singular.
   `/workspace/cloud/near` is the rest"""
 
 
-def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
+def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> float | None:
     """Write the workspace recording of a robot from its results."""
     results = stored.results
-    record_stage(
+    return record_stage(
         study,
         stored,
         output,
         NOTE,
         views={
-            "Cloud, near half cut away": ["cloud/far/**"],
+            "Cloud, near half cut away": ["cloud/far/**", "tray/**", "scene/**"],
             "Voids inside the hull": ["hull/**", "voids/**"],
         },
-        shapes=_cloud(results) | _hull(results) | dict(_voids(results)),
+        scene=study.scene(stored.robot, "capability"),
+        shapes=_cloud(results) | _hull(results) | dict(_voids(results)) | _tray(placing_of(study, stored)),
         points=[results.cloud.point_m],
     )
+
+
+def _tray(placing: Placing | None) -> dict[str, Logged]:
+    """The tray where it is best, and the stand that it needs."""
+    if placing is None:
+        return {}
+    tray = placing.tray
+    corners = [(tray.low, tray.high)]
+    if tray.floor is not None:
+        corners.append((np.array([*tray.low[:2], tray.floor]), np.array([*tray.high[:2], tray.low[2]])))
+    middles, sizes = ([f(low, high) for low, high in corners] for f in (lambda a, b: (a + b) / 2, lambda a, b: b - a))
+    colours = [(*rgb(HIGHLIGHT), 160), (*rgb(MUTED), 90)][: len(corners)]
+    box = rr.Boxes3D(centers=middles, sizes=sizes, colors=colours, labels=["tray", "stand"][: len(corners)])
+    return {"tray": box}
 
 
 def _cloud(results: model.WorkspaceResults) -> dict[str, Logged]:

@@ -31,7 +31,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     robot, results = study.robot(stored.robot), stored.results
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     contradicted = stored.rests_on.get("validation") == "fail"
-    placing = None if contradicted else placing_of(study, stored)
+    placing = placing_of(study, stored)
     context = _context(robot, results, scene, placing, _payload(study, stored) if placing else "")
     if contradicted:
         context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))

@@ -363,7 +363,12 @@ def _is_sound(grasped: ObjectResult, results: VisionResults) -> bool:
 
 
 def placing_of(study: Study, stored: Stored[Any]) -> Placing | None:
-    """Where to put the tray, from the results that lie beside those of a stage; None if that is nowhere."""
+    """Where to put the tray, from the results that lie beside those of a stage.
+
+    None if that is nowhere, or evidence contradicts the table that all rests on.
+    """
+    if stored.rests_on.get("validation") == "fail":
+        return None
     beside = stored.folder.parent if stored.folder else None
     names = [name for name in ("workspace", "inverse", *MOTIONS) if beside and is_computed(beside / name)]
     found = {name: read_stage(beside / name, STAGES[name]) for name in names} if beside else {}
