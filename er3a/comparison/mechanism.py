@@ -313,8 +313,8 @@ def _scores(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, with_en
         inside = slice(first, last + 1)
         gap = np.abs((other.d[inside] - senses[:, inside] * one.d[inside]) @ along)
         total += (gap > tolerances.length) + 1e-4 * gap
-    beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
-    turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
+    sides = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
+    turned = senses * other.offset + np.where(sides[:, :-1] * sides[:, 1:] < 0, np.pi, 0.0) - one.offset
     moved = np.abs(wrap_to_pi(turned)) > tolerances.angle
     moved[:, [0, -1]] = False
     fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry

@@ -1,8 +1,8 @@
 """The slips of a pen that explain best why two tables differ: the fewest win.
 
 What two tables differ by after their best match is counted (:attr:`er3a.comparison.mechanism.Match.cost`): entries of
-geometry, zeros, directions, base and flange. A slip that is undone has a price and lowers this count: a wrong sign
-beside other zeros, for one, otherwise shows as a base turned over and joints that turn the other way. All slips of a
+geometry, zeros, directions, base and flange. A slip that is undone has a price and lowers this count. A wrong sign, for
+one, shows as a base turned over and joints that turn the other way where other zeros differ, too. All slips of a
 declared list are tried, alone and up to ``TOGETHER``, first by a lower bound of what they leave; the best of these are
 matched in full.
 

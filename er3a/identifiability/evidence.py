@@ -154,8 +154,8 @@ def _of_stated(robot: Robot, corrected: Robot, found: Evidence) -> Evidence:
     tool, values = ToolRange(corrected, tables_of(corrected)), dict[str, float]()
     for name, entry in by_name.items():
         own, right = entry.value(robot), entry.value(corrected)
-        apart = own - right if entry.unit != "deg" or entry.column in LIMITS else (own - right + 180) % 360 - 180
-        if abs(apart) > CORRECTED:
+        gap = own - right if entry.unit != "deg" or entry.column in LIMITS else (own - right + 180) % 360 - 180
+        if abs(gap) > CORRECTED:
             values[name] = own
 
     def stated(each: EntryEvidence) -> EntryEvidence:

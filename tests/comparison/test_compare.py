@@ -654,7 +654,7 @@ def changed(robot: er3a.Robot, column: str, values: dict[int, float]) -> er3a.Ro
 
 
 @pytest.mark.parametrize("offsets", [{}, {2: 0.0}, {2: 0.0, 6: 0.0}, {3: np.pi / 2, 5: 0.7}])
-def test_a_length_of_the_wrong_sign_is_named_beside_zeros_that_differ(offsets):
+def test_a_length_of_the_wrong_sign_is_named_where_zeros_differ_too(offsets):
     right = irb120()
     wrong = changed(changed(right, "a", {3: -0.07}), "offset", offsets)
     found = er3a.compare(wrong, right)
@@ -688,7 +688,7 @@ def test_two_exchanged_rows_are_one_slip():
     assert found.directions.same
 
 
-def test_the_other_convention_is_named_beside_another_wrong_entry():
+def test_the_other_convention_is_named_with_another_wrong_entry():
     right = irb120()
     found = er3a.compare(changed(right, "d", {4: 0.332}).replace(convention="modified"), right)
     assert [each.code for each in found.causes] == ["other_convention"]
