@@ -13,7 +13,7 @@ from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_tab
 from er3a.files.printed_table import table_text
 from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
 from er3a.formats.urdf import import_urdf, urdf_groups, urdf_table
-from er3a.formats.urdf_tree import plain_urdf
+from er3a.formats.urdf_tree import plain_urdf, tip_after
 from er3a.robots.robot import Convention, Robot, robot_name
 
 READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
@@ -39,6 +39,7 @@ def read_arm(
     angle_unit: AngleUnit | None = None,
     base: str | None = None,
     tip: str | None = None,
+    joints: int | None = None,
     xacro: Sequence[str] = (),
     as_printed: bool = False,
     columns: Sequence[str] = (),
@@ -56,6 +57,7 @@ def read_arm(
     columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
     whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
+    joints : of a URDF without a ``tip``, the one chain with so many joints is taken, if there is one
 
     Raises
     ------
@@ -70,6 +72,8 @@ def read_arm(
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in URDF:
         with plain_urdf(path, xacro) as plain:
+            if tip is None and joints is not None:
+                tip = tip_after(plain, base, joints)
             if whole:
                 imported = import_urdf(plain, base=base, tip=tip)
                 return ReadArm(imported.robot.replace(name=robot_name(path)), False, imported.notes)
@@ -81,7 +85,7 @@ def read_arm(
     return ReadArm(robot, True, beside=beside_the_table(robot))
 
 
-def read_arms(folder: Path, **options: str | bool | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
+def read_arms(folder: Path, **options: str | int | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
     """All arms in a folder, by file name, and the files that were not read, with the reason.
 
     Raises

@@ -307,6 +307,38 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
 
 
+def tip_after(path: Path, base: str | None, joints: int) -> str | None:
+    """Where the one chain ends that has a number of joints.
+
+    Parameters
+    ----------
+    path : of a URDF
+    base : the link that it begins at; None for the root
+    joints : that move on their own
+
+    Returns
+    -------
+    tip : the end of the fixed joints after the last; None where no chain has so many joints, or several have
+
+    Raises
+    ------
+    InputError
+        as for :func:`tree_of`
+    """
+    tree = tree_of(path, False)
+    todo, found = [(base or _root(tree), 0)], list[str]()
+    while todo:
+        link, count = todo.pop()
+        for joint in tree.onward(link)[0] or tree.by_parent.get(link, []):
+            reached = count + joint.independent
+            if joint.independent and reached == joints:
+                found.append(tree._tail(joint.child))
+            elif reached < joints:
+                todo.append((joint.child, reached))
+    ending = [link for link in found if not tree.onward(link)[1]] if len(found) > 1 else found
+    return ending[0] if len(ending) == 1 else None
+
+
 def _controller_base(tree: Tree, base: str) -> Iterator[str]:
     """A note on the link in which the controller gives poses, if it stands otherwise than the link that was taken.
 

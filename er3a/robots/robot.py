@@ -355,6 +355,20 @@ class Robot(ByValue, Displayed):
         """(4, 4), from the table's last frame through the flange to the tool."""
         return self.tool if self.flange_is_last_frame else self.flange @ self.tool
 
+    def states(self, group: str) -> bool:
+        """Whether the robot's file, or what it was read from, gives a group of values.
+
+        Parameters
+        ----------
+        group : as in ``sources``
+
+        Returns
+        -------
+        states : False if a reader assumed it: its grade is ``inferred``
+        """
+        source = self.sources.get(group)
+        return source is None or source.grade != "inferred"
+
     def replace(self, **changes: Any) -> Robot:
         """A copy with other values for some attributes.
 
