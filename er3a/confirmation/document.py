@@ -60,8 +60,8 @@ def _rows(robot: Robot, base: Reals, pairs: Pairs, found: Confirmation, name: st
     turns = pairs.turns.get(found.form)
     xyz = pairs.xyz / found.factor
     q_deg = shown(robot, pairs.q)
-    digits = HALF * shown(robot, np.broadcast_to(pairs.q_digit, robot.joints))
-    off_mm, off_deg = MM * HALF * float(pairs.xyz_digit.max()), float(np.degrees(HALF * pairs.turn_digit))
+    digits, off_mm = HALF * shown(robot, pairs.q_digit), MM * HALF * pairs.xyz_digit.max(axis=1)
+    off_deg = np.degrees(HALF * np.asarray(pairs.turn_digit)[:, 0])
     rows = []
     for k in chosen:
         R = np.eye(3) if turns is None else turns[k]
@@ -74,11 +74,11 @@ def _rows(robot: Robot, base: Reals, pairs: Pairs, found: Confirmation, name: st
             point="flange",
             pose=tuple(q_deg[k].tolist()),
             xyz_mm=tuple((MM * flange[:3, 3]).tolist()),
-            uncertainty_mm=off_mm,
+            uncertainty_mm=float(off_mm[k]),
             orientation=None if turns is None else _matrix(flange),
-            uncertainty_deg=off_deg,
+            uncertainty_deg=float(off_deg[k]),
             origin=name,
-            rounding=tuple(digits.tolist()),
+            rounding=tuple(digits[k].tolist()),
         )
         rows.append(row)
     return rows

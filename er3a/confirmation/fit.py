@@ -316,10 +316,13 @@ class Fitter:
         robot, pairs = self.robot, self.pairs
         moving = [Entry("d" if slides else "offset", k + 1) for k, slides in enumerate(robot.sliding)]
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = (robot.direction[:, None] * coupling) @ explanation.joints.factors * (pairs.q_digit * ROUNDED)
+        by_joint = (robot.direction[:, None] * coupling) @ explanation.joints.factors
         J = np.einsum("kni,kj->nij", self.twists(explanation, entries, state, u, moving), by_joint)
-        own = np.r_[pairs.xyz_digit * abs(explanation.factor), np.full(3, pairs.turn_digit)] * ROUNDED
-        covariance = J @ transposed(J) + np.diag(own**2 + FLOOR**2)
+        J *= (pairs.q_digit * ROUNDED)[:, None]
+        turned = np.repeat(pairs.turn_digit, 3, axis=1)
+        own = np.concatenate([pairs.xyz_digit * abs(explanation.factor), turned], axis=1) * ROUNDED
+        covariance = J @ transposed(J)
+        covariance[:, range(6), range(6)] += own**2 + FLOOR**2
         size = self.dimensions
         found: Reals = np.zeros((len(u), 6, 6))
         found[:, :size, :size] = np.linalg.inv(np.linalg.cholesky(covariance[:, :size, :size])) / self.widen

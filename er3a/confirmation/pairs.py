@@ -24,7 +24,8 @@ class Pairs(ByValue):
     turns : rotations (N, 3, 3) by the form of orientation that they were read in, the likeliest first; empty if the
         controller's orientations are not given
     named : how many of these forms the columns' names allow; the others are tried because names can be wrong
-    q_digit, xyz_digit : (n,) and (3,), rad or m, the last digits; turn_digit : of orientations, rad
+    q_digit, xyz_digit : (N, n) and (N, 3), rad or m, the last digit of each number, or what broadcasts to it
+    turn_digit : (N, 1), of orientations, rad, or what broadcasts to it
     lines : (N,), where each pose was read
     notes : what was assumed, as (code, word)
     """
@@ -35,9 +36,14 @@ class Pairs(ByValue):
     named: int = 1
     q_digit: Reals = field(default_factory=lambda: np.zeros(1))
     xyz_digit: Reals = field(default_factory=lambda: np.zeros(3))
-    turn_digit: float = 0.0
+    turn_digit: Reals | float = 0.0
     lines: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     notes: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        sizes = {"q_digit": self.q.shape, "xyz_digit": self.xyz.shape, "turn_digit": (len(self.q), 1)}
+        for name, size in sizes.items():
+            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), size))
 
     def __len__(self) -> int:
         return len(self.q)
@@ -55,4 +61,5 @@ class Pairs(ByValue):
         rows : numbers from 0, or (N,) bool
         """
         turns = {form: R[rows] for form, R in self.turns.items()}
-        return replace(self, q=self.q[rows], xyz=self.xyz[rows], turns=turns, lines=self.lines[rows])
+        digits = {name: getattr(self, name)[rows] for name in ("q_digit", "xyz_digit", "turn_digit")}
+        return replace(self, q=self.q[rows], xyz=self.xyz[rows], turns=turns, lines=self.lines[rows], **digits)

@@ -23,6 +23,8 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import Robot
 
 MAX_BYTES, MAX_ROWS = 50_000_000, 10_000
+MOST_TYPED = 6  # decimals; a program that writes more leaves out zeros at the end, if it does, of no weight
+LARGEST = 1e9  # of a number, in any unit
 REST = 1e-3  # rad/s or m/s, below which a joint rests
 STILL, RECORDING = 1e-4, 200  # rad or m between two rows of a stop; rows of a recording
 NEAR_TURN, LONGEST_M = 6.4, 20.0
@@ -187,16 +189,25 @@ class _Columns:
                         self.path, where, f"'{field[:40]}' is not a number", "Correct it, or remove the row"
                     )
                 found[n, k] = float(field)
+                if abs(found[n, k]) > LARGEST:
+                    where = f"line {self.lines[n]}, column {name}"
+                    raise InputError(self.path, where, f"'{field[:40]}' is out of all measure", "Correct it")
         return found
 
-    def digit(self, names: Sequence[str]) -> float:
-        """The last digit of columns that belong together: of the field with most decimals."""
-        most = -LARGEST_DIGITS
-        for row in self.rows:
-            for name in names:
+    def digits(self, names: Sequence[str]) -> Reals:
+        """The last digit (N, k) of each field of columns, none finer than half of them have.
+
+        A zero more at the end of a field says nothing of the others, and little of its own. Of numbers that no person
+        types all have the digits of the longest.
+        """
+        decimals = np.empty((len(self.rows), len(names)))
+        for n, row in enumerate(self.rows):
+            for k, name in enumerate(names):
                 mantissa, _, exponent = row[self.places[name]].lower().partition("e")
-                most = max(most, len(mantissa.partition(".")[2]) - int(exponent or 0))
-        return 10.0**-most
+                decimals[n, k] = len(mantissa.partition(".")[2]) - int(exponent or 0)
+        usual = decimals.max() if decimals.max() > MOST_TYPED else np.floor(np.median(decimals))
+        decimals = np.full_like(decimals, usual) if usual > MOST_TYPED else np.minimum(decimals, usual)
+        return np.asarray(10.0 ** -np.clip(decimals, -LARGEST_DIGITS, LARGEST_DIGITS))
 
     def together(self, names: Sequence[str]) -> list[str] | None:
         """Columns with these names, behind one beginning; the shortest."""
@@ -260,8 +271,8 @@ def _pairs(
         notes.append(("positions_taken_in", unit))
     turns, named, turn_digit = _turns(path, columns, turn)
     found = Pairs(
-        q * size, xyz * SIZES[unit], turns, named, columns.digit(joints) * size,
-        np.full(3, columns.digit(place) * SIZES[unit]), turn_digit, np.array(columns.lines), tuple(notes),
+        q * size, xyz * SIZES[unit], turns, named, columns.digits(joints) * size,
+        columns.digits(place) * SIZES[unit], turn_digit, np.array(columns.lines), tuple(notes),
     )  # fmt: skip
     return _at_rest(path, found, columns, families)
 
@@ -302,11 +313,11 @@ def _pose_columns(
     return place, []
 
 
-def _turns(path: Path, columns: _Columns, names: Sequence[str]) -> tuple[dict[str, Reals], int, float]:
-    """Rotations by form, how many forms the names allow, and the last digit in rad."""
+def _turns(path: Path, columns: _Columns, names: Sequence[str]) -> tuple[dict[str, Reals], int, Reals | float]:
+    """Rotations by form, how many forms the names allow, and the last digits (N, 1) in rad."""
     if not names:
         return {}, 1, 0.0
-    values, digit = columns.values(names), columns.digit(names)
+    values, digit = columns.values(names), columns.digits(names).max(axis=1, keepdims=True)
     if len(names) == 9:
         R = values.reshape(-1, 3, 3)
         return {"matrix": _nearest(path, columns, R), "transposed": _nearest(path, columns, R.mT)}, 1, 1.5 * digit

@@ -171,7 +171,8 @@ def test_natural_files_are_read_alike(name, tmp_path):
     assert np.allclose(pairs.xyz[0] * 1000, NUMBERS[6:9])
     expected = Rotation.from_euler("ZYX", NUMBERS[9:], degrees=True).as_matrix()
     assert np.allclose(pairs.turns[pairs.forms[0]][0], expected)
-    assert np.allclose([*pairs.xyz_digit, *np.degrees(pairs.q_digit) / 1000], 1e-5)
+    assert np.median(pairs.xyz_digit) == pytest.approx(1e-5)
+    assert np.median(np.degrees(pairs.q_digit)) == pytest.approx(0.01)
 
 
 def test_rapid_and_a_recording_are_read(tmp_path):
@@ -266,14 +267,36 @@ def test_each_cause_alone_is_named_first(name):
         assert controller_cases.judged(search(Fitter(robot, made.pairs)), made.truth) == "first", causes
 
 
-def written(folder: Path, T: np.ndarray, q: np.ndarray) -> Path:
-    """A table as typed from a pendant to 0.01."""
+def written(folder: Path, T: np.ndarray, q: np.ndarray, decimals: np.ndarray | int = 2) -> Path:
+    """A table as typed from a pendant, each number to its own ``decimals``, (N, 12) or what broadcasts to it."""
     rows = np.concatenate([q / DEG, T[:, :3, 3] * 1000], axis=1)
     rows = np.concatenate([rows, Rotation.from_matrix(T[:, :3, :3]).as_euler("xyz", degrees=True)], axis=1)
     heading = ",".join([*(f"J{k}" for k in range(1, 7)), *"XYZWPR"])
     path = folder / "pendant.csv"
-    path.write_text("\n".join([heading, *(",".join(f"{value:.2f}" for value in row) for row in rows)]))
+    to = np.broadcast_to(decimals, rows.shape)
+    lines = [",".join(f"{value:.{k}f}" for value, k in zip(row, own)) for row, own in zip(rows, to)]
+    path.write_text("\n".join([heading, *lines]))
     return path
+
+
+MIXED = {
+    "rows in turns": 1 + np.arange(12)[:, None] % 2,
+    "two rows with more": np.where(np.arange(12)[:, None] < 2, 2, 1),
+    "last row with fewer": np.where(np.arange(12)[:, None] < 11, 2, 1),
+    "three columns with more": np.where(np.arange(12) < 3, 2, 1),
+    "one field with more": np.where(np.arange(144).reshape(12, 12) == 40, 3, 1),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("decimals", MIXED.values(), ids=list(MIXED))
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_digits_that_differ_refuse_no_right_arm(tmp_path, decimals, seed):
+    q = poses(seed)
+    path = written(tmp_path, shown(q), q, decimals)
+    assert er3a.confirm(arm(), path, angles="rpy").verdict == "agrees"
+    longer = arm(a=np.array(A) * [1, 1.02, 1, 1, 1, 1])
+    assert er3a.confirm(longer, path, angles="rpy").verdict != "agrees"
 
 
 def test_a_controller_s_poses_are_a_document_about_the_arm(tmp_path):
