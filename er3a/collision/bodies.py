@@ -37,6 +37,7 @@ class Bodies:
     Attributes
     ----------
     scene : as given; None for none
+    all : all bodies, those that move first, as the layout has them
     capsules : all bodies that move; each has its ``link``
     first : (P,) int, number of the pair's body; of two links the one nearer to the base
     second : (P,) int, number of the other link's body, -1 for a solid
@@ -86,8 +87,8 @@ class Bodies:
                 number[id(body)] = len(bodies)
                 bodies.append(body)
         pairs = [(number[id(a)], number[id(b)]) for a, b in (*watched, *around)]
-        self._all, count = tuple(bodies), len(bodies) - len(solids)
-        self.capsules = self._all[:count]
+        self.all, count = tuple(bodies), len(bodies) - len(solids)
+        self.capsules = self.all[:count]
         self.layout = layout_of(robot, bodies, pairs, joined)
         self.joined = self.layout.joined
         self.first = self.layout.first
@@ -252,7 +253,7 @@ class Bodies:
         along = near[1] - near[0]
         length = float(np.linalg.norm(along))
         unit = along / length if length > 0 else np.zeros(3)
-        sizes = [self._all[b].radius for b in (self.layout.first[pair], self.layout.second[pair])]
+        sizes = [self.all[b].radius for b in (self.layout.first[pair], self.layout.second[pair])]
         points: Reals = np.array([near[0] + sizes[0] * unit, near[1] - sizes[1] * unit])
         return points
 
@@ -272,7 +273,7 @@ class Bodies:
 
     def _depth(self, q: Reals, pair: int) -> float:
         """How deep two bodies whose cores overlap do, m; of surfaces at least that."""
-        bodies = [self._all[b] for b in (self.layout.first[pair], self.layout.second[pair])]
+        bodies = [self.all[b] for b in (self.layout.first[pair], self.layout.second[pair])]
         T = np.concatenate([link_frames(self.robot, q), np.eye(4)[None]])
         if any(body.tree for body in bodies):
             return max(depth_inside(a, b, np.linalg.inv(T[a.link]) @ T[b.link]) for a, b in (bodies, bodies[::-1]))

@@ -39,6 +39,9 @@ WORLD = -1  # link of the bodies around the arm
 DEEPEST = 512  # boxes that wait at one time
 FREE, MEETS, UNDECIDED = 0, 1, 2
 NARROW = 1e-6  # m; a box in which bodies move by less is not halved
+BEYOND = (
+    1e-3  # m; surfaces are measured so much farther than settles a box, as what is returned may be no more than that
+)
 
 
 class Layout(NamedTuple):
@@ -409,7 +412,7 @@ def _box_state(
         moved = _pair_motion(layout, T, w, k, half)
         if _apart(middle, reach, first[k], second[k]) > moved:
             continue
-        distance, inside = pair_distance(layout, T, w, first[k], second[k], room, near, moved)
+        distance, inside = pair_distance(layout, T, w, first[k], second[k], room, near, moved + BEYOND)
         if inside or distance < 0:
             return MEETS, moved
         if distance <= moved:
@@ -506,7 +509,7 @@ def search_boxes(
         place(layout, (low + high) / 2, T, w, middle)
         looked += 1
         moved = _pair_motion(layout, T, w, k, half)
-        distance, inside = pair_distance(layout, T, w, a, b, room, near, moved + goal)
+        distance, inside = pair_distance(layout, T, w, a, b, room, near, moved + goal + BEYOND)
         distance *= sign
         if distance < 0 or (inside and not overlapping):
             for j in range(n):

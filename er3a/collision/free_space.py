@@ -198,12 +198,13 @@ def _try_poses(
     witness[cells[free][::-1]] = q[free][::-1]
 
 
-def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours: int) -> Flags:
+def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, more: Reals, neighbours: int) -> Flags:
     """Which clear places can be joined to home by moves that are proven free [2]_.
 
     Parameters
     ----------
     home : (n,), rad or m, an arm free of overlap
+    more : (k, n), rad or m, arms free of overlap through which moves may go, too, such as those at targets
     neighbours : moves to how many of the nearest arms are tried from each
 
     Returns
@@ -211,7 +212,7 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours:
     joined : (M,) bool; nothing is proven of the others
     """
     clear = np.flatnonzero(places.clear)
-    q = np.concatenate([home[None], places.witness[clear]])
+    q = np.concatenate([home[None], places.witness[clear], more])
     reach = np.maximum(bodies.robot.upper - bodies.robot.lower, 1e-9)
     away, near = scipy.spatial.cKDTree(q / reach).query(q / reach, k=min(neighbours + 1, len(q)))
     first = np.repeat(np.arange(len(q)), near.shape[1] - 1)
@@ -230,5 +231,5 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, neighbours:
         if a != b and free_between(bodies.layout, q[first[edge]], q[second[edge]], DEPTH, LOOKS)[0] == FREE:
             group[max(a, b)] = min(a, b)
     joined = np.zeros(len(places.clear), bool)
-    joined[clear] = [root(node) == root(0) for node in range(1, len(q))]
+    joined[clear] = [root(node) == root(0) for node in range(1, len(clear) + 1)]
     return joined

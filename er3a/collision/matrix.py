@@ -278,15 +278,13 @@ def _measured(
 def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, float, int]:
     """Of two bodies that overlap in none of the joint vectors drawn: what boxes prove (:func:`search_boxes`), where
     they meet (n,), a bound of their distance (m), and how many boxes were looked at."""
-    layout, least = layout_of(robot, pair, [(0, 1)]), 0.0
+    layout, box, at = layout_of(robot, pair, [(0, 1)]), np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
     if any(body.tree for body in pair):
-        boxes = min(boxes, BOXES_OF_SURFACES)
-    else:
-        q, found, none = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1)), np.empty(TRIED)
-        measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
-        least = float(found.min())
-    box, at = np.stack([robot.lower, robot.upper]), np.empty(robot.joints)
-    outcome, looked, bound = search_boxes(layout, 0, box, (False, GOAL * least), boxes // 2, at)
+        outcome, looked, bound = search_boxes(layout, 0, box, (False, 0.0), BOXES_OF_SURFACES, at)
+        return outcome, at, bound, looked
+    q, found, none = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1)), np.empty(TRIED)
+    measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
+    outcome, looked, bound = search_boxes(layout, 0, box, (False, GOAL * float(found.min())), boxes // 2, at)
     if outcome not in (FREE, MEETS):
         outcome, more, bound = search_boxes(layout, 0, box, (False, 0.0), boxes, at)
         looked += more

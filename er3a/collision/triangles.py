@@ -30,6 +30,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
+FIRST = 14  # corners, with which the choice of few of a hull begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
 
@@ -132,7 +133,8 @@ def _shells(faces: Integers, points: int) -> tuple[Integers, Integers]:
 def outer_corners(points: Reals, most: int = 64) -> Reals:
     """Few points whose hull holds all points.
 
-    The outermost corners of the hull, moved away from their middle until all others are inside.
+    Corners of the hull, one by one the one that is farthest outside of those before, moved away from their middle until
+    all others are inside.
 
     Parameters
     ----------
@@ -149,14 +151,18 @@ def outer_corners(points: Reals, most: int = 64) -> Reals:
         corners = points[scipy.spatial.ConvexHull(points).vertices]
         if len(corners) <= most:
             return np.asarray(corners)
-        kept = corners[np.unique((fibonacci_sphere(most) @ corners.T).argmax(axis=1))]
-        hull = scipy.spatial.ConvexHull(kept)
+        first = np.unique((fibonacci_sphere(FIRST) @ corners.T).argmax(axis=1))
+        hull = scipy.spatial.ConvexHull(corners[first], incremental=True)
+        while len(hull.points) < most:
+            away = (hull.equations[:, :3] @ corners.T + hull.equations[:, 3:]).max(axis=0)
+            hull.add_points(corners[[away.argmax()]])
     except scipy.spatial.QhullError:
         return box
-    middle, faces = kept.mean(axis=0), hull.equations
+    kept, faces = hull.points[hull.vertices], hull.equations
+    middle = kept.mean(axis=0)
     depth = -(faces[:, :3] @ middle + faces[:, 3])
     beyond = ((faces[:, :3] @ (corners - middle).T) / depth[:, None]).max()
-    grown: Reals = middle + (1 + 1e-9) * beyond * (kept[hull.vertices] - middle)
+    grown: Reals = middle + (1 + 1e-9) * beyond * (kept - middle)
     return grown
 
 
@@ -263,6 +269,21 @@ def _apart_along(points: Reals, count: int, axis: Reals) -> float:
         else:
             first = min(first, along)
     return float(first - last)
+
+
+@inner_kernel
+def _beyond_plane(points: Reals, count: int, by: float) -> bool:
+    """Whether the points from row 3 on, ``count`` of them, are all beyond the plane of the first three, on one side, by
+    so much (m)."""
+    ux, uy, uz = points[1, 0] - points[0, 0], points[1, 1] - points[0, 1], points[1, 2] - points[0, 2]
+    vx, vy, vz = points[2, 0] - points[0, 0], points[2, 1] - points[0, 1], points[2, 2] - points[0, 2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    least = by * np.sqrt(x * x + y * y + z * z)
+    low, high = np.inf, -np.inf
+    for p in range(3, 3 + count):
+        away = x * (points[p, 0] - points[0, 0]) + y * (points[p, 1] - points[0, 1]) + z * (points[p, 2] - points[0, 2])
+        low, high = min(low, away), max(high, away)
+    return bool(low > least or high < -least)
 
 
 @inner_kernel
@@ -405,7 +426,7 @@ def surface_distance(  # noqa: C901, PLR0912
                 if not convex:
                     c = trees.corner[trees.child[m, 1], k]
                     points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
-        if _apart_along(points, count, axis) - disc >= best:
+        if _apart_along(points, count, axis) - disc >= best or _beyond_plane(points, count, disc + best):
             continue
         distance = cores_distance(points, (0, 3, 3, 3 + count), 0.0, disc, room, close)
         if distance < best:

@@ -21,7 +21,9 @@ import scipy
 from er3a.by_value import ByValue
 from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
+from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
+from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -29,27 +31,19 @@ from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
 VerdictWord = Literal["equal", "in_doubt", "same_arm", "other_arm", "other_joint_count"]
-CauseCode = Literal[
-    "a_and_d_swapped",
-    "other_convention",
-    "all_alphas_negated",
-    "one_alpha_negated",
-    "one_length_negated",
-    "offsets_negated",
-    "unit",
-    "angle_unit",
-    "scale",
-    "rows_shifted",
-]
 Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
 SAMPLES = 192  # joint vectors at which the two flanges are compared before the worst is sought
 SWEEPS = 2
+ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, and poses of the first
+ALIGN_POWER = 4  # of a distance, by which it counts
+TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
 HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
+NEAR_ROW = 1e-5  # m, and of a turn, by which base or flange may miss what a row of the table can hold
 ROUNDED = 4  # decimals of mm and deg in a corrected table
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # mm
 RAD = math.degrees(1.0)
@@ -76,7 +70,6 @@ NEAR_GON = 0.02  # of the sum of all angles of a column
 SAME_FACTOR = 1e-6
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
-SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
 
 
 @dataclass(frozen=True)
@@ -96,18 +89,6 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Cause:
-    """What made the entries differ: ``side`` is whose table has it (None: either's), ``amount`` by how many rows or
-    times."""
-
-    code: CauseCode
-    side: Literal["a", "b"] | None
-    entries: tuple[str, ...] = ()
-    amount: float | None = None
-    unit: str = ""
-
-
-@dataclass(frozen=True)
 class UnitLayer:
     """``causes``: columns in another unit than they were read in, and what takes their values to it."""
 
@@ -117,13 +98,15 @@ class UnitLayer:
 
 @dataclass(frozen=True)
 class GeometryLayer:
-    """``worst_mm`` and ``worst_deg``: the largest gap of all ``invariants`` that were compared."""
+    """``worst_mm`` and ``worst_deg``: the largest gap of all ``invariants`` that were compared.
+
+    ``differences``: entries that differ; those that a cause about whole rows or columns explains are not among them.
+    """
 
     same: bool
     worst_mm: float
     worst_deg: float
     differences: tuple[Difference, ...] = ()
-    causes: tuple[Cause, ...] = ()
     invariants: int = 0
     unexplained_mm: float = 0.0
 
@@ -131,21 +114,18 @@ class GeometryLayer:
 @dataclass(frozen=True)
 class ZeroLayer:
     """By row what B's offset is more than A's (deg; mm of joints that slide); 0 of the first and the last row, whose
-    zeros can't be distinguished from base and flange. ``causes`` : the one mistake in A that explains them all."""
+    zeros can't be distinguished from base and flange."""
 
     same: bool
     offsets_deg: tuple[float, ...]
-    causes: tuple[Cause, ...] = ()
 
 
 @dataclass(frozen=True)
 class DirectionLayer:
-    """Numbers of the rows that B moves the other way. ``causes`` : the one mistake in A's table that does so, where no
-    zero differs."""
+    """Numbers of the rows that B moves the other way."""
 
     same: bool
     reversed: tuple[int, ...]
-    causes: tuple[Cause, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -158,11 +138,15 @@ class Turn:
 
 @dataclass(frozen=True)
 class PlacementLayer:
-    """Pose of B's base (flange) in A's base (flange) frame once joint axes agree."""
+    """Pose of B's base (flange) in A's base (flange) frame once joint axes agree.
+
+    ``entries``: those of A's first (last) row that can hold all of it.
+    """
 
     same: bool
     shift_mm: tuple[float, float, float]
     turn: Turn
+    entries: tuple[Difference, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -193,6 +177,17 @@ class CouplingLayer:
 
 
 @dataclass(frozen=True, eq=False)
+class Alignment(ByValue):
+    """What brings B's flange nearest to A's: ``base`` and ``flange`` (4, 4), m, as in :class:`mechanism.Match`, and of
+    each row ``zeros`` (m,), rad or m, and ``signs`` (m,), +1 or -1."""
+
+    base: Reals
+    flange: Reals
+    zeros: Reals
+    signs: Reals
+
+
+@dataclass(frozen=True, eq=False)
 class Comparison(ByValue):
     """What :func:`compare` found.
 
@@ -200,18 +195,22 @@ class Comparison(ByValue):
     ----------
     verdict : equal; same_arm (geometry agrees, something else differs); other_arm; other_joint_count; in_doubt (equal
         numbers, of files whose units are in doubt: er3a.compare, which is given SI, never says it)
-    units, geometry, zero, directions, base, flange, coupling, limits, speeds : the layers; None if joints can't be
-        paired
-    as_printed_mm : largest distance between the two flanges over the joint ranges, for equal joint values
-    aligned_mm : the same, after base, flange, zeros and directions of B are aligned with A's
+    causes : the fewest slips of a pen that explain what differs
+    units, geometry, zero, directions, base, flange, coupling, limits, speeds : the layers, of what differs once causes
+        are undone; None if joints can't be paired
+    as_printed_mm : largest distance between the two flanges over the joint ranges that was found, for equal joint
+        values; the true one may be larger
+    aligned_mm : the same, after base, flange, zeros and directions of B are aligned with A's as well as can be
     as_printed_deg, aligned_deg : the same of the angle between the flanges' orientations
     corrected : A's table with all differing entries corrected, so that it describes B's arm; None if the numbers of
         joints differ
+    alignment : what aligns B with A so
     not_examined : what the verdict leaves out: limits and speeds that are not all given, and groups of the robot file
         that both arms give and no layer compares
     """
 
     verdict: VerdictWord
+    causes: tuple[Cause, ...] = ()
     units: UnitLayer | None = None
     geometry: GeometryLayer | None = None
     zero: ZeroLayer | None = None
@@ -227,6 +226,7 @@ class Comparison(ByValue):
     aligned_deg: float | None = None
     joints: tuple[int, int] = (0, 0)
     corrected: Robot | None = None
+    alignment: Alignment | None = None
     not_examined: tuple[Uncompared, ...] = ()
 
     @property
@@ -261,8 +261,8 @@ def compare(
     return _compared(robot_a, robot_b, mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg)))
 
 
-def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explain: bool = True) -> Comparison:
-    """What :func:`compare` finds; without causes if they are not to be explained."""
+def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explained: bool = True) -> Comparison:
+    """What :func:`compare` finds; without causes and the best alignment if they are not asked for."""
     counts = robot_a.joints, robot_b.joints
     beside = given_by_both(beside_the_table(robot_a), beside_the_table(robot_b))
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
@@ -274,31 +274,29 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     size = max(float(np.abs(robot.a).sum() + np.abs(robot.d).sum()) for robot in printed)
     if 0 < size < TINY:
         tolerances = replace(tolerances, length=min(tolerances.length, FINEST * size))
-    slips = _unit_slips(robot_a, robot_b, tolerances, explain)
+    slips = _unit_slips(robot_a, robot_b, tolerances, explained)
     robot_a, robot_b = in_units(robot_a, slips, "a"), in_units(robot_b, slips, "b")
-    a, b = mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b)
-    found = mechanism.match(a, b, tolerances)
-    same = not found.differences and found.unexplained == 0
-    causes = () if same or not explain else tuple(_causes(robot_a, robot_b, found, tolerances))
-    differences = tuple(_named(robot_a, each) for each in found.differences)
+    plain = mechanism.match(mechanism.mechanism_of(robot_a), mechanism.mechanism_of(robot_b), tolerances)
+    same = not plain.differences and plain.unexplained == 0
+    in_right_units = robot_a, robot_b
+    known = explain(robot_a, robot_b, plain, tolerances) if explained else Explained((), robot_a, robot_b, plain)
+    robot_a, robot_b, found = known.one, known.other, known.found
     geometry = GeometryLayer(
         same,
-        1000 * found.worst_length,
-        math.degrees(found.worst_angle),
-        differences,
-        causes,
-        found.invariants,
+        1000 * plain.worst_length,
+        math.degrees(plain.worst_angle),
+        () if same else (*_undone(in_right_units[0], known), *(_named(robot_a, each) for each in found.differences)),
+        plain.invariants,
         1000 * found.unexplained,
     )
-    moved = tolerances.exceeded(found.zeros, a.sliding)
-    scale = np.where(a.sliding, 1000.0, np.degrees(1.0))
-    turned = same and explain and bool(moved.any() or found.reverses.any())
-    mistakes = tuple(_causes_of_zeros(robot_a, b, found, tolerances)) if turned else ()
-    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()), mistakes if moved.any() else ())
+    moved = tolerances.exceeded(found.zeros, robot_a.sliding)
+    scale = np.where(robot_a.sliding, 1000.0, np.degrees(1.0))
+    zero = ZeroLayer(not moved.any(), tuple((scale * found.zeros).tolist()))
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
     reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
-    directions = DirectionLayer(not reversed_rows, reversed_rows, () if moved.any() else mistakes)
-    base, flange = (_placement(T, tolerances) for T in (found.base, found.flange))
+    directions = DirectionLayer(not reversed_rows, reversed_rows)
+    at_ends = _ends_as_entries(robot_a, _rows_at_ends(robot_a, found, tolerances))
+    base, flange = (_placement(T, entries, tolerances) for T, entries in zip((found.base, found.flange), at_ends))
     joint_zeros = _joint_zeros(robot_a, found)
     layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
         "limits": lambda one, other: _limits(one, other, reverses, joint_zeros, tolerances),
@@ -314,14 +312,15 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     limits, speeds = ranges["limits"], ranges["speeds"]
     units = UnitLayer(not slips, slips)
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
-    agree = agree and units.same and limits.same is not False and speeds.same is not False
+    agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
-    off = _distances(printed, (robot_a, robot_b), found)
+    alignment = _alignment(plain) if same or not explained else _best_alignment(*in_right_units, plain)
+    off = _distances(printed, in_right_units, alignment, robot_a)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
-    layers = units, geometry, zero, directions, base, flange, coupled, limits, speeds
+    layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing = [name for name, layer in ranges.items() if layer.same is None]
     missing += ["limits_on_sums"] if robot_a.combined or robot_b.combined else []
-    return Comparison(verdict, *layers, *off, counts, corrected, (*missing, *beside))
+    return Comparison(verdict, *layers, *off, counts, corrected, alignment, (*missing, *beside))
 
 
 def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
@@ -383,7 +382,7 @@ def best_of(
     found : names and comparisons, all of ``others``
     """
     tolerances = mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
-    found = [(name, _compared(robot, other, tolerances, explain=False)) for name, other in others.items()]
+    found = [(name, _compared(robot, other, tolerances, explained=False)) for name, other in others.items()]
     found.sort(key=lambda pair: _misfit(pair[1]))
     best = found[0][0]
     return [(best, compare(robot, others[best], tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)), *found[1:]]
@@ -428,7 +427,17 @@ def _row_of(robot: Robot, column: str, link: int) -> int:
     return link + (robot.convention == "modified" and column in ("a", "alpha", "beta"))
 
 
-def _placement(T: Reals, tolerances: mechanism.Tolerances) -> PlacementLayer:
+def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
+    """The entries of A that slips of single numbers, or in single rows, have changed."""
+    for name in (name for cause in known.slips for name in cause.entries if cause.side == "a"):
+        column, row = name.rstrip("0123456789"), int(name.lstrip("abdefhlopst")) - 1
+        scale, unit = (RAD, "deg") if column in ("alpha", "offset") else (1000.0, "mm")
+        own, meant = (round(scale * float(getattr(each, column)[row]), ROUNDED) + 0.0 for each in (robot, known.one))
+        if own != meant:
+            yield Difference(name, own, meant, meant - own, unit)
+
+
+def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
     angle, R = mechanism.turn_of(T), T[:3, :3]
     if angle > HALF_TURN:
@@ -438,7 +447,8 @@ def _placement(T: Reals, tolerances: mechanism.Tolerances) -> PlacementLayer:
         axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     size = float(np.linalg.norm(axis))
     u, v, w = (axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])).tolist()
-    return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), Turn(math.degrees(angle), (u, v, w)))
+    turn = Turn(math.degrees(angle), (u, v, w))
+    return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
 
 
 # Joints ---------------------------------------------------------------------------------------------------------------
@@ -467,14 +477,8 @@ def _joint_zeros(robot: Robot, found: mechanism.Match) -> Reals:
     return np.asarray(np.linalg.lstsq(robot.coupling, rows, rcond=None)[0])
 
 
-def _known(robot: Robot, group: str) -> bool:
-    """Whether a robot's file gives a group, or a reader assumed it."""
-    source = robot.sources.get(group)
-    return source is None or source.grade != "inferred"
-
-
 def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: mechanism.Tolerances) -> RangeLayer:
-    if not (_known(robot_a, "limits") and _known(robot_b, "limits")):
+    if not (robot_a.states("limits") and robot_b.states("limits")):
         return RangeLayer(None)
     lower, upper = _limits_of_b(robot_b, signs, zeros)
     found = []
@@ -507,7 +511,7 @@ def _limits_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals
 
 def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
     both = np.isfinite(robot_a.speed) & np.isfinite(robot_b.speed)
-    if not both.any() or not (_known(robot_a, "speeds") and _known(robot_b, "speeds")):
+    if not both.any() or not (robot_a.states("speeds") and robot_b.states("speeds")):
         return RangeLayer(None)
     found = []
     for j in np.flatnonzero(both).tolist():
@@ -522,23 +526,67 @@ def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:
 # How far the flange is off --------------------------------------------------------------------------------------------
 
 
+def _alignment(found: mechanism.Match) -> Alignment:
+    return Alignment(found.base, found.flange, found.zeros, np.where(found.reverses, -1.0, 1.0))
+
+
+def _aligned_flanges(a: Robot, b: Robot, by: Alignment, u: Reals) -> Reals:
+    """B's flanges (k, 4, 4) brought to A's, at values (k, m) of A's rows."""
+    moved = forward_of_rows(b, by.signs * (u - by.zeros * a.direction))
+    flanges: Reals = by.base @ moved @ np.linalg.inv(by.flange)
+    return flanges
+
+
+def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> Alignment:
+    """From where the match has them, base, flange and zeros moved until B's flange is nearest to A's at the worst pose.
+
+    Least sum of a high power of distances, after each round also at the pose found to be the worst by then.
+    """
+    a, b, start = robot_a.without_tool(), robot_b.without_tool(), _alignment(found)
+    q = np.random.default_rng(0).uniform(a.lower, a.upper, (ALIGN_POSES, a.joints))
+
+    def moved(x: Reals) -> Alignment:
+        ends = (translation(*own[:3]) @ rot_z(own[3]) @ rot_y(own[4]) @ rot_x(own[5]) for own in (x[:6], x[6:12]))
+        base, flange = ends
+        return Alignment(base @ start.base, start.flange @ flange, start.zeros + x[12:], start.signs)
+
+    def flanges(x: Reals, poses: Reals) -> tuple[Reals, Reals]:
+        u = row_values(a, poses)
+        return forward_of_rows(a, u), _aligned_flanges(a, b, moved(x), u)
+
+    def off(x: Reals, poses: Reals, scale: float) -> Reals:
+        one, other = flanges(x, poses)
+        gap = (other - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0) / max(scale, NO_OFFSET)
+        size = np.linalg.norm(gap.reshape(len(poses), 12), axis=1)
+        return np.asarray((gap.reshape(len(poses), 12) * size[:, None] ** ALIGN_POWER).ravel())
+
+    best = x = np.zeros(12 + a.rows)
+    least, worst = worst_pose(_shift, lambda poses: flanges(best, poses), a)
+    for _ in range(ALIGNED if least > NO_OFFSET else 0):
+        q = np.concatenate([q, worst[None]])
+        x = scipy.optimize.leastsq(off, x, (q, least), maxfev=ALIGN_TRIES, full_output=True)[0]
+        now = x
+        gap, worst = worst_pose(_shift, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
+        if gap < least:
+            best, least = x, gap
+    return moved(best)
+
+
 def _distances(
-    as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], found: mechanism.Match
+    as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], alignment: Alignment, ranges: Robot
 ) -> tuple[float, float, float, float]:
     """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
     (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
-    signs, zeros = np.where(found.reverses, -1.0, 1.0), found.zeros * a.direction
-    behind = np.linalg.inv(found.flange)
 
     def printed(q: Reals) -> tuple[Reals, Reals]:
         return forward(first, q), forward(second, q)
 
     def aligned(q: Reals) -> tuple[Reals, Reals]:
         u = row_values(a, q)
-        return forward_of_rows(a, u), found.base @ forward_of_rows(b, signs * (u - zeros)) @ behind
+        return forward_of_rows(a, u), _aligned_flanges(a, b, alignment, u)
 
-    mm = [1000 * largest_gap(_shift, flanges, a) for flanges in (printed, aligned)]
-    deg = [math.degrees(largest_gap(_turn, flanges, a)) for flanges in (printed, aligned)]
+    mm = [1000 * largest_gap(_shift, flanges, ranges) for flanges in (printed, aligned)]
+    deg = [math.degrees(largest_gap(_turn, flanges, ranges)) for flanges in (printed, aligned)]
     return mm[0], mm[1], deg[0], deg[1]
 
 
@@ -567,6 +615,22 @@ def largest_gap(
     -------
     largest : no bound: the true one may be a little larger
     """
+    return worst_pose(off, flanges, robot)[0]
+
+
+def worst_pose(
+    off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
+) -> tuple[float, Reals]:
+    """The same, with the joint values at which it was found.
+
+    Parameters
+    ----------
+    off, flanges, robot : as of :func:`largest_gap`
+
+    Returns
+    -------
+    largest, q : and (n,), rad or m
+    """
     generator = np.random.default_rng(0)
     q = generator.uniform(robot.lower, robot.upper, (SAMPLES, robot.joints))
     values = off(*flanges(q))
@@ -579,7 +643,7 @@ def largest_gap(
             gaps = off(*flanges(tried))
             best = tried[int(gaps.argmax())]
             values = np.append(values, gaps.max())
-    return float(values.max())
+    return float(values.max()), best
 
 
 # Units ----------------------------------------------------------------------------------------------------------------
@@ -766,115 +830,6 @@ def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> It
         yield _of_unit("unit", None, columns, factor)
 
 
-# Causes ---------------------------------------------------------------------------------------------------------------
-
-
-def _causes(
-    robot_a: Robot, robot_b: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances
-) -> Iterator[Cause]:
-    """What explains all differences at once; else which single entries have the wrong sign."""
-    several = len(found.differences) > 1 or found.unexplained > 0
-    for side, table, other in (("a", robot_a, robot_b), ("b", robot_b, robot_a)) if several else ():
-        there = mechanism.mechanism_of(other, ends=False)
-        for code, amount, shifted, columns in _repaired(table, other):
-            if mechanism.is_same_mechanism(mechanism.mechanism_of(table, ends=False, **columns), there, tolerances):
-                yield Cause(code, side, (), amount, shifted)  # type: ignore[arg-type]
-                return
-    for each in found.differences:
-        negated = each.column == "alpha" and abs(wrap_to_pi(np.array(each.one + each.other))) < tolerances.angle
-        if negated and abs(each.one) > tolerances.angle:
-            yield Cause("one_alpha_negated", "a", (_name(robot_a, each.column, each.link),))
-    swapped = _swapped_in_a_row(robot_a, robot_b, tolerances) if len(found.differences) > 1 else ()
-    if swapped:
-        yield Cause("a_and_d_swapped", "a", swapped)
-
-
-def _repaired(robot: Robot, other: Robot) -> Iterator[tuple[CauseCode, float | None, str, Columns]]:
-    """The columns of a table with one mistake undone throughout; how many rows or times, of which columns."""
-    a, d, alpha = robot.a, robot.d, robot.alpha
-    yield "a_and_d_swapped", None, "", {"a": d, "d": a}
-    yield "other_convention", None, "", {"convention": "modified" if robot.convention == "standard" else "standard"}
-    yield "all_alphas_negated", None, "", {"alpha": -alpha}
-    arms = [mechanism.mechanism_of(each, ends=False) for each in (robot, other)]
-    for ratio in _ratios(*arms):
-        yield "scale", ratio, "", {"a": a * ratio, "d": d * ratio}
-    for rows, names in itertools.product((1, -1), SHIFTED):
-        yield "rows_shifted", float(rows), ", ".join(names), {key: np.roll(getattr(robot, key), rows) for key in names}
-
-
-def _ratios(one: mechanism.Mechanism, other: mechanism.Mechanism) -> list[float]:
-    """The factor between the longest lengths of two tables, if it is not about 1."""
-    longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in (one, other)]
-    if min(longest) <= 0:
-        return []
-    ratio = float(longest[1] / longest[0])
-    return [ratio] if abs(math.log(ratio)) > SAME_RATIO else []
-
-
-def _causes_of_zeros(
-    robot: Robot, b: mechanism.Mechanism, found: mechanism.Match, tolerances: mechanism.Tolerances
-) -> Iterator[Cause]:
-    """The one mistake in the first table that explains why zeros or directions differ, where geometry agrees."""
-    offset, zeros = robot.offset, np.where(robot.sliding, 0.0, found.zeros)
-    inner = [k for k in range(1, robot.rows - 1) if not robot.sliding[k]]
-    moved = int((np.abs(zeros) > tolerances.angle).sum())
-    if moved and not found.reverses.any():
-        mistakes: list[tuple[CauseCode, float | None, str, Reals]] = []
-        if moved > 1:  # one zero that is half a turn or a quarter off can be chosen so
-            mistakes += [("offsets_negated", None, "", -offset)]
-            mistakes += [("rows_shifted", float(rows), "offset", np.roll(offset, rows)) for rows in (1, -1)]
-        for code, amount, unit, meant in mistakes:
-            left = np.abs(wrap_to_pi(meant - offset - zeros)[inner])
-            if left.max() < tolerances.angle and np.abs(wrap_to_pi(meant)[inner]).max() > tolerances.angle:
-                yield Cause(code, "a", (), amount, unit)
-                return
-    if np.abs(np.sin(zeros)).max() > tolerances.angle:
-        return  # a turned normal turns zeros by half turns
-    ends = found.layers - int(found.reverses.sum()) - moved
-    rows = [k for k in range(robot.rows) if abs(math.sin(robot.alpha[k])) > tolerances.angle]
-    for negated in (*([k] for k in rows), rows):
-        alpha = np.where(np.isin(np.arange(robot.rows), negated), -robot.alpha, robot.alpha)
-        if mechanism.joints_agree(mechanism.mechanism_of(robot, alpha=alpha), b, tolerances, ends):
-            names = tuple(f"alpha{k + 1}" for k in negated)
-            yield Cause("one_alpha_negated", "a", names) if len(names) == 1 else Cause("all_alphas_negated", "a")
-            return
-    yield from _negated_lengths(robot, b, tolerances, ends)
-
-
-def _negated_lengths(
-    robot: Robot, b: mechanism.Mechanism, tolerances: mechanism.Tolerances, ends: int
-) -> Iterator[Cause]:
-    """The lengths of which any one has the wrong sign if base, directions and zeros are to agree.
-
-    Geometry can't tell: with a base that is turned over, the same links turn the other way.
-    """
-    entries = [
-        (column, k)
-        for column in ("a", "d")
-        for k in range(robot.rows)
-        if abs(getattr(robot, column)[k]) > tolerances.length and not (column == "d" and robot.sliding[k])
-    ]
-    for column, k in entries:
-        a, d = np.array(robot.a), np.array(robot.d)
-        changed = a if column == "a" else d
-        changed[k] = -changed[k]
-        if mechanism.joints_agree(mechanism.mechanism_of(robot, a=a, d=d), b, tolerances, ends):
-            yield Cause("one_length_negated", "a", (f"{column}{k + 1}",))
-
-
-def _swapped_in_a_row(robot: Robot, other: Robot, tolerances: mechanism.Tolerances) -> tuple[str, ...]:
-    """The row in which a and d are swapped, if that explains all."""
-    there = mechanism.mechanism_of(other, ends=False)
-    for k in range(robot.rows):
-        if abs(robot.a[k] - robot.d[k]) <= tolerances.length:
-            continue
-        a, d = np.array(robot.a), np.array(robot.d)
-        a[k], d[k] = d[k], a[k]
-        if mechanism.is_same_mechanism(mechanism.mechanism_of(robot, ends=False, a=a, d=d), there, tolerances):
-            return f"a{k + 1}", f"d{k + 1}"
-    return ()
-
-
 # The corrected table --------------------------------------------------------------------------------------------------
 
 
@@ -905,7 +860,7 @@ def _corrected(
     ends = np.sort(np.stack([signs * (end - joint_zeros) for end in (robot_a.lower, robot_a.upper)]), axis=0)
     lower, upper, continuous = ends[0], ends[1], robot_a.continuous
     combined = _sums_of_b(robot_a, signs, -signs * joint_zeros)
-    if limits.same is False or (_known(robot_b, "limits") and not _known(robot_a, "limits")):
+    if limits.same is False or (robot_b.states("limits") and not robot_a.states("limits")):
         lower, upper, continuous, combined = robot_b.lower, robot_b.upper, robot_b.continuous, robot_b.combined
     speed = np.where(np.isfinite(robot_b.speed), robot_b.speed, robot_a.speed)
     placed = {"base": base is not robot_a.base, "flange": flange is not robot_a.flange}
@@ -929,26 +884,77 @@ def _corrected(
     )
 
 
+Row = tuple[tuple[str, int, float], ...]
+"""Columns, rows (from 0) and values, m and rad, of entries that change."""
+
+
+def _rows_at_ends(robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> tuple[Row, Row]:
+    """The entries of the first row that hold what base differs by, and of the last row what flange does; none where
+    they can't: of a standard table the first row's ``Rz Tz`` and all of the last, of a modified one the reverse."""
+    before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
+    behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
+    standard, rows = robot.convention == "standard", []
+    for k, T in ((0, before), (robot.rows - 1, behind)):
+        near = rot_z(robot.offset[k]) @ translation(0, 0, robot.d[k])
+        across = translation(robot.a[k], 0, 0) @ rot_x(robot.alpha[k])
+        if (k == 0 and standard) or (k and not standard):
+            changed, whole = _of_row(T @ near if k == 0 else near @ T, 1), False
+        elif standard:
+            changed, whole = _of_row(near @ across @ T, 1), True
+        else:
+            changed, whole = _of_row(np.array(np.linalg.inv(T @ across @ near), float), -1), True
+        fits = changed is not None and not robot.beta[k] and (whole or max(map(abs, changed[2:])) < NEAR_ROW)
+        values = zip(("offset", "d", "a", "alpha"), changed if changed and fits else ())
+        rows.append(tuple(_changes(robot, k, values if whole else itertools.islice(values, 2), tolerances)))
+    return rows[0], rows[1]
+
+
+def _changes(
+    robot: Robot, row: int, values: Iterable[tuple[str, float]], tolerances: mechanism.Tolerances
+) -> Iterator[tuple[str, int, float]]:
+    for column, value in values:
+        own = float(getattr(robot, column)[row])
+        angle = column in ("offset", "alpha")
+        gap = abs(float(wrap_to_pi(np.array(value - own)))) if angle else abs(value - own)
+        if gap > (tolerances.angle if angle else tolerances.length):
+            yield column, row, _rounded(value, angle)
+
+
+def _of_row(M: Reals, sign: int) -> tuple[float, float, float, float] | None:
+    """theta, d, a, alpha (times ``sign``) with ``M = Rz(theta) Tz(d) Tx(a) Rx(alpha)``, if there are any."""
+    theta = math.atan2(M[1, 0], M[0, 0])
+    across = math.cos(theta) * M[1, 3] - math.sin(theta) * M[0, 3]
+    if max(abs(M[2, 0]), abs(across)) > NEAR_ROW:
+        return None
+    a = math.cos(theta) * M[0, 3] + math.sin(theta) * M[1, 3]
+    return sign * theta, sign * float(M[2, 3]), sign * a, sign * math.atan2(M[2, 1], M[2, 2])
+
+
+def _ends_as_entries(robot: Robot, rows: tuple[Row, Row]) -> list[tuple[Difference, ...]]:
+    found = []
+    for row in rows:
+        own = []
+        for column, k, value in row:
+            scale, unit = (RAD, "deg") if column in ("offset", "alpha") else (1000.0, "mm")
+            one, other = (round(scale * x, ROUNDED) + 0.0 for x in (float(getattr(robot, column)[k]), value))
+            own.append(Difference(f"{column}{k + 1}", one, other, other - one, unit))
+        found.append(tuple(own))
+    return found
+
+
 def _ends_corrected(
     robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances, columns: dict[str, Any]
 ) -> tuple[Reals, Reals]:
     """Base and flange as the other arm has them; where the first or last row can hold the difference, that is changed
     in ``columns`` instead."""
-    base, flange, standard, last = robot.base, robot.flange, robot.convention == "standard", robot.rows - 1
-    if not mechanism.is_identity(found.base, tolerances):
-        before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
-        if standard and _about_z(before):
-            _put_on_axis(columns, 0, before)
-        else:
-            base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)
-    if not mechanism.is_identity(found.flange, tolerances):
-        behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
-        folded = standard and bool(columns["a"][last] or np.sin(columns["alpha"][last]))
-        if not folded and _about_z(behind) and last > 0:
-            turned_over = standard and np.cos(columns["alpha"][last]) < 0
-            _put_on_axis(columns, last, np.linalg.inv(behind) if turned_over else behind)
-        else:
-            flange = _rounded_pose(robot.flange @ found.flange)
+    rows = _rows_at_ends(robot, found, tolerances)
+    base, flange = robot.base, robot.flange
+    if not (rows[0] or mechanism.is_identity(found.base, tolerances)):
+        base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)
+    if not (rows[1] or mechanism.is_identity(found.flange, tolerances)):
+        flange = _rounded_pose(robot.flange @ found.flange)
+    for column, k, value in (*rows[0], *rows[1]):
+        columns[column][k] = value
     return base, flange
 
 
@@ -974,14 +980,3 @@ def _rounded_pose(T: Reals) -> Reals:
     rounded = T.copy()
     rounded[:3, 3] = np.round(T[:3, 3] * 1000, ROUNDED) / 1000
     return rounded
-
-
-def _about_z(T: Reals) -> bool:
-    """Whether a transform only turns about z and shifts along it."""
-    return bool(np.hypot(*T[:2, 3]) < NO_OFFSET and np.hypot(*T[:2, 2]) < NO_OFFSET and T[2, 2] > 0)
-
-
-def _put_on_axis(columns: dict[str, Reals], row: int, T: Reals) -> None:
-    turn = float(np.arctan2(T[1, 0], T[0, 0]))
-    columns["d"][row] = _rounded(columns["d"][row] + T[2, 3], False)
-    columns["offset"][row] = _rounded(float(wrap_to_pi(np.array(columns["offset"][row] + turn))), True)

@@ -37,7 +37,7 @@ import numpy as np
 
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
 
 Parts = tuple[Reals, Reals, Reals]
@@ -48,7 +48,8 @@ NEARLY_PARALLEL = math.radians(3.0)  # below it a common normal can be far outsi
 ON_AXIS = 1e-9  # m
 MAX_SENSES = 6
 MAX_ENTRIES = 4
-TURNED_END = 2  # joints reversed, that a base or flange turned counts for
+TURNED_END = 2  # joints reversed, that a base or flange turned counts for; 1 if an offset at that end would do it
+ENTRY = 2.0  # of geometry that differs, in conventions that do
 HALF_TURN = rot_x(math.pi)
 MAX_HALF_TURN = math.radians(185.0)
 
@@ -266,11 +267,25 @@ def with_senses(mechanism: Mechanism, senses: Reals, normals: Reals) -> Mechanis
 # Senses of axes and normals -------------------------------------------------------------------------------------------
 
 
-def _likely_senses(
-    one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True
-) -> list[tuple[Reals, Reals]]:
-    """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ, then those
-    that turn the fewest bases, flanges, joints and zeros; only those by which none has to if they may not."""
+@dataclass(frozen=True, eq=False)
+class _Scores:
+    """What each of the S senses of axes leaves different.
+
+    ``entries`` (S,), with a fraction for how much they differ, and ``layers`` (S,), bases, flanges, joints and zeros;
+    ``either`` (links, 2): whether a normal may point either way.
+    """
+
+    senses: Reals
+    normals: Reals
+    folds: Integers
+    entries: Reals
+    layers: Reals
+    either: Flags
+    inexact: bool
+
+
+def _scores(one: Mechanism, other: Mechanism, tolerances: Tolerances, *, with_ends: bool) -> _Scores:
+    """All senses of the other arm's axes, each with the normals by which the fewest entries differ."""
     m, links = len(one.d), len(one.a)
     senses = 1.0 - 2.0 * np.array(list(itertools.product((0, 1), repeat=m)))
     near = (one.between < NEARLY_PARALLEL) & (other.between < NEARLY_PARALLEL)
@@ -298,29 +313,56 @@ def _likely_senses(
         inside = slice(first, last + 1)
         gap = np.abs((other.d[inside] - senses[:, inside] * one.d[inside]) @ along)
         total += (gap > tolerances.length) + 1e-4 * gap
-    beside = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
-    turned = senses * other.offset + np.where(beside[:, :-1] * beside[:, 1:] < 0, np.pi, 0.0) - one.offset
+    sides = np.concatenate([np.ones((len(senses), 1)), normals, np.ones((len(senses), 1))], axis=1)
+    turned = senses * other.offset + np.where(sides[:, :-1] * sides[:, 1:] < 0, np.pi, 0.0) - one.offset
     moved = np.abs(wrap_to_pi(turned)) > tolerances.angle
     moved[:, [0, -1]] = False
     fixed = one.sliding & ~np.append(parallel, False) & ~np.append(False, parallel)  # their theta is geometry
     total += (moved & fixed).sum(axis=1)
     moved &= ~one.sliding
-    extra = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1)
-    if may_differ:
-        extra = extra + _ends_turned(one, other, senses, turned, tolerances)
-    order = np.argsort(np.floor(total) + 0.01 * extra + 1e-3 * (total % 1), kind="stable")
-    most = np.floor(total).min() + 1 if may_differ or inexact.any() else 0
+    layers = (senses * other.direction * one.direction < 0).sum(axis=1) + moved.sum(axis=1)
+    if with_ends:
+        layers = layers + _ends_turned(one, other, senses, turned, tolerances)
+    return _Scores(senses, normals, folds, total, layers, either, bool(inexact.any()))
+
+
+def least_cost(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> float:
+    """About how much at least differs, without a full match: ``ENTRY`` for each entry, 1 for each convention.
+
+    Parameters
+    ----------
+    one, other : with the same number of rows, of the same kinds
+    tolerances : in m and rad
+
+    Returns
+    -------
+    cost : shifts of base and flange are not in it
+    """
+    scores = _scores(one, other, tolerances, with_ends=True)
+    return float((ENTRY * np.floor(scores.entries) + scores.layers).min())
+
+
+def _likely_senses(
+    one: Mechanism, other: Mechanism, tolerances: Tolerances, *, may_differ: bool = True
+) -> list[tuple[Reals, Reals]]:
+    """Senses (m,) and normals (m - 1,) of the other arm, those first by which the fewest entries differ, then those
+    that turn the fewest bases, flanges, joints and zeros; only those by which none has to if they may not."""
+    scores, by_link = _scores(one, other, tolerances, with_ends=may_differ), np.arange(len(one.a))
+    total = scores.entries
+    order = np.argsort(np.floor(total) + 0.01 * scores.layers + 1e-3 * (total % 1), kind="stable")
+    most = np.floor(total).min() + 1 if may_differ or scores.inexact else 0
     best = order[np.floor(total[order]) <= most][: MAX_SENSES * (4 if one.sliding.any() else 1)]
     found = []
     for k in best:
-        found.append((senses[k], normals[k]))
-        for link in np.flatnonzero(either[by_link, folds[k]]):  # a normal and a twist: the sign of one of both
-            found.append((senses[k], np.where(by_link == link, -normals[k], normals[k])))
+        senses, normals = scores.senses[k], scores.normals[k]
+        found.append((senses, normals))
+        for link in np.flatnonzero(scores.either[by_link, scores.folds[k]]):  # a normal and a twist: one of both signs
+            found.append((senses, np.where(by_link == link, -normals, normals)))
     return found
 
 
 def _ends_turned(one: Mechanism, other: Mechanism, senses: Reals, turned: Reals, tolerances: Tolerances) -> Reals:
-    """``TURNED_END`` for each of base and flange that turns, (S,), by senses (S, m) and turns (S, m) of zeros."""
+    """What base and flange that turn count for, (S,), by senses (S, m) and turns (S, m) of zeros."""
     total = np.zeros(len(senses))
     for k, own, theirs in ((0, one.base, other.base), (-1, one.flange, other.flange)):
         over, c, s = senses[:, k], np.cos(turned[:, k]), np.sin(turned[:, k])
@@ -328,7 +370,11 @@ def _ends_turned(one: Mechanism, other: Mechanism, senses: Reals, turned: Reals,
         turn[:, 0, 0], turn[:, 1, 1], turn[:, 2, 2] = c, over * c, over
         turn[:, 0, 1], turn[:, 1, 0] = (-s, over * s) if k == 0 else (-over * s, s)
         R = theirs[:3, :3] @ turn @ own[:3, :3].T if k == 0 else own[:3, :3].T @ turn @ theirs[:3, :3]
-        total += TURNED_END * (np.trace(R, axis1=1, axis2=2) < 1 + 2 * math.cos(tolerances.angle))
+        axis = own[:3, :3].T[:, 2] if k else own[:3, 2]
+        about_axis = R @ axis @ axis > math.cos(tolerances.angle)
+        total += np.where(about_axis, 1, TURNED_END) * (
+            np.trace(R, axis1=1, axis2=2) < 1 + 2 * math.cos(tolerances.angle)
+        )
     return total
 
 
@@ -421,6 +467,11 @@ class Match:
         turns = turn_of(self.base) + turn_of(self.flange)
         return entries + 2 * (self.unexplained > 0), self.layers, round(size, 6), round(turns, 4)
 
+    @property
+    def cost(self) -> float:
+        """How much differs: ``ENTRY`` for each entry, 1 for each convention."""
+        return ENTRY * self.rank[0] + self.layers
+
 
 def match(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> Match:
     """The match by which the fewest entries differ, and of those the one with the fewest differences of convention.
@@ -454,28 +505,6 @@ def is_same_mechanism(one: Mechanism, other: Mechanism, tolerances: Tolerances) 
     if _links_differ(one, other, tolerances):
         return False
     return _best_match(one, other, tolerances, may_differ=False) is not None
-
-
-def joints_agree(one: Mechanism, other: Mechanism, tolerances: Tolerances, most_layers: int) -> bool:
-    """Whether geometry, zeros and directions agree, so that equal joint values move both arms alike.
-
-    Parameters
-    ----------
-    one, other : with the same number of rows, of the same kinds
-    tolerances : in m and rad
-    most_layers : how many of base and flange may differ
-
-    Returns
-    -------
-    agree : for any of the likely senses of axes and normals
-    """
-    least = np.where(one.sliding, tolerances.length, tolerances.angle)
-    return any(
-        found.layers <= most_layers and not (np.abs(found.zeros) > least).any()
-        for senses, normals in _likely_senses(one, other, tolerances, may_differ=False)
-        if (senses * other.direction == one.direction).all()
-        for found in _settled(one, with_senses(other, senses, normals), tolerances, may_differ=False)
-    )
 
 
 def _links_differ(one: Mechanism, other: Mechanism, tolerances: Tolerances) -> bool:
@@ -583,9 +612,8 @@ def _settled_at(
     placed = _ends_placed(one, other, turned, (shift[0][0], shift[m - 1][1]))
     reverses = one.direction * other.direction < 0
     moved = tolerances.exceeded(zeros, one.sliding)
-    ends = sum(
-        int(np.linalg.norm(T[:3, 3]) > tolerances.length) + TURNED_END * (turn_of(T) > tolerances.angle) for T in placed
-    )
+    at_axes = np.linalg.inv(one.base) @ placed[0] @ one.base, one.flange @ placed[1] @ np.linalg.inv(one.flange)
+    ends = sum(_end_moved(T, tolerances) for T in at_axes)
     layers = int(reverses.sum() + moved.sum()) + ends
     lengths = [abs(each.other - each.one) for each in entries]
     return Match(
@@ -623,6 +651,13 @@ def _ends_placed(one: Mechanism, other: Mechanism, turned: Reals, shifts: tuple[
     last_turn = turned[-1] if len(turned) > 1 else 0.0
     flange = translation(*(-shifts[1])) @ rot_z(last_turn) @ other.flange
     return one.base @ np.linalg.inv(base), np.linalg.inv(one.flange) @ flange
+
+
+def _end_moved(T: Reals, tolerances: Tolerances) -> int:
+    """What a base or flange counts for that is moved by T, given in the frame of the joint there."""
+    about_axis = T[2, 2] > math.cos(tolerances.angle)
+    shifts = int(np.linalg.norm(T[:3, 3]) > tolerances.length)
+    return shifts + (1 if about_axis else TURNED_END) * int(turn_of(T) > tolerances.angle)
 
 
 def is_identity(T: Reals, tolerances: Tolerances) -> bool:

@@ -226,15 +226,13 @@ def _with_limits(given: Robot, found: Conventions, references: Sequence[Referenc
     """What was found, with limits as they are stated, or as wide as poses that are shown; those that the robot's file
     gives otherwise are faults."""
     lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
-    source = given.sources.get("limits")
-    assumed = source is not None and source.grade == "inferred"
     for joint, side in itertools.product(np.flatnonzero(~given.slides).tolist(), SIDES):
         ends = lower if side == "lower" else upper
         own = math.degrees(ends[joint])
         stated = limit_stated(joint, side, own, references)
         if stated is not None:
             ends[joint] = math.radians(stated)
-            if not assumed:
+            if given.states("limits"):
                 faults.append(fact("wrong_limit", joint=joint + 1, side=side, given_deg=own, fits_deg=stated))
     return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
 

@@ -47,6 +47,8 @@ DECIMALS = 12
 SAME_ANGLE, SAME_LENGTH = 0.1, 0.02  # rad; of the arm's length
 FEW_PASSES, MANY_PASSES, ALL_PASSES = 3, 10, 40
 MAX_PROMISING = 400
+MOST_ALIKE = 8
+NEARLY = 2.0  # half-widths, that a pair is off on average which may meet all references
 
 Difference = Callable[[Tables], Reals]
 
@@ -97,11 +99,19 @@ class Case:
     given : the table, a batch of one
     references : n, which all state a value
     difference : of tables to the references, (H, n)
+    spread : the same with at most ``MOST_ALIKE`` references of a kind, where there are more: two numbers are found with
+        few, and what is found is held against all
     """
 
     given: Tables
     references: tuple[Reference, ...]
     difference: Difference
+    spread: Case | None = None
+
+    @property
+    def thin(self) -> Case:
+        """The case to search with."""
+        return self.spread or self
 
     @cached_property
     def uncertainty(self) -> Reals:
@@ -250,11 +260,8 @@ def _alike(tables: Tables, without: Sequence[str] = ()) -> tuple[Integers, Integ
 def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
     starts = join([repair.apply(case.given) for repair in case.repairs])
     first, group = _alike(starts, ("lower", "upper"))
-    search = case.search(starts[first])
-    fits = fitting.scanned(
-        search, [(place,) for place in range(len(case.numbers))], fitting.FINE if thorough else fitting.COARSE
-    )
-    fits = _refined(search, fits, thorough)
+    places = [(place,) for place in range(len(case.numbers))]
+    fits = _searched(case, starts[first], places, fitting.FINE if thorough else fitting.COARSE, thorough)
     rows = [np.flatnonzero(fits.start == shape) for shape in group]
     start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
     every = fits[np.concatenate(rows)]
@@ -264,18 +271,21 @@ def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
 
 
 def _two_numbers(case: Case, thorough: bool = False) -> Pool:
-    search = case.search(case.given)
     pairs = list(combinations(range(len(case.numbers)), 2))
-    fits = _refined(search, fitting.scanned(search, pairs, fitting.DENSE if thorough else fitting.PAIRED), thorough)
+    fits = _searched(case, case.given, pairs, fitting.DENSE if thorough else fitting.PAIRED, thorough)
     return _fitted(case, case.given, [()], fits)
 
 
-def _refined(search: fitting.Search, fits: fitting.Fits, thorough: bool) -> fitting.Fits:
-    """Fits from a scan brought to their bottoms: of the most promising, or of all."""
-    if thorough:
-        return fitting.meet(search, fitting.descend(search, fits, ALL_PASSES))
-    fits = fitting.descend(search, fits, FEW_PASSES)
+def _searched(
+    case: Case, starts: Tables, places: Sequence[tuple[int, ...]], grid: fitting.ScanGrid, thorough: bool
+) -> fitting.Fits:
+    """Fits from a scan brought to their bottoms, the most promising of them held against all references."""
+    thin, search = case.thin.search(starts), case.search(starts)
+    fits = fitting.descend(thin, fitting.scanned(thin, places, grid), ALL_PASSES if thorough else FEW_PASSES)
     best = np.sort(np.argsort(fits.squares, kind="stable")[:MAX_PROMISING])
+    if thorough:
+        best = np.flatnonzero(fits.squares <= fitting.CURVED * NEARLY**2 * fits.left.shape[1])
+    fits = search.at(fits.start, fits.which, fits.amounts)
     return fitting.meet(search, fits.with_rows(best, fitting.descend(search, fits[best], MANY_PASSES)))
 
 
@@ -425,7 +435,21 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
     def difference(tables: Tables) -> Reals:
         return predict_tables(tables, robot, list(first.values()))[:, column] - expected
 
-    return Case(tables_of(robot), stated, difference)
+    few = _spread(stated)
+    return Case(tables_of(robot), stated, difference, case_of(robot, few) if len(few) < len(stated) else None)
+
+
+def _spread(stated: tuple[Reference, ...]) -> tuple[Reference, ...]:
+    """At most ``MOST_ALIKE`` references of a kind and coordinate, spread evenly over all."""
+    kinds = dict[tuple[object, ...], list[int]]()
+    for i, each in enumerate(stated):
+        quantity = each.quantity
+        kinds.setdefault((type(quantity), getattr(quantity, "coordinate", None)), []).append(i)
+    kept = [
+        own[k * len(own) // MOST_ALIKE] for own in kinds.values() for k in range(MOST_ALIKE) if len(own) > MOST_ALIKE
+    ]
+    kept += [i for own in kinds.values() if len(own) <= MOST_ALIKE for i in own]
+    return tuple(stated[i] for i in sorted(kept))
 
 
 def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:

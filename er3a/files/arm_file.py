@@ -11,9 +11,9 @@ from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.printed_table import table_text
-from er3a.files.robot_library import holds_table, load_robot, robot_of
-from er3a.formats.urdf import urdf_groups, urdf_table
-from er3a.formats.urdf_tree import plain_urdf
+from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
+from er3a.formats.urdf import import_urdf, urdf_groups, urdf_table
+from er3a.formats.urdf_tree import plain_urdf, tip_after
 from er3a.robots.robot import Convention, Robot, robot_name
 
 READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
@@ -39,9 +39,11 @@ def read_arm(
     angle_unit: AngleUnit | None = None,
     base: str | None = None,
     tip: str | None = None,
+    joints: int | None = None,
     xacro: Sequence[str] = (),
     as_printed: bool = False,
     columns: Sequence[str] = (),
+    whole: bool = False,
 ) -> ReadArm:
     """Read an arm's table, limits and speeds.
 
@@ -53,7 +55,9 @@ def read_arm(
     length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
     as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
     columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
+    joints : of a URDF without a ``tip``, the one chain with so many joints is taken, if there is one
 
     Raises
     ------
@@ -66,8 +70,13 @@ def read_arm(
         content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
         robot = robot_of(content)
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
-    if path.suffix in (".urdf", ".xacro", ".xml"):
+    if path.suffix in URDF:
         with plain_urdf(path, xacro) as plain:
+            if tip is None and joints is not None:
+                tip = tip_after(plain, base, joints)
+            if whole:
+                imported = import_urdf(plain, base=base, tip=tip)
+                return ReadArm(imported.robot.replace(name=robot_name(path)), False, imported.notes)
             robot, assumed = urdf_table(plain, base=base, tip=tip)
             beside = urdf_groups(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
@@ -76,7 +85,7 @@ def read_arm(
     return ReadArm(robot, True, beside=beside_the_table(robot))
 
 
-def read_arms(folder: Path, **options: str | bool | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
+def read_arms(folder: Path, **options: str | int | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
     """All arms in a folder, by file name, and the files that were not read, with the reason.
 
     Raises

@@ -245,7 +245,9 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
         documents |= own.documents.by_name
     if references is None:
         check_robot_origins(robot, documents)
-    return evidence_of(robot, stated, Documents(documents), tolerance)
+    best = diagnosis.diagnosis_of(robot, stated).hypotheses[:1]
+    right = [each.corrected for each in best if each.explains]
+    return evidence_of(robot, stated, Documents(documents), tolerance, corrected=right)
 
 
 def calibrate(

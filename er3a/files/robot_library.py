@@ -21,6 +21,8 @@ from er3a.files.pieces_file import load_pieces
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
+from er3a.formats.urdf import import_urdf
+from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.numerics.arrays import Reals
@@ -37,12 +39,14 @@ from er3a.robots.robot import (
     to_standard,
 )
 
+URDF = (".urdf", ".xacro", ".xml")
 ROBOTS = ROOT / "data" / "robots"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
-    """Load a robot by the name of a file in data/robots or of a known arm, or by a path of a robot file or D-H table.
+    """Load a robot by the name of a file in data/robots or of a known arm, or by a path of a robot file, D-H table,
+    URDF or xacro.
 
     A name is looked up below the working folder first, then among the robots that come with er3a, then in the catalogue
     of arms (``er3a arms``). Other files than robot files (.yaml) hold a D-H table, as :func:`read_table` takes it.
@@ -55,6 +59,12 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     """
     if holds_table(name_or_path):
         return read_table(name_or_path, convention)
+    if Path(name_or_path).suffix in URDF:
+        with plain_urdf(Path(name_or_path)) as plain:
+            imported = import_urdf(plain)
+        if imported.notes:
+            warnings.warn(f"{name_or_path}: {'; '.join(imported.notes)}", InputWarning, stacklevel=2)
+        return imported.robot.replace(name=robot_name(Path(name_or_path)))
     if known := known_arm(str(name_or_path)):
         return known.robot
     return robot_of(read_robot(robot_path(name_or_path)))
@@ -99,7 +109,7 @@ def holds_table(source: str | Path) -> bool:
     path = Path(text)
     if path.suffix in (".yaml", ".yml"):
         return path.is_file() and re.search(r"(?m)^[\"']?kind[\"']?\s*:", read_text(path)) is None
-    return path.suffix not in ("", ".urdf", ".xacro", ".xml") or (not path.suffix and path.is_file())
+    return path.suffix not in ("", *URDF) or (not path.suffix and path.is_file())
 
 
 def read_table(

@@ -30,6 +30,7 @@ from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import Er3aError, InputError
 from er3a.formats import urdf_tree
 from er3a.formats.mesh_file import link_mesh
+from er3a.formats.placeholders import without_placeholders
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
@@ -42,6 +43,7 @@ NO_SLIDE_M, MAX_SLID_M = 1.0, 100.0
 MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
+WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -74,7 +76,7 @@ def import_urdf(
     *,
     base: str | None = None,
     tip: str | None = None,
-    snap: bool = False,
+    snap: bool = True,
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
 
@@ -89,7 +91,8 @@ def import_urdf(
     ----------
     path : a URDF, or expanded xacro
     base, tip : links at which the arm begins and ends; None if the file has only one arm
-    snap : round angles within 1e-4 rad of a multiple of 90 deg to that multiple, with a note for each
+    snap : take angles that the file shows rounded (1.571, 0.785) as the multiples of 45 deg that they stand for; one
+        note says how many, and by how much that moves the flange
 
     Raises
     ------
@@ -101,29 +104,33 @@ def import_urdf(
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
     q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
-    given = _chain_forward(found.joints, q @ coupling.T + shift)
+    values = q @ coupling.T + shift
+    given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
     shapes, shaped, lost = link_shapes(path, root, robot, placed)
     visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
+    robot, empty = without_placeholders(robot.replace(**shapes, visuals=visuals, masses=masses))
     stated = {
         "envelopes": any(shapes.values()),
-        "inertia": bool(masses.links),
-        "drives": masses.drives is not None,
+        "inertia": bool(robot.masses.links),
+        "drives": robot.masses.drives is not None,
     }
     more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
     if lost and stated["envelopes"]:
         text = f"As {path.name} states it, but for shapes of {', '.join(lost)} that could not be read"
         more["envelopes"] = Source(text, "inferred")
-    if changed:
+    if changed and stated["inertia"]:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
         more["inertia"] = Source(text, "export")
-    robot = robot.replace(**shapes, visuals=visuals, masses=masses, sources={**robot.sources, **more})
+    robot = robot.replace(sources={**robot.sources, **more})
     first, last = found.joints[0].parent, found.joints[-1].child
-    return UrdfImport(robot, (*found.notes, *notes, *shaped, *unseen, *weighed), float(misfit), names, first, last)
+    rounded = _unrounded(urdf_tree.read_chain(path, base, tip, False).joints, found.joints, values) if snap else ()
+    said = (*empty, *rounded, *found.notes, *notes, *shaped, *unseen, *weighed)
+    return UrdfImport(robot, said, float(misfit), names, first, last)
 
 
 def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
@@ -529,6 +536,21 @@ def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Real
         if joint.moves:
             T, moved = T @ _motion(joint, values[:, moved]), moved + 1
     return T
+
+
+def _unrounded(
+    written: Sequence[urdf_tree.UrdfJoint], taken: Sequence[urdf_tree.UrdfJoint], values: Reals
+) -> tuple[str, ...]:
+    """A note on joints whose angles were taken as multiples of 45 deg, if any differ by more than printed digits of a
+    double do; ``values`` (N, m) of the moving joints, at which the flange is compared."""
+    turned = [one.T_parent_joint - other.T_parent_joint for one, other in zip(written, taken)]
+    count = sum(bool(np.abs(each).max() > WRITTEN_RAD) for each in turned)
+    if not count:
+        return ()
+    away = (_chain_forward(written, values) - _chain_forward(taken, values))[:, :3, 3]
+    moved = 1000 * float(np.linalg.norm(away, axis=1).max())
+    taken_as = f"rounded angles of {count} joints were taken as multiples of 45 deg"
+    return (f"{taken_as}: that moves the flange by up to {moved:.2g} mm",)
 
 
 def _words(values: Reals) -> str:

@@ -53,7 +53,7 @@ MOST_CORNERS = 100  # of a hull, which stands in the robot file; with more a con
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
-ROUNDED_RAD = 2e-3  # an angle so near to a right one may be that, rounded: 1.57, 1.571, 3.14
+ROUNDED_RAD = 1e-3  # of angles in three digits, and of 1.57
 MAX_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
@@ -307,6 +307,38 @@ def read_chain(path: Path, base: str | None, tip: str | None, snap: bool) -> Urd
     return UrdfChain(tuple(joints), tree.by_name, (*taken, *notes))
 
 
+def tip_after(path: Path, base: str | None, joints: int) -> str | None:
+    """Where the one chain ends that has a number of joints.
+
+    Parameters
+    ----------
+    path : of a URDF
+    base : the link that it begins at; None for the root
+    joints : that move on their own
+
+    Returns
+    -------
+    tip : the end of the fixed joints after the last; None where no chain has so many joints, or several have
+
+    Raises
+    ------
+    InputError
+        as for :func:`tree_of`
+    """
+    tree = tree_of(path, False)
+    todo, found = [(base or _root(tree), 0)], list[str]()
+    while todo:
+        link, count = todo.pop()
+        for joint in tree.onward(link)[0] or tree.by_parent.get(link, []):
+            reached = count + joint.independent
+            if joint.independent and reached == joints:
+                found.append(tree._tail(joint.child))
+            elif reached < joints:
+                todo.append((joint.child, reached))
+    ending = [link for link in found if not tree.onward(link)[1]] if len(found) > 1 else found
+    return ending[0] if len(ending) == 1 else None
+
+
 def _controller_base(tree: Tree, base: str) -> Iterator[str]:
     """A note on the link in which the controller gives poses, if it stands otherwise than the link that was taken.
 
@@ -444,9 +476,8 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     origin, axis, limit, mimic = (element.find(tag) for tag in ("origin", "axis", "limit", "mimic"))
     xyz, rpy = _origin(path, where, origin)
     notes: list[str] = []
-    if snap:
-        rpy = _snapped(rpy, where, notes)
-    notes += _perhaps_rounded(rpy, where)
+    if snap and origin is not None:
+        rpy = _unrounded(rpy, origin.get("rpy", "").split())
     doubtful = bool((np.abs(xyz) > FAR_APART_M).any() or (np.abs(rpy) > WHOLE_TURN).any())
     if (np.abs(xyz) > FAR_APART_M).any():
         notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
@@ -557,24 +588,13 @@ def _origin(path: Path, where: str, origin: ElementTree.Element | None) -> tuple
     return xyz, rpy
 
 
-def _snapped(rpy: Reals, where: str, notes: list[str]) -> Reals:
-    right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
-    near = (np.abs(rpy - right) <= SNAP_RAD) & (rpy != right)
-    for given, taken in dict(zip(rpy[near].tolist(), right[near].tolist())).items():
-        notes.append(f"{where}: angle {given:.10g} rad taken as {math.degrees(taken):g} deg")
-    return np.where(near, right, rpy)
-
-
-def _perhaps_rounded(rpy: Reals, where: str) -> list[str]:
-    """Of angles that are kept but may be right ones, rounded: a note each."""
-    right = np.round(rpy / (math.pi / 2)) * (math.pi / 2)
-    off = np.abs(rpy - right)
-    near = (off > SNAP_RAD) & (off <= ROUNDED_RAD) & (right != 0)
-    return [
-        f"{where}: angle {given:.10g} rad is kept, {math.degrees(away):.2g} deg from a right angle; if one is meant, "
-        f"write {meant:.10g}: axes that meet or are parallel only nearly leave an arm without a closed form"
-        for given, meant, away in sorted(set(zip(rpy[near].tolist(), right[near].tolist(), off[near].tolist())))
-    ]
+def _unrounded(rpy: Reals, words: Sequence[str]) -> Reals:
+    """Angles (3,), rad, as they were before they were written in so many digits: those that a multiple of 45 deg
+    explains are that multiple."""
+    meant = np.round(rpy / (math.pi / 4)) * (math.pi / 4)
+    digits = [len(word.partition(".")[2]) for word in words] or [0] * 3
+    shown = np.clip(0.5 * 10.0 ** -np.array(digits), SNAP_RAD, ROUNDED_RAD)
+    return np.where(np.abs(rpy - meant) <= shown, meant, rpy)
 
 
 class LinkPlaces(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
@@ -28,6 +29,8 @@ LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9  # in an entry's unit
 OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
+LIMITS = ("lower", "upper", "speed")
+CORRECTED = 1e-6  # in an entry's unit, from which on a corrected value is another one
 WIDEST = 720.0
 FIRST_STEP, HALVINGS = 0.05, 12
 
@@ -118,20 +121,62 @@ def evidence_of(
     documents: Documents,
     tolerance: Tolerance | None = None,
     only: Sequence[str] | None = None,
+    corrected: Sequence[Robot] = (),
 ) -> Evidence:
     """What independent references settle of a robot's table.
+
+    A table that misses them is judged from a corrected one that meets them, as diagnosis or comparison gives it, with
+    its base and flange: entries that differ are contradicted, of all others it is asked what that arm leaves open.
 
     Parameters
     ----------
     references : of all sets together; official, measured, CAD and export ones count, if there are any, else claims do
     tolerance : how far the tool may be off for what counts as settled
     only : names of the requested entries; all by default
+    corrected : the robot without faults, in the ways that could be right, likeliest first
 
     Returns
     -------
     evidence : the same for the same input
     """
-    return _Judge(robot, references, documents, tolerance or Tolerance()).evidence(only)
+    judge = _Judge(robot, references, documents, tolerance or Tolerance())
+    if corrected and not judge.meets_trusted:
+        for each in corrected:
+            other = _Judge(each, references, documents, judge.tolerance)
+            if other.meets_trusted:
+                return _of_stated(robot, each, other.evidence(only))
+    return judge.evidence(only)
+
+
+def _of_stated(robot: Robot, corrected: Robot, found: Evidence) -> Evidence:
+    """Evidence of a corrected table as evidence of the one that is stated."""
+    by_name = {entry.name: entry for entry in entries_of(robot)}
+    tool, values = ToolRange(corrected, tables_of(corrected)), dict[str, float]()
+    for name, entry in by_name.items():
+        own, right = entry.value(robot), entry.value(corrected)
+        gap = own - right if entry.unit != "deg" or entry.column in LIMITS else (own - right + 180) % 360 - 180
+        if abs(gap) > CORRECTED:
+            values[name] = own
+
+    def stated(each: EntryEvidence) -> EntryEvidence:
+        if each.entry in ("base", "flange"):
+            moved = not np.allclose(getattr(robot, each.entry), getattr(corrected, each.entry), atol=ROUNDING)
+            return replace(each, status="contradicted") if moved else each
+        if each.entry not in values:
+            return each
+        entry = by_name[each.entry]
+        if entry.column in LIMITS and not robot.states("limits"):
+            return replace(each, value=values[each.entry], status="open")
+        amount = np.array([[(values[each.entry] - entry.value(corrected)) / entry.in_unit]])
+        off = tool.off(shifted(tool.table, [entry], amount)) if entry.column not in LIMITS else NOT_OFF
+        return replace(each, value=values[each.entry], status="contradicted", alternatives=(), off=off)
+
+    return replace(
+        found,
+        entries=tuple(stated(each) for each in found.entries),
+        table_meets=False,
+        other=OtherTable(tables_of(corrected), "described"),
+    )
 
 
 class _View:
@@ -230,6 +275,11 @@ class _Judge:
         self._views: dict[tuple[int, ...], _View] = {}
         self._readings: dict[Alternative, OtherReading] = {}
 
+    @property
+    def meets_trusted(self) -> bool:
+        """Whether the table meets all that trusted references ask."""
+        return self.view(self.trusted).asked.missed_by(self.table) <= MET
+
     def evidence(self, only: Sequence[str] | None = None) -> Evidence:
         """Evidence of all entries, or of some.
 
@@ -290,7 +340,7 @@ class _Judge:
     def _judged(self, entry: Entry) -> EntryEvidence:
         own = self._independent(document_of(self.robot, entry))
         relevant = self.relevant(entry, own)
-        if entry.column in ("lower", "upper", "speed"):
+        if entry.column in LIMITS:
             return self._bound(entry, relevant)
         view = self.view(own)
         judged = self._direction if entry.column == "direction" else self._number
@@ -385,6 +435,8 @@ class _Judge:
         trusted = [self.references[i] for i in every if i in self.trusted]
         if status == "consistent" and trusted and judge_limit(self.robot, entry, trusted, True)[0] == "contradicted":
             status = "contradicted"
+        if status == "contradicted" and not self.robot.states("speeds" if entry.column == "speed" else "limits"):
+            status = "open"  # er3a assumed it: nobody is contradicted
         return EntryEvidence(
             entry=entry.name,
             value=self.values[entry.name],

@@ -33,7 +33,7 @@ from er3a.files.reference_sets import (
     load_references,
 )
 from er3a.files.robot_file import RobotFile
-from er3a.files.robot_library import holds_table, load_of, load_robot
+from er3a.files.robot_library import URDF, holds_table, load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
@@ -151,6 +151,9 @@ def check_file(path: Path) -> str:
     if holds_table(path) and table_in(path):
         read_dh_table(path, "arm")
         return "a D-H table"
+    if path.suffix in URDF and path.exists():
+        load_robot(path)
+        return "a URDF"
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():
             raise InputError(path, None, "there is no such file", "Check the path")

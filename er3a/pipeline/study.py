@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
+import numpy as np
 from pydantic import Field, PrivateAttr, create_model, model_validator
 
 from er3a.collision.scene import Scene
@@ -18,12 +19,14 @@ from er3a.files.kept_files import sha256, shown_path
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
-from er3a.files.units import noted_doubts
+from er3a.files.units import JointsDeg, noted_doubts
 from er3a.files.yaml_file import InputFile, StrictModel, load, read_yaml
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import LANGUAGES, LanguageCode
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.sweeps import StageName, Sweep, Variant
+from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 STAGES = tuple(REGISTRY)
@@ -36,7 +39,8 @@ class RobotEntry(StrictModel):
     """One robot of the study; ``vision``: the file of what its camera sees, if it has one; ``confirm``: joint values
     and the poses that its controller shows for them.
 
-    ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages.
+    ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages. ``home_deg``: joint values (mm of
+    joints that slide) from which its free space is explored; else joints at 0, or a pose that is chosen.
 
     ``tool_load`` and ``payload`` are the masses on its flange, which the stage dynamics alone looks at.
 
@@ -57,6 +61,7 @@ class RobotEntry(StrictModel):
     tool_load: LoadFields | None = None
     payload: LoadFields | None = None
     expect: dict[Text, ExpectedStatus] = {}
+    home_deg: JointsDeg | None = None
     stages: list[StageName] | None = None
 
     @model_validator(mode="after")
@@ -276,6 +281,34 @@ class StudyBase(InputFile):
         if variant := self.variants.get(name):
             tool = variant.tool(tool)
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
+
+    def home(self, name: str) -> Reals | None:
+        """The home that the study gives a robot.
+
+        Parameters
+        ----------
+        name : of a robot or a variant
+
+        Returns
+        -------
+        q : (n,), rad or m; None if it gives none
+
+        Raises
+        ------
+        InputError
+            if it is not within the limits
+        """
+        entry, robot = self.entry(name), self.robot(name)
+        if entry.home_deg is None:
+            return None
+        field = f"robots.{self._base(name)}.home_deg"
+        if len(entry.home_deg) != robot.joints:
+            raise InputError(None, field, f"{len(entry.home_deg)} joint values", f"The arm has {robot.joints}")
+        q = meant(robot, np.array(entry.home_deg))
+        if out := np.flatnonzero((q < robot.lower) | (q > robot.upper)).tolist():
+            problem = f"J{out[0] + 1} at {entry.home_deg[out[0]]:g} is outside its limits"
+            raise InputError(None, field, problem, "Give a pose that the arm can take")
+        return q
 
     def loads(self, name: str) -> list[LoadFields]:
         """What hangs on the flange: the tool, then the payload, as far as the study says.

@@ -332,6 +332,19 @@ class Robot(ByValue, Displayed):
         """
         return self.replace(tool=np.eye(4))
 
+    def with_tool(self, tool: Reals) -> Robot:
+        """The robot with another tool.
+
+        Parameters
+        ----------
+        tool : (4, 4), T_flange_tool, m
+
+        Returns
+        -------
+        robot : a copy; :class:`er3a.Er3aError` for what is no pose
+        """
+        return self.replace(tool=np.asarray(tool, float))
+
     @property
     def flange_is_last_frame(self) -> bool:
         """Whether the table ends at the flange."""
@@ -341,6 +354,20 @@ class Robot(ByValue, Displayed):
     def last_to_tool(self) -> Reals:
         """(4, 4), from the table's last frame through the flange to the tool."""
         return self.tool if self.flange_is_last_frame else self.flange @ self.tool
+
+    def states(self, group: str) -> bool:
+        """Whether the robot's file, or what it was read from, gives a group of values.
+
+        Parameters
+        ----------
+        group : as in ``sources``
+
+        Returns
+        -------
+        states : False if a reader assumed it: its grade is ``inferred``
+        """
+        source = self.sources.get(group)
+        return source is None or source.grade != "inferred"
 
     def replace(self, **changes: Any) -> Robot:
         """A copy with other values for some attributes.

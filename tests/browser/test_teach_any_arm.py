@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.convex import RIM
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
+from er3a.formats.mesh_file import link_mesh
 from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
 from er3a.kinematics.wrist_partitioned import has_branches
@@ -212,3 +214,24 @@ def test_the_least_distance_is_python_s(page, name, scene, random):
         assert bodies.distances(q[k], np.array([found[k]["number"]]))[0] == pytest.approx(least[k], abs=1e-8)
         ends = np.array([found[k]["from"], found[k]["to"]])
         assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(least[k], abs=1e-8)
+
+
+@pytest.mark.parametrize("scene", [None, "wall_and_low_floor"])
+def test_the_panel_measures_the_triangles_of_meshes(page, scene, random):
+    robot = load_robot("er3_600")
+    tori = [trimesh.creation.torus(0.12, 0.03, 24, 12).apply_transform(random_pose(random)) for _ in range(7)]
+    robot = robot.replace(envelopes=(), hulls=(), meshes=tuple(link_mesh(k, t.triangles) for k, t in enumerate(tori)))
+    around = load_scene(ROOT / f"data/scenes/{scene}.yaml") if scene else None
+    q = joints_at_random(robot, random, POSES)
+    found = asked(page, DISTANCES, panel_data(robot, NEAR), clearance_data(robot, around), q.tolist())
+    least, _ = Bodies(robot, around).min_distance(q)
+    distance = np.array([one["distance"] for one in found])
+    assert 0 < (least > 0).mean() < 1
+    assert np.array_equal(distance > 0, least > 0)
+    assert np.abs(distance - least)[least > 0].max() < 4e-6  # corners are passed on to 1 µm
+
+
+def random_pose(random: np.random.Generator) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = Rotation.random(random_state=random).as_matrix(), random.normal(size=3) * 0.05
+    return T

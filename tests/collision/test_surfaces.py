@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import coal
 import numpy as np
 import pytest
@@ -10,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from er3a import Robot, load_robot
 from er3a.collision.bodies import Bodies
-from er3a.collision.distances import FREE, free_between
+from er3a.collision.distances import FREE, free_between, which_overlap
 from er3a.collision.scene import Box, Scene
-from er3a.collision.shapes import link_frames
+from er3a.collision.shapes import layout_of, link_frames
 from er3a.files.robot_writer import write_robot
 from er3a.formats.mesh_file import link_mesh
 
@@ -87,6 +89,17 @@ def test_a_move_that_is_proven_free_is_free_between_its_ends(arm: Robot) -> None
         assert not states[-1] or bodies.free(between).all()
     assert any(states)
     assert not all(states)
+
+
+def test_a_short_move_with_room_around_it_is_proven_where_hulls_overlap(arm: Robot) -> None:
+    bodies = Bodies(arm, None)
+    q = np.random.default_rng(9).uniform(arm.lower, arm.upper, (200, arm.joints))
+    q = q[bodies.min_distance(q)[0] > 0.005]
+    hulls = layout_of(arm, [replace(body, tree=None) for body in bodies.all], list(zip(bodies.first, bodies.second)))
+    overlap = np.zeros((len(q), 1), bool)
+    which_overlap(hulls, q, overlap)
+    assert overlap.sum() > 10
+    assert all(free_between(bodies.layout, start, start + 1e-3, 1e-3, 10)[0] == FREE for start in q)
 
 
 def test_a_robot_file_keeps_every_triangle(arm: Robot, tmp_path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from er3a.confirmation.layers import search
 from er3a.confirmation.pairs import Pairs
 from er3a.confirmation.poses import of_angles, read_pairs
 from er3a.errors import Er3aError, InputError
+from er3a.files.robot_writer import write_robot
 from er3a.references.predict import state_of
 from er3a.references.reference import quantities_of
 from testing import controller_cases
@@ -285,3 +287,20 @@ def test_a_controller_s_poses_are_a_document_about_the_arm(tmp_path):
         assert abs(each.quantity.value(state) - each.expected) <= each.uncertainty, each
     with pytest.raises(InputError, match="tool or base set that the study has not"):
         controller_set(model, model, tmp_path / "pendant.csv")
+
+
+@pytest.mark.long
+def test_the_page_opens_with_the_answer(tmp_path, call):
+    q = poses()
+    written(tmp_path, shown(q) @ moved((0.02, 0, 0.12)), q)
+    arm_file = tmp_path / "made.yaml"
+    write_robot(arm(), arm_file)
+    page = tmp_path / "page.html"
+    assert call("confirm", arm_file, tmp_path / "pendant.csv", "--html", page, "--expect", "frames").returncode == 0
+    text = page.read_text(encoding="utf-8")
+    headline = re.search(r'<h1>.*?<span class="(\w+)">', text)
+    assert headline
+    assert headline[1] == "caution"
+    placed = re.search(r"tool of the controller: \{xyz_mm: \[(\S+), \S+, (\S+)\]", text)
+    assert placed
+    assert [float(each) for each in placed.groups()] == pytest.approx([20, 120], abs=0.05)

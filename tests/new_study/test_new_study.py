@@ -168,6 +168,8 @@ def test_the_references_of_a_robot_come_along(tmp_path):
 def test_a_urdf_with_an_odd_name(tmp_path):
     urdf = tmp_path / "KR-6 (R700) ü.urdf"
     urdf.write_text(export_urdf(load_robot("er3_600")), encoding="utf-8")
+    assert arm_of(urdf, None, None).robot.name == "er3_600"  # as the robot in it is called
+    urdf.write_text(urdf.read_text(encoding="utf-8").replace('name="er3_600"', ""), encoding="utf-8")
     assert arm_of(urdf, None, None).robot.name == "kr_6__r700"
 
 
@@ -368,7 +370,7 @@ def test_xacro_is_expanded_with_its_packages_arguments_and_meshes(xacro):
     arm = arm_of(xacro, None, None, xacro=("mesh:=box.stl",))
     q = np.random.default_rng(1).uniform(packaged.lower, packaged.upper, (20, 6))
     assert np.allclose(er3a.forward(arm.robot, q), er3a.forward(packaged, q), atol=1e-9)
-    assert arm.robot.name == "my_arm"
+    assert arm.robot.name == "arm"
     assert np.ptp(np.array(arm.robot.hulls[0].points), axis=0) == pytest.approx([0.1] * 3, abs=1e-6)
     assert arm_of(xacro, None, None, xacro=("mesh:=ring.stl",)).robot.hulls != arm.robot.hulls
     assert [path.name for path in xacro.parent.iterdir()] == [xacro.name]

@@ -86,14 +86,25 @@ def test_import_agrees_with_pinocchio_and_survives_the_robot_file(random, tmp_pa
     np.testing.assert_allclose(forward(imported.robot, q), pinocchio_poses(path, q, "l6"), atol=1e-9)
 
 
-@pytest.mark.parametrize("angle", ["1.571", "1.57", "-1.571"])
-def test_an_angle_that_may_be_a_rounded_right_one_is_kept_and_named(tmp_path, angle):
-    text = urdf().replace('rpy="1.5708 -1.5708 0"', f'rpy="{angle} 0 {angle}"')
-    notes = import_urdf(written(tmp_path, text), snap=True).notes
-    (named,) = (note for note in notes if "is kept" in note)
-    assert f"joint j2: angle {angle} rad is kept, 0.0" in named
-    assert f"write {np.copysign(np.pi / 2, float(angle)):.10g}:" in named
-    assert not any("joint j2" in note and "taken as" in note for note in notes)
+@pytest.mark.parametrize(
+    ("angle", "meant"),
+    [
+        ("1.571", np.pi / 2),
+        ("-1.57", -np.pi / 2),
+        ("0.785", np.pi / 4),
+        ("3.1416", np.pi),
+        ("1.569", None),
+        ("0.79", None),
+    ],
+)
+def test_an_angle_is_a_multiple_of_45_deg_where_its_digits_allow_it(tmp_path, angle, meant):
+    rounded, full = (
+        import_urdf(written(tmp_path, urdf().replace('rpy="1.5708 -1.5708 0"', f'rpy="{text} 0 0"')), snap=snap).robot
+        for text, snap in ((angle, True), (repr(float(meant or angle)), True))
+    )
+    kept = import_urdf(written(tmp_path, urdf().replace('rpy="1.5708 -1.5708 0"', f'rpy="{angle} 0 0"')), snap=False)
+    np.testing.assert_allclose(rounded.alpha, full.alpha, atol=1e-12)
+    assert np.allclose(rounded.alpha[:2], kept.robot.alpha[:2], atol=1e-6) == (meant is None)
 
 
 def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
@@ -102,7 +113,7 @@ def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     np.testing.assert_allclose(got.a, real.a, atol=1e-12)
     np.testing.assert_allclose(got.d, [0.3215, 0, 0, 0.299, 0, 0.0785], atol=1e-12)
     np.testing.assert_allclose(got.alpha, real.alpha, atol=1e-12)
-    assert "joint j2: angle 1.5708 rad taken as 90 deg" in imported.notes
+    assert "rounded angles of 4 joints were taken as multiples of 45 deg" in imported.notes[0]
     assert any("continuous" in note for note in imported.notes)
     assert (got.continuous.any(), got.lower[5], got.upper[5]) == (False, -2, 2)  # as the file states them
     path = tmp_path / "arm.yaml"

@@ -51,7 +51,7 @@ def arm_text(links: dict[int, str] | None = None, limits: dict[int, str] | None 
     text = '<robot name="r"><link name="l0"/>'
     for k, (kind, xyz, rpy, axis) in enumerate(JOINTS):
         limit = f'<limit lower="-1.{k}" upper="2.{k}" velocity="3.{k}" effort="{50 + k}"/>'
-        text += f'<link name="l{k + 1}">{(links or {}).get(k + 1, inertial())}</link>'
+        text += f'<link name="l{k + 1}">{(links or {}).get(k + 1, inertial(f"2.{k}"))}</link>'
         text += f'<joint name="j{k + 1}" type="{kind}"><parent link="l{k}"/><child link="l{k + 1}"/>'
         text += f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{(limits or {}).get(k + 1, limit)}'
         text += f'<dynamics friction="0.{k}" damping="1.{k}"/></joint>'
@@ -347,7 +347,7 @@ def test_an_inertia_that_no_body_has_leaves_mass_and_centre(tmp_path, random, ma
     assert note.startswith("link l3 has a principal moment of inertia")
     assert told in note
     robot, body = found.robot, found.robot.masses.body(3)
-    own = import_urdf(written(tmp_path, arm_text())).robot.masses.body(3)
+    own = import_urdf(written(tmp_path, arm_text({3: inertial(mass)}))).robot.masses.body(3)
     assert (body.mass, body.centre) == (own.mass, own.centre)
     moments = np.linalg.eigvalsh(body.inertia_matrix)
     assert moments[2] == pytest.approx(moments[0] + moments[1])  # on the edge of what a body can have

@@ -11,6 +11,7 @@ import yaml
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.collision.along import clearance
+from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
@@ -158,9 +159,9 @@ CAGES = {
         {"spheres": [{"name": "rock", "radius_mm": 900, "xyz_mm": [0, 0, 367.5]}]},
         ("fail", "collision.never_free"),
     ),
-    "home collides": (
+    "joints at 0 collide": (
         {"spheres": [{"name": "lamp", "radius_mm": 60, "xyz_mm": [374, 0, 700]}]},
-        ("fail", "collision.home_collides"),  # the study's paths meet the lamp, too
+        ("fail", "collision.free_space"),  # the study's paths meet the lamp, too
     ),
 }
 
@@ -179,7 +180,7 @@ def test_scenes_that_leave_nothing_have_one_verdict(case, tmp_path):
     [((-20, 20), "fail", ["through"]), ((90, 100), "caution", [])],
 )
 def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, colliding, tmp_path):
-    content = study_with(scene_file(tmp_path, **CAGES["home collides"][0]), samples=1000, rounds=0).model_dump()
+    content = study_with(scene_file(tmp_path, **CAGES["joints at 0 collide"][0]), samples=1000, rounds=0).model_dump()
     start, end = ([q1, 0, 0, 0, 0, 0] for q1 in ends_deg)
     path = {"name": "through", "title": "A", "kind": "joint", "samples": 20, "duration_s": 2.0}
     contents = {
@@ -189,9 +190,22 @@ def test_a_home_that_collides_hides_no_path_that_does(ends_deg, status, collidin
     for part, written in contents.items():
         (tmp_path / f"{part}.yaml").write_text(json.dumps(written), encoding="utf-8")
         content["robots"][NAME][part] = str(tmp_path / f"{part}.yaml")
+    chosen = compute(Study.model_validate(content), NAME).summary
+    assert (chosen.home_from, chosen.verdict.finding.code) == ("chosen", "collision.free_space")
+    assert chosen.verdict.finding.joined > 0
+    content["robots"][NAME]["home_deg"] = [0.0] * 6
     verdict = compute(Study.model_validate(content), NAME).summary.verdict
     assert (verdict.status, verdict.finding.code) == (status, "collision.home_collides")
     assert (verdict.finding.nearest.name, [each.name for each in verdict.finding.colliding]) == ("free", colliding)
+
+
+@pytest.mark.parametrize("home_deg", [[0.0] * 5, [0.0, 999.0, 0.0, 0.0, 0.0, 0.0]])
+def test_a_home_that_the_arm_does_not_have_is_one_error(home_deg, tmp_path):
+    content = study_with(scene_file(tmp_path), samples=1000, rounds=0).model_dump()
+    content["robots"][NAME]["home_deg"] = home_deg
+    with pytest.raises(InputError) as caught:
+        Study.model_validate(content).home(NAME)
+    assert caught.value.field == f"robots.{NAME}.home_deg"
 
 
 @pytest.mark.long

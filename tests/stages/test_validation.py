@@ -109,7 +109,7 @@ def edited_robot(study: Study, folder: Path, edit) -> Study:
 def computed(study: Study, folder: Path, name: str = "edited") -> Stored[ValidationResults]:
     """Results without the evidence of each entry, which has tests of its own and takes longest."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compute_module, "evidence_of_table", lambda robot, sets: None)
+        patch.setattr(compute_module, "evidence_of_table", lambda *_: None)
         run.compute("validation", study, name, folder)
     return read_results(folder, RESULTS)
 

@@ -130,7 +130,8 @@ def compare_two(
     first, found_before = read or _read(a, asked)
     with noted_doubts() as doubtful:
         # Names of columns are those of A, or of B if A is no table.
-        others = _others(b, asked.xacro, asked.options | ({"columns": ()} if holds_table(a) else {}))
+        of_table = {"columns": (), "joints": first.robot.joints} if holds_table(a) else {}
+        others = _others(b, asked.xacro, asked.options | of_table)
     doubtful = list({str(each): each for each in (*found_before, *doubtful)}.values())
     arm = first.robot
     if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
@@ -336,7 +337,7 @@ def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any
         key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
         for key, value in vars(found).items()
     }
-    del record["corrected"]
+    del record["corrected"], record["alignment"]
     if not folder:
         return record
     keys = "verdict", "different_entries", "as_printed_mm", "aligned_mm"

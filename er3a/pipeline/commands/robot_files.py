@@ -42,7 +42,7 @@ def import_urdf(
     *,
     base: options.Base = None,
     tip: options.Tip = None,
-    snap: Annotated[bool, typer.Option(help="round angles within 1e-4 rad of a right angle, with a note")] = False,
+    snap: Annotated[bool, typer.Option(help="take rounded angles (1.571) as the multiples of 45 deg meant")] = True,
     xacro: options.Xacro = None,
     as_json: options.AsJson = False,
 ):

@@ -5,16 +5,18 @@ from __future__ import annotations
 import shlex
 from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from er3a.errors import Er3aError
 from er3a.pipeline import language
 from er3a.pipeline.commands import options
+from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.results import write_checksum
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
+from er3a.robots.robot import Convention
 
 TEACH = "teach"
 
@@ -113,6 +115,13 @@ def teach(
     output: Annotated[
         Path | None, typer.Option(help="the page to write, if ROBOT is a file (default: NAME.html)")
     ] = None,
+    *,
+    convention: Annotated[Convention, typer.Option(help="of a D-H table")] = "standard",
+    length_unit: Lengths = None,
+    angle_unit: Angles = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
+    xacro: options.Xacro = None,
 ):
     """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
@@ -122,8 +131,10 @@ def teach(
     from er3a.files.arm_catalogue import known_arms
     from er3a.robots.robot import robot_name
 
+    given: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    given |= {"base": base, "tip": tip, "xacro": xacro or ()}
     if robot == "-" or Path(robot).suffix or (robot in known_arms() and (output or not study.is_file())):
-        _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"))
+        _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"), given)
         return
     if output is not None:
         raise Er3aError(
@@ -132,8 +143,8 @@ def teach(
     _write_teach_page(_study_to_show(study), robot, results, reports)
 
 
-def _teach_file(source: str, page: Path) -> None:
-    """Write the panel of an arm that is given as a file."""
+def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
+    """Write the panel of an arm that is given as a file, read as the options say."""
     from er3a.files.arm_catalogue import ARMS
     from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
@@ -141,7 +152,7 @@ def _teach_file(source: str, page: Path) -> None:
     from er3a.pipeline.results import Input, Provenance
     from er3a.pipeline.teach.panel import write_panel
 
-    arm = read_arm(source)
+    arm = read_arm(source, whole=True, **given)
     for note in arm.notes:
         options.print_note(note)
     file = Path(source) if Path(source).is_file() else ARMS if source != "-" else None

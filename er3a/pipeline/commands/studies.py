@@ -35,7 +35,7 @@ def new(
     tip: options.Tip = None,
     dh: Annotated[Path | None, typer.Option(help="the arm, as a D-H table in any form (- is standard input)")] = None,
     robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
-    name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: the file's name)")] = None,
+    name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: its file's)")] = None,
     convention: Annotated[
         Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
     ] = None,
@@ -52,13 +52,16 @@ def new(
         form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
         form["columns"] = options.columns_of(column)
         arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, **form)
-        at(f"{folder}: searching for targets and paths that the arm can do")
+        compiles = "" if STAGES["trajectory"].compiled.exists() else "; the first time er3a compiles, up to two minutes"
+        at(f"{folder}: searching for targets and paths that the arm can do{compiles}")
         written = write_study(arm, folder)
     for note in arm.notes:
         options.print_note(note)
     for file in written.files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
+    if urdf is not None:
+        print(f"To hold it against the arm's pendant: er3a confirm {arm.robot.name} --plan")
     for shortcoming in written.shortcomings:
         typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from er3a.comparison.compare import (
-    Cause,
     Comparison,
     Difference,
     GeometryLayer,
@@ -14,6 +13,7 @@ from er3a.comparison.compare import (
     RangeLayer,
     Uncompared,
 )
+from er3a.comparison.slips import Cause
 from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import joined, say, word
@@ -47,6 +47,7 @@ CAUSES = {
     "angle_unit": N_("the angles are in another unit"),
     "scale": N_("all lengths are scaled"),
     "rows_shifted": N_("values stand a row too high or too low"),
+    "rows_exchanged": N_("two rows are exchanged"),
 }
 BESIDE = {"pair_rules": N_("rules for pairs of links"), "limits_on_sums": N_("limits on sums of joints")}
 STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
@@ -64,13 +65,14 @@ def headline(found: Comparison, doubts: Iterable[str] = ()) -> str:
 
 
 def _verdict(found: Comparison) -> str:
-    text = joined([*map(say, found.units.causes if found.units else ()), word("comparison", HEADLINES, found.verdict)])
+    causes = (*(found.units.causes if found.units else ()), *found.causes)
+    text = joined([*map(say, causes), word("comparison", HEADLINES, found.verdict)])
     if found.as_printed_mm is None or found.aligned_mm is None:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text
     off = tr(
-        "{verdict} (flange off by {printed:.1f} mm and {turned:.2f} deg at worst, aligned by {aligned:.4g} mm and "
-        "{aligned_deg:.3g} deg)",
+        "{verdict} (flange off by {printed:.1f} mm and {turned:.2f} deg at the worst found; aligned by "
+        "{aligned:.4g} mm and {aligned_deg:.3g} deg)",
         verdict=text,
         printed=found.as_printed_mm,
         turned=found.as_printed_deg,
@@ -108,11 +110,9 @@ def _detail(name: str, found: Comparison) -> str:
         return say(layer)
     if name == "zero" and not layer.same:
         moved = [(k, value) for k, value in enumerate(layer.offsets_deg, 1) if abs(value) > 1e-3]
-        shown = ", ".join(f"J{k} {with_unit(f'{value:+.6g}', 'deg')}" for k, value in moved)
-        return joined([shown, *(say(each) for each in layer.causes)])
+        return ", ".join(f"J{k} {with_unit(f'{value:+.6g}', 'deg')}" for k, value in moved)
     if name == "directions" and not layer.same:
-        shown = tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
-        return joined([shown, *(say(each) for each in layer.causes)])
+        return tr("{joints} turn the other way", joints=", ".join(f"J{k}" for k in layer.reversed))
     if name == "limits" and layer.same is False:
         return tr("{limits} (by the first's zeros and directions)", limits=say(layer))
     if name == "units":
@@ -131,8 +131,7 @@ def _(found: GeometryLayer) -> str:
             mm=found.worst_mm,
             deg=found.worst_deg,
         )
-    entries = joined([say(each) for each in found.differences], ", ")
-    return joined([entries, *(say(each) for each in found.causes)])
+    return joined([say(each) for each in found.differences], ", ")
 
 
 @say.register
@@ -149,7 +148,10 @@ def _(found: Difference) -> str:
 def _(found: Cause) -> str:
     text = word("comparison", CAUSES, found.code)
     amount = "" if found.amount is None else f" ({found.unit} {found.amount:.6g})".replace("( ", "(")
-    where = f"{', '.join(found.entries)}: " if found.entries else ""
+    shown = joined(
+        [", ".join(found.entries), *([tr("or {entries}", entries=", ".join(found.alike))] if found.alike else [])], " "
+    )
+    where = f"{shown}: " if shown else ""
     sides = {"a": tr("in the first table"), "b": tr("in the second table"), None: tr("in one of the tables")}
     return f"{where}{text}{amount}, {sides[found.side]}"
 
@@ -163,7 +165,10 @@ def _(found: PlacementLayer) -> str:
     if found.turn.deg > 1e-3:
         axis = _axis(found.turn.axis)
         parts.append(tr("turned {deg:.6g} deg about {axis}", deg=found.turn.deg, axis=axis))
-    return joined(parts, ", ")
+    moved = joined(parts, ", ")
+    if not found.entries:
+        return moved
+    return tr("{entries} ({moved})", entries=joined(map(say, found.entries), ", "), moved=moved)
 
 
 def _axis(axis: tuple[float, float, float]) -> str:

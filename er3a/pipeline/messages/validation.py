@@ -121,7 +121,8 @@ TEXTS = texts(
         "whole_group": "{group:missing_group}",
         "named_pose": "{name:own}",
         "validation.no_reference": (
-            "There is no official, CAD or exported data to compare this table with.[ {claims: }][ {own_text: }]"
+            "There is no official, CAD or exported data to compare this table with. Read five poses at the pendant: "
+            "er3a confirm ROBOT --plan.[ {claims: }][ {own_text: }]"
         ),
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
         "contradiction": (

@@ -17,7 +17,7 @@ from er3a.files.robot_library import known_arm, read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.formats.mesh_file import read_text
 from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import plain_urdf
+from er3a.formats.urdf_tree import plain_urdf, urdf_root
 from er3a.robots.robot import Convention, Robot, robot_name
 
 REFERENCES = "data/manual_refs"
@@ -59,7 +59,7 @@ def arm_of(
 
     Parameters
     ----------
-    name : of the robot in the study; by default that of the file
+    name : of the robot in the study; by default that of the file, or the one that a URDF has in it
     convention, length_unit, angle_unit : of the D-H table, where its columns don't say; "standard" if None
     columns : what the columns of the D-H table mean, in their order
     ends : the URDF's links at which the arm begins and ends, where the file leaves a choice
@@ -84,7 +84,8 @@ def arm_of(
         raise Er3aError("--base, --tip and --xacro say how a URDF is read; give them with --urdf")
     if urdf is not None:
         with plain_urdf(urdf, xacro) as file:
-            return _from_urdf(file, name or robot_name(file), ends)
+            own = urdf_root(file).get("name") or file.stem
+            return _from_urdf(file, name or robot_name(Path(f"{own}.urdf")), ends)
     if dh is not None:
         units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
         content, notes = read_dh_table(dh, name or robot_name(dh), convention or "standard", **units)
@@ -93,7 +94,7 @@ def arm_of(
 
 
 def _from_urdf(path: Path, name: str, ends: tuple[str | None, str | None]) -> Arm:
-    imported = import_urdf(path, base=ends[0], tip=ends[1], snap=True)
+    imported = import_urdf(path, base=ends[0], tip=ends[1])
     robot = imported.robot.replace(name=name)
     content = robot_file(robot, path)
     misfit = f"the table's flange differs from the URDF's by at most {imported.misfit_m * 1000:.2g} mm on random poses"

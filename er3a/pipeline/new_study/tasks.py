@@ -172,6 +172,7 @@ class TaskSearch:
         self.robot, self.reach, self.settings = robot, reach, settings
         self.limits, self.near = limits_of(robot, settings), near_singular(settings)
         self.bodies = Bodies(robot, scene)
+        self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
         self.drawn = reach.q[:JUDGED]
         self.fit = self.drawn[self._fits(self.drawn)]
 
@@ -263,7 +264,8 @@ class TaskSearch:
         return inverse(self.robot, target.T, target.q_ref, self_motion_rows=True), target
 
     def _fits(self, q: Reals) -> Flags:
-        """Whether joints (N, n) are away from limits and singular poses, and clear of everything.
+        """Whether joints (N, n) are away from limits and singular poses, and clear of everything: by the study's margin
+        where shapes are assumed.
 
         Away are 8 deg or a twentieth of a joint's range, and twice what the study calls near a singular pose.
         """
@@ -271,7 +273,7 @@ class TaskSearch:
         smallest = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
         room = (np.minimum(q - robot.lower, robot.upper - q) > smallest) | robot.continuous
         fits: Flags = room.all(axis=-1) & (self.near.margin(robot, q) > SINGULAR_MARGIN)
-        fits[fits] = self.bodies.free(q[fits])
+        fits[fits] = self.bodies.free(q[fits], self.margin)
         return fits
 
     def _written(self, q: Reals) -> list[float]:
@@ -328,7 +330,8 @@ class TaskSearch:
         if judgement.verdict != "safe" or judgement.events:
             return False
         around = Surroundings(self.bodies, self.settings.penetration_tolerance_mm / 1000)
-        return not measured(around, motion).contacts
+        along = measured(around, motion)
+        return not along.contacts and bool(along.closest < 0 or along.distance[along.closest] >= self.margin)
 
 
 def _millimetres(point: Reals) -> list[float]:

@@ -3,8 +3,10 @@
 import { add, moved, norm, scaled, subtract } from "er3a/algebra";
 import { ballAround, bodyDistance } from "er3a/distance";
 import { write } from "er3a/readouts";
+import { surfaceDistance } from "er3a/surface";
 import { fill, inMillimetres } from "er3a/text";
 
+const FAR = 1e3; // m
 const WORLD = -1; // link of what stands around the arm
 const balls = new WeakMap(); // around bodies, in their links' frames
 
@@ -14,8 +16,8 @@ const byId = (id) => document.getElementById(id);
  * The nearest pair at frames `T` (of `frames`), or null where nothing can meet: `{pair, distance, from, to, deep}`, m,
  * with points on the bodies' surfaces. A pair that a joint joins counts only where it overlaps. `bodies` are those of
  * `bodyDistance`, each with its `link` (0 the base, k what row k moves, -1 the world), points in the link's frame;
- * `pairs` are `{bodies: [first, second], joined, hulls, text}`; with `hulls`, the points of a body are those of a hull
- * around it, whose distance is at most the body's.
+ * `pairs` are `{bodies: [first, second], joined, text}`. The points of a body with a `surface` are those of a hull around
+ * it; triangles are looked at only where hulls are nearer than what was found.
  */
 export function nearestPair({ bodies, pairs }, base, T) {
   const frame = (link) => (link ? T[link - 1] : base);
@@ -27,16 +29,27 @@ export function nearestPair({ bodies, pairs }, base, T) {
     if (!places.has(i)) places.set(i, link === WORLD ? points : points.map((point) => moved(frame(link), point)));
     return places.get(i);
   };
+  const frameOf = (i) => (bodies[i].link === WORLD ? null : frame(bodies[i].link));
+  const surfaces = (pair) => pair.bodies.some((i) => bodies[i].surface);
   let best = null;
+  const waiting = [];
+  const consider = (pair, found) => {
+    if (found && !(pair.joined && found.distance >= 0) && (!best || found.distance < best.distance)) best = { pair, ...found };
+  };
   for (const pair of pairs) {
     const [i, j] = pair.bodies;
     const [ball, other] = [around[i], around[j]];
     const apart = other ? norm(subtract(ball.centre, other.centre)) - ball.reach - other.reach : -Infinity;
     if (best && apart >= best.distance) continue;
     const found = bodyDistance(bodies[i], placed(i), bodies[j], placed(j));
-    if (pair.joined && found.distance >= 0) continue;
-    if (pair.hulls) found.distance = Math.max(found.distance, 0); // of surfaces the hulls around them: at least that
-    if (!best || found.distance < best.distance) best = { pair, ...found };
+    if (surfaces(pair)) waiting.push([found.distance, pair]); // of hulls around them: at most that of the surfaces
+    else consider(pair, found);
+  }
+  for (const [least, pair] of waiting.sort(([a], [b]) => a - b)) {
+    if (best && least >= best.distance) break;
+    const [i, j] = bodies[pair.bodies[0]].surface ? pair.bodies : [...pair.bodies].reverse();
+    const found = surfaceDistance(bodies[i], frameOf(i), bodies[j], frameOf(j), placed(j), best ? Math.max(best.distance, 0) : FAR);
+    consider(pair, found && { ...found, near: i === pair.bodies[0] ? found.near : [...found.near].reverse() });
   }
   if (!best) return null;
   const [i, j] = best.pair.bodies;
@@ -54,12 +67,12 @@ export class Clearance {
   /** What overlaps at frames `T`, in words; empty where nothing does. */
   overlap(T) {
     const found = nearestPair(this.clearance, this.table.base, T);
-    return found && found.distance <= 0 && !found.pair.hulls ? this.#described(found) : "";
+    return found && found.distance <= 0 ? this.#described(found) : "";
   }
 
   #described({ distance, deep, pair }) {
-    const words = pair.hulls ? this.words.hulls : this.clearance.assumed ? this.words.assumed : this.words;
-    const text = distance <= 0 ? (deep && !pair.hulls ? words.overlap_deep : words.overlap) : words.clearance_is;
+    const words = this.clearance.assumed ? this.words.assumed : this.words;
+    const text = distance <= 0 ? (deep ? words.overlap_deep : words.overlap) : words.clearance_is;
     return fill(text, { distance: inMillimetres(Math.abs(distance)), pair: pair.text });
   }
 
@@ -74,7 +87,7 @@ export class Clearance {
       return null;
     }
     const { distance, deep, pair } = found;
-    const touching = distance <= 0 && !pair.hulls;
+    const touching = distance <= 0;
     element.dataset.state = touching ? "at" : distance < this.clearance.near ? "near" : "clear";
     write(element, this.#described(found));
     return { from: found.from, to: found.to, text: deep ? "" : inMillimetres(distance), touching: touching ? pair.names : [] };

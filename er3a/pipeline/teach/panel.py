@@ -13,6 +13,7 @@ from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL
 from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
+from er3a.collision.triangles import TriangleTree
 from er3a.finding import fact
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
@@ -267,10 +268,6 @@ WORDS: dict[str, Any] = {
         "overlap": N_("Collision of assumed shapes: {pair} overlap by {distance}."),
         "overlap_deep": N_("Collision of assumed shapes: {pair} overlap by {distance} or more."),
     },
-    "hulls": {
-        "clearance_is": N_("Clearance at least {distance}, by hulls around the surfaces: {pair}."),
-        "overlap": N_("Hulls around {pair} overlap: whether their surfaces do is not measured here."),
-    },
     "nothing_meets": N_("No bodies here can collide."),
 }
 
@@ -418,19 +415,31 @@ def clearance_data(robot: Robot, scene: Scene | None) -> dict[str, Any]:
                 "points": layout.points[layout.start[b] : layout.start[b + 1]].tolist(),
                 "radius": float(layout.radius[b]),
                 "disc": float(layout.disc[b]),
+                "surface": surface_data(body.tree) if body.tree else None,
             }
-            for b in range(len(layout.link))
+            for b, body in enumerate(found.all)
         ],
         "pairs": [
             {
                 "bodies": [int(first), int(second)],
                 "joined": bool(joined),
-                "hulls": bool(max(layout.trees.root[[first, second]]) >= 0),
                 "text": say(pair),
                 "names": names_of(pair),
             }
             for first, second, joined, pair in zip(layout.first, layout.second, layout.joined, found.pairs)
         ],
+    }
+
+
+def surface_data(tree: TriangleTree) -> dict[str, Any]:
+    """A surface as ``surface.js`` takes it: points (m, to 1 µm), faces, their closed shells (0 for none), probes."""
+    points, rows = np.unique(np.round(tree.corner.reshape(-1, 3), 6), axis=0, return_inverse=True)
+    keys = np.unique(np.append(tree.shell, 0))
+    return {
+        "points": points.tolist(),
+        "faces": rows.reshape(-1, 3).tolist(),
+        "shells": np.where(tree.shell == 0, 0, np.searchsorted(keys, tree.shell) + 1).tolist(),
+        "probes": tree.probe.tolist(),
     }
 
 

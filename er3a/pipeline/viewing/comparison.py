@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from scipy.spatial.transform import Rotation
 
 from er3a.comparison.compare import Comparison, in_units
 from er3a.files.kept_files import sha256
@@ -60,7 +59,7 @@ def write_comparison(
         provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
         names=(one[0], other[0]),
         verdict=found.verdict,
-        headline=joined([*doubts, *map(say, slips), word("comparison", HEADLINES, found.verdict)]),
+        headline=joined([*doubts, *map(say, (*slips, *found.causes)), word("comparison", HEADLINES, found.verdict)]),
         keys=_keys(found),
         seen=_seen(in_units(one[1], slips, "a"), in_units(other[1], slips, "b"), same=found.verdict == "equal"),
         layers=[*doubt_rows(doubts), *layer_rows(found)],
@@ -109,12 +108,8 @@ def _rows(robot: Robot, corrected: Robot) -> list[list[tuple[str, str, bool]]]:
 
 def _arms(one: Robot, other: Robot, found: Comparison) -> dict[str, Any]:
     """Both arms as chains for the page's script, and what brings the second onto the first."""
-    if found.base is None or found.zero is None or found.directions is None:
+    if (by := found.alignment) is None:
         return {}
-    turn = Rotation.from_rotvec(np.radians(found.base.turn.deg) * np.array(found.base.turn.axis)).as_matrix()
-    placed = np.eye(4)
-    placed[:3, :3], placed[:3, 3] = turn, np.array(found.base.shift_mm) / 1000
-    scale = np.where(one.sliding, 1e-3, np.radians(1.0))
     joints = []
     for j in range(one.joints):
         (lower, slides), (upper, _) = (joint_shown(one, j, float(value[j])) for value in (one.lower, one.upper))
@@ -122,9 +117,9 @@ def _arms(one: Robot, other: Robot, found: Comparison) -> dict[str, Any]:
         joints.append({"lower": lower, "upper": upper, "start": start, "unit": "mm" if slides else "deg"})
     return {
         "arms": [_chain(one), _chain(other)],
-        "base": placed.tolist(),
-        "zeros": (scale * np.array(found.zero.offsets_deg) * one.direction).tolist(),
-        "signs": [-1 if k in found.directions.reversed else 1 for k in range(1, one.rows + 1)],
+        "base": by.base.tolist(),
+        "zeros": (by.zeros * one.direction).tolist(),
+        "signs": by.signs.tolist(),
         "joints": joints,
     }
 

@@ -14,6 +14,7 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.files.target_file import load_targets
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.inverse import inverse
+from er3a.kinematics.singularity import conditioning
 from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
@@ -25,7 +26,7 @@ from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisio
 from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
-from er3a.robots.joint_limits import shown
+from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import nearest
 from er3a.selection.select import refusals_of
@@ -146,6 +147,7 @@ def _closest(bodies: Bodies, about: tuple, q: Reals, distance: float, pair: int)
 STAGE_NAME = "collision"
 CHECKS = 1  # points of a path checked between its samples to begin with; clearance adds what it needs
 SAMPLES_STREAM, PLACES_STREAM = 0, 1
+HOMES = 64  # free joint vectors among which a home is chosen
 
 
 def compute(study: Study, name: str) -> model.CollisionResults:
@@ -161,10 +163,14 @@ def compute(study: Study, name: str) -> model.CollisionResults:
     space = free_space.sample_joint_space(bodies, settings.samples, np.random.default_rng([study.seed, SAMPLES_STREAM]))
     random = np.random.default_rng([study.seed, PLACES_STREAM])
     places = free_space.find_places(bodies, space, settings.cells_across, settings.rounds, random)
-    q_home, at_home, depth = _home(bodies)
-    if at_home is None:
-        places.joined[:] = free_space.joined_to_home(bodies, places, q_home, settings.neighbours)
     targets, at_targets, blocked = target_clearances(robot, bodies, study.entry(name).targets)
+    home_from, q_home = _home(bodies, study.home(name), space.q[space.free])
+    at_home, depth = _overlap(bodies, q_home)
+    if at_home is None:
+        solved = meant(robot, np.reshape([each.q_deg for each in at_targets], (-1, robot.joints)))
+        places.joined[:] = free_space.joined_to_home(
+            bodies, places, q_home, solved[bodies.free(solved)], settings.neighbours
+        )
     motions = list(study_motions(study, name, CHECKS))
     paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
@@ -193,6 +199,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             of_itself=_share(space.of_itself),
             of_scene=_share(space.of_scene),
             whole=_share(space.whole),
+            home_from=home_from,
             home_deg=None if at_home else tuple(shown(robot, q_home).tolist()),
             proven_m=free_space.DEPTH,
             penetration_tolerance_mm=settings.penetration_tolerance_mm,
@@ -237,12 +244,26 @@ def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
     return by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed)
 
 
-def _home(bodies: Bodies) -> tuple[Reals, Pair | None, float]:
-    """Joint values as near to 0 as the limits allow, and what overlaps there by how much, m; None if nothing does."""
-    q = np.clip(np.zeros(bodies.robot.joints), bodies.robot.lower, bodies.robot.upper)
+def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeFrom, Reals]:
+    """Where places are joined to: the study's home, joints at 0 if that is within the limits and free of overlap, or
+    else one of the free joint vectors (k, n): of the ``HOMES`` nearest to the middle of the limits the one farthest
+    from singular."""
+    robot = bodies.robot
+    zero = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
+    if given is not None:
+        return "study", given
+    if not len(free) or (not zero.any() and bodies.free(zero[None])[0]):
+        return "zero", zero
+    middle, half = (robot.lower + robot.upper) / 2, np.maximum(robot.upper - robot.lower, 1e-9) / 2
+    near = free[np.argsort(np.abs((free - middle) / half).max(axis=1), kind="stable")[:HOMES]]
+    return "chosen", near[conditioning(robot, near).smallest_singular_value.argmax()]
+
+
+def _overlap(bodies: Bodies, q: Reals) -> tuple[Pair | None, float]:
+    """What overlaps at joint values (n,) by how much, m; None if nothing does."""
     smallest, nearest = bodies.min_distance(q[None])
     overlap = bodies.pairs[nearest[0]] if nearest[0] >= 0 and smallest[0] < 0 else None
-    return q, overlap, float(-smallest[0])
+    return overlap, float(-smallest[0])
 
 
 def _colliding(
@@ -347,7 +368,7 @@ def _verdict(
     blocked = not all(each.expected for each in found.blocked)
     if not all(each.expected for each in found.colliding) or (blocked and not found.targets):
         return Verdict("fail", home or found)
-    return Verdict("caution" if home or found.undecided or not found.joined or blocked else "pass", home or found)
+    return Verdict("caution" if home or not found.joined or blocked else "pass", home or found)
 
 
 def _figures(space: free_space.JointSpace, places: model.PlacesSummary, matrix: model.MatrixRows) -> tuple[Figure, ...]:

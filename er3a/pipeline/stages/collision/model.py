@@ -60,6 +60,9 @@ class Closest:
     to_mm: tuple[float, float, float]
 
 
+HomeFrom = Literal["study", "zero", "chosen"]
+
+
 class CollisionSummary(Summary):
     """What the stage found.
 
@@ -67,7 +70,8 @@ class CollisionSummary(Summary):
     ----------
     scene : title of the scene; None in open space
     samples : random joint vectors tried
-    home_deg : where places are to be joined to; None where no home is free of overlap
+    home_from : whether the study gives home, joints are at 0 there, or it was chosen
+    home_deg : where places are to be joined to; None where home is not free of overlap
     proven_m : cells' witnesses are joined by moves that are proven free but for overlaps less deep than this
     """
 
@@ -79,6 +83,7 @@ class CollisionSummary(Summary):
     of_itself: FreeShare
     of_scene: FreeShare
     whole: FreeShare
+    home_from: HomeFrom
     home_deg: tuple[float, ...] | None
     proven_m: float
     penetration_tolerance_mm: float

@@ -45,20 +45,6 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 
-def diagnose_sets(robot: Robot, sets: list[ReferenceSet]) -> tuple[model.SetDiagnosis, ...]:
-    """Diagnose a table against each reference set.
-
-    Parameters
-    ----------
-    robot : with revolute joints, one for each row
-
-    Returns
-    -------
-    diagnoses : one for each set, in their order
-    """
-    return tuple(_set_diagnosis(robot, references, diagnosis_of(robot, references)) for references in sets)
-
-
 def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis) -> model.SetDiagnosis:
     documents = dict.fromkeys(reference.document for reference in usable(references))
     own = [name for name in documents if made_from_table(robot, name, references.documents)]
@@ -157,12 +143,18 @@ def _checked(
             if is_turning(robot)
             else undeclared_bases(references.checkable)
         )
-        judged, contradictions = checks_of_set(
-            references, read(asked, state), bases, robot.slides, 1000 * size_of(robot)
-        )
+        own = np.where([_assumed_of_robot(robot, quantity) for quantity in asked], np.nan, read(asked, state))
+        judged, contradictions = checks_of_set(references, own, bases, robot.slides, 1000 * size_of(robot))
         checks += judged
         conflicts += contradictions
     return checks, conflicts
+
+
+def _assumed_of_robot(robot: Robot, quantity: quantities.Quantity) -> bool:
+    """Whether a quantity is a limit or a speed that the robot's file does not give."""
+    if isinstance(quantity, quantities.Limit):
+        return not robot.states("limits")
+    return isinstance(quantity, quantities.Speed) and not robot.states("speeds")
 
 
 def compute(study: Study, name: str) -> model.ValidationResults:
@@ -202,12 +194,16 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     checks += trip_checks
 
     axes, poses = axes_table(circles, sets), key_poses_table(robot, sets)
-    diagnoses = diagnose_sets(robot, sets if turning else [])
+    diagnosed = [diagnosis_of(robot, references) for references in sets if turning]
+    diagnoses = tuple(_set_diagnosis(robot, *pair) for pair in zip(sets, diagnosed))
     found = {each.reference_set: each for each in diagnoses}
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
-    evidence = evidence_of_table(robot, sets) if turning else None
+    found_right = [
+        each.hypotheses[0].corrected for each in diagnosed if each.hypotheses and each.hypotheses[0].explains
+    ]
+    evidence = evidence_of_table(robot, sets, found_right) if turning else None
     summary = model.ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
         figures=key_figures(checks, axes, summaries, reach, trips),
@@ -258,12 +254,15 @@ def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator
         yield Open("tool_and_base", names)
 
 
-def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.TableEvidence | None:
+def evidence_of_table(
+    robot: Robot, sets: Sequence[ReferenceSet], corrected: Sequence[Robot] = ()
+) -> model.TableEvidence | None:
     """What independent documents settle of the table, entry by entry.
 
     Parameters
     ----------
     robot : with revolute joints, one for each row
+    corrected : the robot without the faults that explain best what each set misses
 
     Returns
     -------
@@ -274,7 +273,7 @@ def evidence_of_table(robot: Robot, sets: Sequence[ReferenceSet]) -> model.Table
     if not any(reference.expected is not None for reference in references):
         return None
     documents = Documents({name: each for own in sets for name, each in own.documents.by_name.items()})
-    found = evidence_of(robot, references, documents)
+    found = evidence_of(robot, references, documents, corrected=corrected)
     return stated(
         model.TableEvidence,
         found,

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from er3a.collision.pairs import TRIED
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
-from er3a.pipeline.messages.collision import state_word, why
+from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.player import drawing_head, moment, player
 from er3a.pipeline.results import Stored
@@ -142,6 +142,8 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         drawing_head=drawing_head(),
         closest=[_closest(found) for found in closest[:MAX_ROWS]],
         rows_left_out=len(closest) - MAX_ROWS,
+        home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",
+        home_from=word("collision.home", HOMES, summary.home_from),
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
 

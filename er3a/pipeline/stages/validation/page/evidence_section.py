@@ -312,6 +312,8 @@ def rounded_within(value: float, each: EntryEvidence) -> float:
     low, high = each.interval or (value, value)
     if each.status != "contradicted" and abs(value - (each.value or 0.0)) < DIFFERS:
         return each.value or 0.0
+    if each.status == "gauge":  # a sum alone is known: its parts are not rounded one by one
+        return round(value, 3)
     return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
 
 

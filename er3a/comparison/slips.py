@@ -1,0 +1,278 @@
+"""The slips of a pen that explain best why two tables differ: the fewest win.
+
+What two tables differ by after their best match is counted (:attr:`er3a.comparison.mechanism.Match.cost`): entries of
+geometry, zeros, directions, base and flange. A slip that is undone has a price and lowers this count. A wrong sign, for
+one, shows as a base turned over and joints that turn the other way where other zeros differ, too. All slips of a
+declared list are tried, alone and up to ``TOGETHER``, first by a lower bound of what they leave; the best of these are
+matched in full.
+
+A slip is named if it leaves nothing, or if it lowers count and price together by at least ``CLEARLY``. One that changes
+no geometry has to leave the base upright and all joints turning the same way, or to lower what differs by ``FAR``: else
+the arms are merely defined otherwise.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from er3a.comparison import mechanism
+from er3a.geometry.vectors import wrap_to_pi
+from er3a.robots.robot import Robot
+
+CauseCode = Literal[
+    "a_and_d_swapped",
+    "other_convention",
+    "all_alphas_negated",
+    "one_alpha_negated",
+    "one_length_negated",
+    "offsets_negated",
+    "unit",
+    "angle_unit",
+    "rows_exchanged",
+    "scale",
+    "rows_shifted",
+]
+SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
+EXCHANGED = ("a", "alpha", "d"), ("a", "alpha", "d", "offset")
+SAME_RATIO = math.log(1.005)
+WHOLE = 2.0  # of a slip that changes more than one number
+TOGETHER, KEPT, MATCHED = 3, 6, 6
+CLEARLY = 2.0
+FAR = 4.0
+UPRIGHT = 1 - 1e-6
+Columns = dict[str, Any]
+Undone = Callable[[Robot], Columns]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A slip that made entries differ.
+
+    Attributes
+    ----------
+    code : what kind it is; entries : those that it changes, or columns that are in another unit
+    side : whose table has it; None: either's
+    amount, unit : by how many rows or times, of which columns
+    alike : entries of which any one, in place of the first, explains as much
+    """
+
+    code: CauseCode
+    side: Literal["a", "b"] | None = "a"
+    entries: tuple[str, ...] = ()
+    amount: float | None = None
+    unit: str = ""
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Edit:
+    slip: Cause
+    price: float
+    undone: Undone
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """Both arms with the ``slips`` undone, and how they match then."""
+
+    slips: tuple[Cause, ...]
+    one: Robot
+    other: Robot
+    found: mechanism.Match
+
+
+def explain(one: Robot, other: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> Explained:
+    """The fewest slips that explain what differs.
+
+    Parameters
+    ----------
+    one, other : with the same number of rows, of the same kinds, in the right units
+    found : their match
+    tolerances : in m and rad
+
+    Returns
+    -------
+    explained : without slips, as they are, if none explains clearly more than the match does
+    """
+    as_they_are = Explained((), one, other, found)
+    if found.rank[0] == 0 and abs(_upright(one, found)) < UPRIGHT:
+        return as_they_are  # signs turn a base over, they don't tilt it
+    best, price, tied = as_they_are, found.cost, list[tuple[_Edit, ...]]()
+    edits = list(_edits(one, other, tolerances))
+    kept: list[tuple[_Edit, ...]] = [()]
+    for count in range(1, TOGETHER + 1):
+        if count > 1 and price <= count:
+            break
+        tried = [(*own, edit) for own in kept for edit in edits if _follows(own, edit, edits)]
+        tried = [own for own in tried if _price(own) < price]
+        guesses = [_price(own) + mechanism.least_cost(*_mechanisms(one, other, own), tolerances) for own in tried]
+        order = np.argsort(guesses, kind="stable")
+        kept = [tried[k] for k in order[:KEPT]]
+        likely = [k for k in order if guesses[k] <= price]
+        for own in (tried[k] for k in likely[:MATCHED]):
+            match = mechanism.match(*_mechanisms(one, other, own), tolerances)
+            cost = _price(own) + match.cost
+            if match.cost and not _is_plain(one, match, found, own):
+                continue
+            if cost < price:
+                best, price, tied = Explained(tuple(e.slip for e in own), *_undone(one, other, own), match), cost, [own]
+            elif cost == price and tied and len(own) == len(tied[0]):
+                tied.append(own)
+    return replace(best, slips=_with_alternatives(best.slips, tied))
+
+
+def _is_plain(robot: Robot, match: mechanism.Match, before: mechanism.Match, edits: Sequence[_Edit]) -> bool:
+    """Whether much less geometry differs than before, or the arms are not merely defined otherwise: the base does not
+    lean, and all joints turn the same way or far less differs."""
+    saved = before.cost - match.cost - _price(edits)
+    if any(edit.price == WHOLE for edit in edits) and saved < CLEARLY:
+        return False
+    turns_alike = _upright(robot, match) > UPRIGHT and (not match.reverses.any() or saved >= FAR)
+    return match.rank[0] < before.rank[0] or turns_alike
+
+
+def _upright(robot: Robot, match: mechanism.Match) -> float:
+    """1 if the first joint's axis is the same in both bases, -1 if it is turned over."""
+    axis = robot.base[:3, 2]
+    return float(axis @ match.base[:3, :3] @ axis)
+
+
+def _price(edits: Sequence[_Edit]) -> float:
+    return sum(edit.price for edit in edits)
+
+
+def _follows(own: tuple[_Edit, ...], edit: _Edit, edits: list[_Edit]) -> bool:
+    """Whether an edit comes after those chosen, so that no set is tried twice, and changes no entry of theirs."""
+    names = {name for each in own for name in each.slip.entries}
+    later = not own or edits.index(edit) > edits.index(own[-1])
+    return later and not names & set(edit.slip.entries)
+
+
+def _undone(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[Robot, Robot]:
+    for edit in edits:
+        if edit.slip.side == "a":
+            one = one.replace(**edit.undone(one))
+        else:
+            other = other.replace(**edit.undone(other))
+    return one, other
+
+
+def _mechanisms(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[mechanism.Mechanism, mechanism.Mechanism]:
+    first, second = _undone(one, other, edits)
+    return mechanism.mechanism_of(first), mechanism.mechanism_of(second)
+
+
+def _with_alternatives(slips: tuple[Cause, ...], tied: Sequence[tuple[_Edit, ...]]) -> tuple[Cause, ...]:
+    """Slips with the entries that would do in their place, where sets that explain as much differ in one slip only."""
+    found = list(slips)
+    for own in tied[1:]:
+        others = [edit.slip for edit in own if edit.slip not in slips]
+        places = [k for k, slip in enumerate(slips) if slip not in [edit.slip for edit in own]]
+        if len(others) == len(places) == 1 and len(others[0].entries) == 1 == len(slips[places[0]].entries):
+            k = places[0]
+            found[k] = replace(found[k], alike=(*found[k].alike, *others[0].entries))
+    return tuple(found)
+
+
+# The list of slips ----------------------------------------------------------------------------------------------------
+
+
+def _edits(one: Robot, other: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
+    """All slips that could be undone, those of single numbers first."""
+    yield from _signs(one, tolerances)
+    yield _Edit(Cause("all_alphas_negated"), WHOLE, lambda robot: {"alpha": -robot.alpha})
+    yield from _of_offsets(one, tolerances)
+    sides: tuple[Literal["a", "b"], ...] = "a", "b"
+    for side in sides:
+        yield _Edit(Cause("other_convention", side), WHOLE, _other_convention)
+    for row in range(one.rows):
+        if abs(one.a[row] - one.d[row]) > tolerances.length:
+            yield _Edit(Cause("a_and_d_swapped", "a", (f"a{row + 1}", f"d{row + 1}")), WHOLE, _swapped(row))
+    yield _Edit(Cause("a_and_d_swapped"), WHOLE, lambda robot: {"a": robot.d, "d": robot.a})
+    yield from _exchanges(one)
+    yield from _scales(one, other)
+    for rows, names in itertools.product((1, -1), SHIFTED):
+        yield _Edit(Cause("rows_shifted", "a", (), float(rows), ", ".join(names)), WHOLE, _rolled(names, rows))
+
+
+def _signs(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
+    """Numbers that could have the wrong sign."""
+    for column in ("alpha", "a", "d"):
+        size = np.abs(np.sin(robot.alpha)) if column == "alpha" else np.abs(getattr(robot, column))
+        least = tolerances.angle if column == "alpha" else tolerances.length
+        code: CauseCode = "one_alpha_negated" if column == "alpha" else "one_length_negated"
+        for row in np.flatnonzero(size > least).tolist():
+            if not (column == "d" and robot.sliding[row]):
+                yield _Edit(Cause(code, "a", (f"{column}{row + 1}",)), 1.0, _negated(column, row))
+
+
+def _of_offsets(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
+    """Mistakes in all offsets at once, which leave some other than 0 between the ends."""
+    inner = ~robot.sliding & (np.arange(robot.rows) > 0) & (np.arange(robot.rows) < robot.rows - 1)
+    mistakes: list[tuple[Cause, Undone]] = [(Cause("offsets_negated"), lambda each: {"offset": -each.offset})]
+    for rows in (1, -1):
+        mistakes.append((Cause("rows_shifted", "a", (), float(rows), "offset"), _rolled(("offset",), rows)))
+    for slip, undone in mistakes:
+        meant = undone(robot)["offset"]
+        if np.abs(wrap_to_pi(meant))[inner].max(initial=0.0) > tolerances.angle:
+            yield _Edit(slip, 1.0, undone)
+
+
+def _exchanges(robot: Robot) -> Iterator[_Edit]:
+    """Two rows that stand in each other's place, with or without their offsets."""
+    for names in EXCHANGED:
+        if "offset" in names and not np.ptp(robot.offset):
+            continue
+        for pair in itertools.combinations(range(robot.rows), 2):
+            if robot.sliding[list(pair)].any():
+                continue
+            entries = tuple(f"{name}{row + 1}" for row in pair for name in names)
+            yield _Edit(Cause("rows_exchanged", "a", entries), WHOLE, _exchanged(names, *pair))
+
+
+def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:
+    """The factor between the longest lengths of two tables, if it is not about 1."""
+    arms = (mechanism.mechanism_of(each, ends=False) for each in (one, other))
+    longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in arms]
+    ratio = float(longest[1] / longest[0]) if min(longest) > 0 else 1.0
+    if abs(math.log(ratio)) > SAME_RATIO:
+        yield _Edit(Cause("scale", "a", (), ratio), WHOLE, lambda robot: {"a": robot.a * ratio, "d": robot.d * ratio})
+
+
+def _other_convention(robot: Robot) -> Columns:
+    return {"convention": "modified" if robot.convention == "standard" else "standard"}
+
+
+def _negated(column: str, row: int) -> Undone:
+    def undone(robot: Robot) -> Columns:
+        values = getattr(robot, column)
+        return {column: np.where(np.arange(len(values)) == row, -values, values)}
+
+    return undone
+
+
+def _swapped(row: int) -> Undone:
+    def undone(robot: Robot) -> Columns:
+        own = np.arange(robot.rows) == row
+        return {"a": np.where(own, robot.d, robot.a), "d": np.where(own, robot.a, robot.d)}
+
+    return undone
+
+
+def _exchanged(names: Sequence[str], one: int, other: int) -> Undone:
+    def undone(robot: Robot) -> Columns:
+        order = np.arange(robot.rows)
+        order[[one, other]] = other, one
+        return {name: getattr(robot, name)[order] for name in names}
+
+    return undone
+
+
+def _rolled(names: Sequence[str], rows: int) -> Undone:
+    return lambda robot: {name: np.roll(getattr(robot, name), rows) for name in names}

@@ -1,0 +1,99 @@
+"""Values that fill a URDF's fields and are no data: they are named, and left out, so that nothing rests on them.
+
+A field that a format asks for is filled with something where its value is not known: the same effort for all joints,
+whatever they carry; 1 kg for each link; half a turn to either side for each joint. Other values can't be meant as they
+stand: centres of mass far outside of what the same file draws of the link, as in the base's coordinates; or moments of
+inertia about the links' origins.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from er3a.collision.shapes import arm_shapes
+from er3a.dynamics.arm_model import link_shapes
+from er3a.dynamics.plausibility import mass_findings
+from er3a.finding import is_one
+from er3a.numerics.arrays import Reals
+from er3a.robots.masses import Drives, Masses
+from er3a.robots.robot import Robot, Source
+
+ROUNDED_RAD = 2e-3  # half a turn written as 3.14
+SEVERAL = 3  # joints or links, that no maker's arm has alike
+THOUSAND = 1000.0  # N m, of no motor that is known so roundly; generators of URDFs write it
+OUTSIDE_M = 0.25  # m, beyond all that is drawn of a link: more than what is glued to it without a shape explains
+
+
+def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
+    """An imported arm without the values that are no data.
+
+    Parameters
+    ----------
+    robot : with limits, masses and drives as the file states them, and its shapes and visual meshes
+
+    Returns
+    -------
+    robot : without these efforts and masses; limits stay, graded ``inferred``
+    notes : what was found, and what is not judged therefore; in words
+    """
+    notes = []
+    stated = ~robot.slides & ~robot.continuous
+    half_turns = np.isclose([-robot.lower, robot.upper], math.pi, rtol=0, atol=ROUNDED_RAD)[:, stated]
+    if half_turns.shape[1] >= SEVERAL and half_turns.all():
+        text = "The file gives all joints +-180 deg, which is a placeholder"
+        robot = robot.replace(sources={**robot.sources, "limits": Source(text, "inferred")})
+        notes.append("the limits +-180 deg of all joints are a placeholder: what rests on limits is not settled")
+    if why := _no_efforts(robot):
+        drives = robot.masses.drives
+        rest = replace(drives, peak=np.full(robot.joints, np.nan)) if drives and _friction(drives) else None
+        robot = robot.replace(masses=replace(robot.masses, drives=rest))
+        notes.append(f"{why}: a placeholder, so no torque is held against it")
+    if why := _no_masses(robot):
+        robot = robot.replace(masses=Masses(drives=robot.masses.drives))
+        notes.append(f"{why}: the masses can't be right, so no torque is judged")
+    return robot, tuple(notes)
+
+
+def _no_efforts(robot: Robot) -> str:
+    """Why efforts are none; empty if they may be meant."""
+    drives = robot.masses.drives
+    known = np.empty(0) if drives is None else drives.peak[np.isfinite(drives.peak)]
+    if len(known) >= SEVERAL and np.ptp(known) == 0:
+        return f"all joints have the effort {known[0]:g}"
+    return f"joints have the effort {THOUSAND:g}" if (known == THOUSAND).sum() >= SEVERAL else ""
+
+
+def _friction(drives: Drives) -> bool:
+    """Whether friction of any joint is known."""
+    return bool(np.isfinite([drives.coulomb, drives.viscous]).any())
+
+
+def _no_masses(robot: Robot) -> str:
+    """Why masses are none; empty if they may be meant."""
+    masses = [each.body.mass for each in robot.masses.links]
+    if len(masses) >= SEVERAL and np.ptp(masses) == 0:
+        return f"all links have the mass {masses[0]:g} kg"
+    away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in robot.masses.links}
+    if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
+        link = max(far, key=lambda each: far[each])
+        more = f" and {len(far) - 1} more" if len(far) > 1 else ""
+        return f"the centre of mass of link {link}{more} is {1000 * far[link]:.0f} mm outside of the link"
+    about = [found.link for found in mass_findings(robot) if is_one(found, "about_origin")] if masses else []
+    if len(about) >= SEVERAL:
+        return f"{len(about)} links have inertias about their origin, not about their centre of mass"
+    return ""
+
+
+def _outside(robot: Robot, link: int, centre: Reals) -> float:
+    """How far (m) a centre (3,) is outside of the hull of what a link is drawn with; -inf where nothing is."""
+    parts = [visual.points for visual in robot.visuals if visual.link == link]
+    if arm_shapes(robot).given and link in (shapes := link_shapes(robot)):
+        parts.append(shapes[link].points)
+    if not parts:
+        return -math.inf
+    hull = scipy.spatial.ConvexHull(np.concatenate(parts), qhull_options="QJ")
+    return float((hull.equations @ np.append(centre, 1.0)).max())

@@ -1,0 +1,61 @@
+"""What fills a URDF's fields and is no data: named first, and nothing rests on it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from er3a.formats.urdf import import_urdf
+
+ROD = '<collision><origin xyz="0 0 0.15"/><geometry><box size="0.1 0.1 0.3"/></geometry></collision>'
+
+
+def written(folder: Path, mass="{k}.5", centre="0 0 0.15", about_origin=False, effort="{k}00", limit=2.0) -> Path:
+    """An arm of four joints, each link a rod of 0.3 m along z; ``{k}`` is the number of joint or link."""
+    text = '<robot name="r"><link name="l0"/>'
+    for k in range(1, 5):
+        across = float(mass.format(k=k)) * (0.1 / 12 + (0.15**2 if about_origin else 0))
+        along = float(mass.format(k=k)) * 0.02 / 12
+        inertia = f'<inertia ixx="{across}" iyy="{across}" izz="{along}" ixy="0" ixz="0" iyz="0"/>'
+        body = f'<inertial><origin xyz="{centre}"/><mass value="{mass.format(k=k)}"/>{inertia}</inertial>'
+        text += f'<link name="l{k}">{ROD}{body}</link><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
+        text += f'<child link="l{k}"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="{k % 2} {1 - k % 2} 0"/>'
+        text += f'<limit lower="{-limit}" upper="{limit}" velocity="2" effort="{effort.format(k=k)}"/></joint>'
+    path = folder / "arm.urdf"
+    path.write_text(text + "</robot>")
+    return path
+
+
+def test_what_may_be_meant_is_kept(tmp_path):
+    imported = import_urdf(written(tmp_path))
+    assert len(imported.robot.masses.links) == 4
+    assert imported.robot.masses.drives.peak.tolist() == [100, 200, 300, 400]
+    assert imported.robot.sources["limits"].grade == "export"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"mass": "1"}, {"centre": "0 0 1.4"}, {"about_origin": True}],
+    ids=["one mass for all", "centres far outside", "moments about the origin"],
+)
+def test_masses_that_are_none_are_left_out(tmp_path, given):
+    imported = import_urdf(written(tmp_path, **given))
+    assert not imported.robot.masses.links
+    assert "inertia" not in imported.robot.sources
+    assert "no torque is judged" in imported.notes[0]
+
+
+@pytest.mark.parametrize("effort", ["300", "1000", "0"])
+def test_efforts_that_are_none_are_unknown(tmp_path, effort):
+    robot = import_urdf(written(tmp_path, effort=effort)).robot
+    assert robot.masses.drives is None
+    assert len(robot.masses.links) == 4
+
+
+def test_half_turns_everywhere_are_limits_that_someone_assumed(tmp_path):
+    imported = import_urdf(written(tmp_path, limit=math.pi))
+    assert imported.robot.sources["limits"].grade == "inferred"
+    assert np.allclose(imported.robot.upper, math.pi, atol=1e-6)
