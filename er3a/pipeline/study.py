@@ -36,7 +36,8 @@ SettingsT = TypeVar("SettingsT", bound=StrictModel)
 
 
 class RobotEntry(StrictModel):
-    """One robot of the study; ``vision``: the file of what its camera sees, if it has one.
+    """One robot of the study; ``vision``: the file of what its camera sees, if it has one; ``confirm``: joint values
+    and the poses that its controller shows for them.
 
     ``base`` and ``tool`` replace those of its file, ``scene`` those of the stages. ``home_deg``: joint values (mm of
     joints that slide) from which its free space is explored; else joints at 0, or a pose that is chosen.
@@ -53,6 +54,7 @@ class RobotEntry(StrictModel):
     paths: Text
     programs: Text | None = None
     vision: Text | None = None
+    confirm: Text | None = None
     scene: Text | None = None
     base: Placement | None = None
     tool: Placement | None = None
@@ -451,7 +453,8 @@ class StudyBase(InputFile):
         -------
         settings : plain data: seed, the robot's entry without its files, and the key's settings
         """
-        not_counted = {"targets", "paths", "programs", "vision", "file", "scene", "expect", "tool_load", "payload"}
+        not_counted = {"targets", "paths", "programs", "vision", "confirm", "file", "scene", "expect"}
+        not_counted |= {"tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=not_counted, exclude_none=True)
         if variant := self.variants.get(name):
             entry["varied"] = {variant.vary: variant.value}

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import er3a
+from er3a.confirmation.document import controller_set
 from er3a.confirmation.fit import Fitter
 from er3a.confirmation.layers import search
 from er3a.confirmation.pairs import Pairs
 from er3a.confirmation.poses import of_angles, read_pairs
 from er3a.errors import Er3aError, InputError
+from er3a.files.robot_writer import write_robot
+from er3a.references.predict import state_of
+from er3a.references.reference import quantities_of
 from testing import controller_cases
 from testing.arms import links_of_rows
 
@@ -257,3 +264,43 @@ def test_each_cause_alone_is_named_first(name):
     for causes in ((), *((cause,) for cause in controller_cases.CAUSES)):
         made = controller_cases.case(robot, causes, seed=0)
         assert controller_cases.judged(search(Fitter(robot, made.pairs)), made.truth) == "first", causes
+
+
+def written(folder: Path, T: np.ndarray, q: np.ndarray) -> Path:
+    """A table as typed from a pendant to 0.01."""
+    rows = np.concatenate([q / DEG, T[:, :3, 3] * 1000], axis=1)
+    rows = np.concatenate([rows, Rotation.from_matrix(T[:, :3, :3]).as_euler("xyz", degrees=True)], axis=1)
+    heading = ",".join([*(f"J{k}" for k in range(1, 7)), *"XYZWPR"])
+    path = folder / "pendant.csv"
+    path.write_text("\n".join([heading, *(",".join(f"{value:.2f}" for value in row) for row in rows)]))
+    return path
+
+
+def test_a_controller_s_poses_are_a_document_about_the_arm(tmp_path):
+    q, X, Y = poses(), moved((0.02, 0, 0.12), (0, 30, 0)), moved((0.3, -0.2, 0.05), (0, 0, 45))
+    model = arm()
+    here = model.replace(base=Y, tool=X)
+    found = controller_set(here, model, written(tmp_path, Y @ shown(q) @ X, q))
+    assert len(found.rows["positions"]) == len(q)
+    state = state_of(model, quantities_of(found.checkable))
+    for each in found.checkable:
+        assert abs(each.quantity.value(state) - each.expected) <= each.uncertainty, each
+    with pytest.raises(InputError, match="tool or base set that the study has not"):
+        controller_set(model, model, tmp_path / "pendant.csv")
+
+
+@pytest.mark.long
+def test_the_page_opens_with_the_answer(tmp_path, call):
+    q = poses()
+    written(tmp_path, shown(q) @ moved((0.02, 0, 0.12)), q)
+    arm_file = tmp_path / "made.yaml"
+    write_robot(arm(), arm_file)
+    page = tmp_path / "page.html"
+    assert call("confirm", arm_file, tmp_path / "pendant.csv", "--html", page, "--expect", "frames").returncode == 0
+    text = page.read_text(encoding="utf-8")
+    headline = re.search(r'<h1>.*?<span class="(\w+)">', text)
+    assert headline
+    assert headline[1] == "caution"
+    placed = re.search(r"tool of the controller: \{xyz_mm: \[(\S+), \S+, (\S+)\]", text)
+    assert placed
+    assert [float(each) for each in placed.groups()] == pytest.approx([20, 120], abs=0.05)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from enum import StrEnum
 from functools import partial
@@ -48,6 +49,7 @@ def confirm(
     ] = None,
     plan: Annotated[bool, typer.Option("--plan", help="print five poses to read at the pendant")] = False,
     programs: Annotated[Path | None, typer.Option(help="of a plan: a folder for programs that move there")] = None,
+    html: Annotated[Path | None, typer.Option(help="write the answer as a page")] = None,
     every: Annotated[bool, typer.Option("--all", help="list each pose")] = False,
     base: Base = None,
     tip: Tip = None,
@@ -75,6 +77,14 @@ def confirm(
         _write(found, output)
         if not as_json:
             print(f"{output}: written")
+    if html is not None:
+        from er3a.pipeline.viewing.confirmation import write_confirmation
+
+        files = [Path(each) for each in (robot, poses) if Path(each).is_file()]
+        command = shlex.join(["er3a", "confirm", robot, poses, "--html", str(html)])
+        write_confirmation(read.robot, found, html, nearest=nearest, command=command, files=files)
+        if not as_json:
+            print(f"{html}: written")
     if found.verdict == "open" or not set(found.layers) <= {each.value for each in expect or ()}:
         raise typer.Exit(1)
 

@@ -39,7 +39,7 @@ TEXTS = texts(
         "confirmed#frames": "FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
         "confirmed#joints": "JOINTS: the arm agrees once joints are counted as the controller does; at most {off} off",
         "confirmed#small": "SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
-        "confirmed#another": "ANOTHER ARM: entries of the table are other; with these, at most {off} off",
+        "confirmed#another": "ANOTHER ARM: entries of the table differ; with these, at most {off} off",
         "confirmed#open": "OPEN: nothing explains the difference; at least {off} are left",
         "confirm.off": "{mm} mm and {deg} deg",
         "confirm.off_mm": "{mm} mm",

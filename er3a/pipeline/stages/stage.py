@@ -38,6 +38,11 @@ class RobotFiles(Protocol):
         """Path of the file of what the camera sees; None without a camera."""
         ...
 
+    @property
+    def confirm(self) -> str | None:
+        """Path of the file of joint values and poses of the controller; None without."""
+        ...
+
 
 class StudyFiles(Protocol):
     """What a stage asks of a study to name its inputs; :class:`er3a.pipeline.study.StudyBase` says what each gives."""

@@ -84,6 +84,7 @@
     draw();
   });
   addEventListener("resize", draw);
+  canvas.closest("details").addEventListener("toggle", draw);
   document.getElementById("copy").addEventListener("click", () => navigator.clipboard.writeText(document.getElementById("corrected").textContent));
   draw();
 }

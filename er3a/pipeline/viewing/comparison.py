@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from scipy.spatial.transform import Rotation
 
 from er3a.comparison.compare import Comparison, in_units
@@ -15,11 +16,13 @@ from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import tr
-from er3a.pipeline.messages.comparison import doubt_rows, headline, layer_rows
-from er3a.pipeline.messages.say import bracketed
+from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.messages.comparison import HEADLINES, doubt_rows, layer_rows
+from er3a.pipeline.messages.numbers import number
+from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, seen_arm, side_view
 from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
 
@@ -57,7 +60,9 @@ def write_comparison(
         provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
         names=(one[0], other[0]),
         verdict=found.verdict,
-        headline=headline(found, doubts),
+        headline=joined([*doubts, *map(say, slips), word("comparison", HEADLINES, found.verdict)]),
+        keys=_keys(found),
+        seen=_seen(in_units(one[1], slips, "a"), in_units(other[1], slips, "b"), same=found.verdict == "equal"),
         layers=[*doubt_rows(doubts), *layer_rows(found)],
         columns=_columns(),
         rows=[] if corrected is None else _rows(one[1], corrected),
@@ -66,6 +71,20 @@ def write_comparison(
         arms=None if corrected is None else _arms(in_units(one[1], slips, "a"), in_units(other[1], slips, "b"), found),
         compare_script=Path(__file__).with_name("comparison.js").read_text(encoding="utf-8"),
     )
+
+
+def _keys(found: Comparison) -> list[tuple[str, str]]:
+    """How far the flanges are off each other, and how far with base, zeros and directions alike."""
+    if found.as_printed_mm is None or found.aligned_mm is None:
+        return []
+    off, aligned = (with_unit(number(value, 3), "mm") for value in (found.as_printed_mm, found.aligned_mm))
+    return [(off, tr("flange off at worst")), (aligned, tr("base, zeros, directions alike"))]
+
+
+def _seen(one: Robot, other: Robot, *, same: bool) -> Markup:
+    kind: Kind = "right" if same else "wrong"
+    arms = [seen_arm(one, own_title(one.title), "A", kind), seen_arm(other, own_title(other.title), "B", "right")]
+    return side_view(arms, least_wide=UPRIGHT)
 
 
 def _columns() -> list[str]:

@@ -406,8 +406,8 @@ def _layout(shown: Recorded) -> rrb.Container:
     shares = [SPACE_SHARE] * len(views) + [1.0 + len(lanes)] * bool(lanes)
     left = rrb.Vertical(*seen, row_shares=shares)  # side by side they would cut the arm off
     if len(curves) > 1:
-        beside = rrb.Vertical(*curves, name="Curves")
-        return rrb.Horizontal(left, beside, texts, column_shares=[2.0, 1.0, 1.3], name=stage)
+        middle = rrb.Vertical(*curves, name="Curves")
+        return rrb.Horizontal(left, middle, texts, column_shares=[2.0, 1.0, 1.3], name=stage)
     return rrb.Horizontal(left, rrb.Vertical(*curves, *words, name="Words"), column_shares=[2.0, 1.3], name=stage)
 
 

@@ -19,6 +19,7 @@ Kind = Literal["right", "wrong", "other"]
 MARGIN = 0.06  # of the larger side
 LETTERS = 0.034  # of the height
 WIDE, UPRIGHT = 1.25, 0.77  # at least, of the height
+FLATTEST = 1.6  # width, of the height: letters stay legible over a level arm
 BONE = 0.045  # an arm's thickness, of the height of what is drawn
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
@@ -66,6 +67,8 @@ def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None, least_wide
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
+    flat = max(0.0, float(high[0] - low[0]) / FLATTEST - float(high[1] - low[1])) / 2
+    low[1], high[1] = low[1] - flat, high[1] + flat
     names, scale = (lines * 1.7 * LETTERS * (high[1] - low[1]) for lines in (len(arms), 1.2))
     low[1], high[1] = low[1] - scale, high[1] + names  # room for both
     wide, tall = high - low

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from er3a.confirmation.document import controller_set
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.diagnosis.ranking import usable
 from er3a.files.reference_sets import check_robot_origins, load_references
@@ -182,6 +184,8 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     robot = model.model_of(study, name)
     settings = study.section(ValidationSettings)
     sets = [load_references(reference, robot) for reference in robot.references]
+    if shown := study.entry(name).confirm:
+        sets.append(controller_set(study.robot(name), robot, Path(shown)))
     check_robot_origins(robot, [document for own in sets for document in own.documents.by_name])
 
     turning = is_turning(robot)

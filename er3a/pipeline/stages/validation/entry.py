@@ -21,7 +21,9 @@ class ValidationSettings(StrictModel):
 
 
 def _inputs(study: StudyFiles, robot: str) -> list[Path]:
-    return [file for name in study.references(robot) for file in sorted(reference_folder(name).glob("*.csv"))]
+    sets = [file for name in study.references(robot) for file in sorted(reference_folder(name).glob("*.csv"))]
+    poses = study.entry(robot).confirm
+    return [*sets, Path(poses)] if poses else sets
 
 
 STAGE = Stage(
