@@ -182,7 +182,7 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
     end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
     shapes = results.summary.verdict.shapes
     shown = end_text(path, path.sound_end, shapes=shapes)
-    assert f"also in a stop of {path.clear_until.stop_s:.2f} s" in shown
+    assert f"after a stop of {path.clear_until.stop_s:.2f} s" in shown
     within = path.clear_until.margin_mm < shapes.margin_mm
     first = "Confirm the shapes first, which may be wrong by 20 mm"
     assert shown.startswith(first) == within
