@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -35,6 +36,7 @@ from testing.small_study import STUDY, fresh
 ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
+MOST_FAST_S, SHOWN_SLOW = 0.4, 20  # processor time of a test of the fast set
 LONGEST_FILES = (
     "integration/test_wheel.py",
     "kinematics/test_by_class.py",
@@ -110,6 +112,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.long)
         if "shared_folder" in fixtures or item.get_closest_marker("long"):
             item.add_marker(pytest.mark.timeout(LONGEST_S))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """How much processor time each test takes, for the report at the end."""
+    start = time.process_time()
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("processor_s", time.process_time() - start))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name tests of the fast set that are long: mark them so."""
+    passed = terminalreporter.stats.get("passed", ())
+    spent = [(dict(each.user_properties).get("processor_s", 0.0), each) for each in passed]
+    slow = [(used, each.nodeid) for used, each in spent if used > MOST_FAST_S and "long" not in each.keywords]
+    for used, name in sorted(slow, reverse=True)[:SHOWN_SLOW]:
+        terminalreporter.write_line(f"long, and not marked so: {name} ({used:.1f} s of processor time)")
 
 
 def pytest_collection_finish() -> None:

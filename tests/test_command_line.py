@@ -77,6 +77,7 @@ def test_a_file_that_would_be_read_as_an_option_is_refused(call, tmp_path):
     assert done.stderr.startswith("error: --scene=evil.src: ")
 
 
+@pytest.mark.long
 def test_a_run_says_what_was_edited_meanwhile(call, monkeypatch):
     verdict = StageVerdict("arm", "workspace", "pass", "code", "text", outdated=("data/robots/arm.yaml",))
     monkeypatch.setattr(run_study, "run_study", lambda *_: True)

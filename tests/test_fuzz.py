@@ -89,6 +89,7 @@ def test_a_zero_with_a_huge_exponent_is_a_zero(tmp_path):
     assert judge(path).fault is None  # its last digit overflowed
 
 
+@pytest.mark.long
 def test_a_table_of_thousands_of_repeated_measurements_is_read_at_once(tmp_path):
     header, row, *_ = MEASUREMENTS.splitlines()
     path = tmp_path / "measured.csv"

@@ -29,6 +29,7 @@ def test_no_other_module_imports_open3d():
     assert importing == ["geometry/open3d_loader.py"]
 
 
+@pytest.mark.long
 def test_open3d_is_loaded_without_its_web_server():
     words = "import sys, er3a.geometry.open3d_loader as here; here.load_open3d(); print('dash' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)

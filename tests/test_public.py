@@ -335,6 +335,7 @@ class Cells(html.parser.HTMLParser):
             self.rows[-1] += 1
 
 
+@pytest.mark.long
 def test_objects_show_themselves_in_a_few_lines_and_as_tables(shown):
     for name, each in shown.items():
         if not isinstance(each, Displayed | Measurement):

@@ -155,6 +155,7 @@ def test_a_file_is_as_arrow_itself_writes_its_columns(table, tmp_path):
     found.validate(full=True)
 
 
+@pytest.mark.long
 def test_writing_a_table_loads_no_pandas(tmp_path):
     code = "import sys; from testing.made_stage import ROWS; from pathlib import Path; ROWS.write(Path(sys.argv[1])); "
     code += "assert 'pandas' not in sys.modules"

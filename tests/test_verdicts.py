@@ -235,6 +235,7 @@ def test_an_index_over_inputs_that_changed_since_says_so_as_verdicts_and_report_
     assert etree.parse(tmp_path / "junit.xml").getroot().get("failures") == "1"
 
 
+@pytest.mark.long
 def test_an_input_that_is_edited_while_a_stage_is_computed_makes_its_verdict_outdated(study, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     paths = tmp_path / "paths.yaml"

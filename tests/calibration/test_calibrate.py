@@ -177,6 +177,7 @@ def test_few_poses_give_fewer_entries_and_say_what_more_is_needed(random):
     assert (needed.poses, needed.determined, needed.determinable, needed.missing) == (1, 3, 5, 1)
 
 
+@pytest.mark.long
 def test_positions_of_another_arm_are_not_explained_away(random):
     robot, other = load_robot("er3a_c60_article"), load_robot("er3a_c60")
     rows = measured(other, random.uniform(-1, 1, (40, 6)), 0.05, random)
@@ -348,6 +349,7 @@ def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
     assert is_one(caught.value.finding, "more_positions")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("convert", [lambda q: q[:, [0, 1, 2, 3, 5, 4]], lambda q: q * [1, 1, 1, 1, -1, 1]])
 @pytest.mark.parametrize("known", [True, False])
 def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
@@ -372,6 +374,7 @@ def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
     assert er3a.calibrate(robot, advised).fits
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "joint"), [("er3_600", 3), ("er3_600", 5), ("er3a_c60", 4)])
 def test_a_wrong_sign_of_alpha_is_named(name, joint, random):
     robot = load_robot(name)

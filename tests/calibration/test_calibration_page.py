@@ -50,6 +50,7 @@ def test_the_page_hands_out_the_corrected_robot(written):
     assert "保留的 20 个位置" in page
 
 
+@pytest.mark.long
 def test_each_word_of_the_page_can_be_translated(written, tmp_path):
     robot = er3a.load_robot(DATA / "wam.yaml")
     rows = er3a.load_measurements(written / "wam.csv", robot)

@@ -207,6 +207,7 @@ def test_sag_under_the_arm_s_own_weight_is_told_from_a_load_at_the_tool(random):
     assert term.coefficients[0] == pytest.approx(3, abs=4 * term.standard_errors[0])
 
 
+@pytest.mark.long
 def test_a_large_sag_is_no_smaller_than_its_interval_says(random):
     """A coefficient of several times its usual size, in an arm that is measured finely."""
     bench = Bench("slide", random, {JointTerm("sag", 2): [6e-3]})
@@ -216,6 +217,7 @@ def test_a_large_sag_is_no_smaller_than_its_interval_says(random):
     assert found.beyond.deviation_mm == pytest.approx(0.015, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_load_that_lifts_the_arm_is_no_sag(random):
     bench = Bench("six", random, {JointTerm("sag", 2): [-3e-3]})
     found = er3a.calibrate(bench.robot, bench.measured(200, 0.05))
@@ -525,6 +527,7 @@ def test_what_is_touched_at_unknown_places_corrects_a_table(kind, arm, random, t
             assert each.nominal + each.correction == pytest.approx(true, abs=3 * each.half_width)
 
 
+@pytest.mark.long
 def test_touches_that_quite_another_arm_meets_better_settle_nothing():
     """A slide and two joints, four touches of each ball, seen with 1 mm: least squares ran off to a tool of metres, and
     the table was refused as another arm's; elsewhere it took terms, or entries with intervals of 0."""
@@ -643,6 +646,7 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_two_means_have():
     assert freedom == pytest.approx([second - 1, (1 / first + 1 / second) ** 2 / sum(shares)])
 
 
+@pytest.mark.long
 def test_two_poses_at_a_place_count_once(random):
     """An arm of three joints has few poses at a place: corrections, deviation and intervals are those of a fit without
     er3a to the differences of the two."""
@@ -722,6 +726,7 @@ def test_few_poses_find_a_term_without_trying_all(name, term, poses, random):
     assert bench.error(found) < 0.06
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("poses", [130, 80])
 def test_a_coupling_of_joints_is_found_and_held_by_a_robot_file(poses, random, tmp_path):
     """J4 turns a little with J2; the arm's coupling holds it, beside that which it has. From few poses other terms are

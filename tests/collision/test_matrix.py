@@ -304,6 +304,7 @@ def test_a_bent_tool_is_watched_beyond_the_wrist_of_guessed_shapes():
     assert "link_4/link_6" in found[1] | turned[1]
 
 
+@pytest.mark.long
 def test_a_tool_does_not_put_guessed_shapes_in_error():
     """As of a UR10, whose flange is as near to link 4 as its housings are thick."""
     arm = Robot.from_dh(

@@ -51,6 +51,7 @@ def test_formats_give_the_same_mesh(tmp_path, suffix):
     assert len(found.faces) == 20
 
 
+@pytest.mark.long
 def test_a_mesh_whose_triangles_are_turned_is_read_without_what_only_developers_have(tmp_path):
     mesh = angle_iron()
     mesh.faces[::3] = mesh.faces[::3, ::-1]

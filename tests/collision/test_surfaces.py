@@ -44,6 +44,7 @@ def coal_tree(corners: np.ndarray) -> coal.BVHModelOBBRSS:
     return model
 
 
+@pytest.mark.long
 def test_distances_and_collisions_are_those_of_the_triangles(arm: Robot) -> None:
     bodies = Bodies(arm, None)
     q = np.random.default_rng(5).uniform(arm.lower, arm.upper, (150, arm.joints))

@@ -58,6 +58,7 @@ def test_no_right_table_is_accused(kind):
         assert 1000 * far == pytest.approx(0, abs=4.0)  # angles that agree to 0.1 deg stay as printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_wrong_entries_are_named(kind):
     random = np.random.default_rng(100 + KINDS.index(kind))

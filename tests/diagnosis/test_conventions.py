@@ -52,6 +52,7 @@ def test_a_flange_defined_elsewhere_is_no_wrong_last_row(shift_mm):
     assert fault.shift_mm == pytest.approx([-c for c in shift_mm], abs=0.1)
 
 
+@pytest.mark.long
 def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
     right = er3a.load_robot("er3_600")
     upper = right.upper.copy()

@@ -48,6 +48,7 @@ def test_the_articles_zero_pose_lacks_an_offset_on_joint_2():
     assert not second.explains
 
 
+@pytest.mark.long
 def test_no_fault_or_two_makes_the_article_the_real_arm():
     ranked = er3a.diagnose(load_robot("er3a_c60_article"), "er3a_c60")
     assert not any(hypothesis.explains for hypothesis in ranked)
@@ -79,6 +80,7 @@ def test_single_faults_are_named(entries, named):
     assert first.explains
 
 
+@pytest.mark.long
 def test_unit_swap_scale_and_convention_are_named():
     robot = load_robot("er3a_c60")
     modified = to_modified(robot)
@@ -125,6 +127,7 @@ def test_what_references_cannot_tell_apart_is_named():
     assert any((fault.joint, fault.column) == (3, "d") for fault in lengths)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("times", "off"), [(1, 0), (10, 6)])
 def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere(times, off):
     """Where uncertainties are so large that some are like the best, but not like each other, too."""

@@ -224,6 +224,7 @@ def test_the_whole_set_stands_in_the_conclusion():
     assert (fact("reversed_direction", joint=5),) in members
 
 
+@pytest.mark.long
 def test_a_fault_beside_references_that_are_off_is_named_as_what_leaves_least(arm):
     """Two references are wrong by more than they own up to: nothing explains them, the fault explains the rest."""
     stated = list(stated_of(arm))

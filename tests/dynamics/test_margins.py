@@ -281,6 +281,7 @@ def test_forces_on_the_tool_count_to_the_wrists_moments(arm):
     assert off[5] == pytest.approx(100 * 0.1985 + 1.1 * 9.81 * 0.1135, rel=1e-4)
 
 
+@pytest.mark.long
 def test_levers_are_distances_of_the_load_from_the_axes(arm):
     point, q = np.array([0.03, -0.02, 0.1]), np.random.default_rng(2).uniform(arm.lower, arm.upper, (3000, 6))
     far, bounds = worst_levers(arm, point, range(2, 6))

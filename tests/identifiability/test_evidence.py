@@ -444,6 +444,7 @@ def test_a_table_that_names_an_unknown_document_is_refused():
         er3a.evidence(robot.replace(sources=wrong))
 
 
+@pytest.mark.long
 def test_a_robot_without_references_has_everything_open():
     found = evidence_of(puma(), [], Documents())
     assert {each.status for each in found.entries} == {"open", "gauge", "given"}

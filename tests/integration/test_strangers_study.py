@@ -134,6 +134,7 @@ def test_commands_run_nothing_of_the_folder(stranger, words, code):
     call("er3a", *words, code=code)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", [".", ":"])
 def test_a_folder_in_the_path_of_python_is_taken_out_of_it(stranger, path):
     folder, call = stranger
@@ -143,6 +144,7 @@ def test_a_folder_in_the_path_of_python_is_taken_out_of_it(stranger, path):
     call("python", "-m", "er3a", "check", "config/study.yaml", PYTHONPATH=path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", [".snakemake", "results", "reports/er3_600", "logs"])
 def test_a_folder_written_into_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path, place):
     foreign = tmp_path / "foreign"

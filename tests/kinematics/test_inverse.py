@@ -85,6 +85,7 @@ def test_random_arms_are_solved(data, robot):
         assert solution.within_limits[found].all()
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(data=st.data(), robot=arms(orthogonal_wrist=True))
 def test_each_branch_finds_all_branches_again(data, robot):

@@ -43,6 +43,7 @@ def test_all_reachable_poses_are_solved(robot, random, respect_limits):
         assert ((found.q >= robot.lower) & (found.q <= robot.upper)).all()
 
 
+@pytest.mark.long
 @settings(max_examples=60)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved_within_their_limits(data, robot):

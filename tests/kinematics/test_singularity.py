@@ -29,6 +29,7 @@ def test_determinant_is_a_constant_times_the_three_factors(robot, random):
     np.testing.assert_allclose(determinant, sign * constant * product_of_factors(robot, q), rtol=0, atol=1e-14)
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_determinant_of_random_arms_is_a_constant_times_the_three_factors(data, robot):
@@ -73,6 +74,7 @@ def test_factors_need_a_wrist_partitioned_arm():
         determinant_factors(make_arm(d=[0.3, 0, 0, 0.35, 0.02, 0.08]), np.zeros(6))
 
 
+@pytest.mark.long
 @settings(max_examples=50)
 @given(data=st.data(), robot=arms(), length=number(0.1, 2))
 def test_conditioning_agrees_with_singular_values(data, robot, length):

@@ -52,6 +52,7 @@ def apart(rows, q, others):
     return np.abs(np.where([row[0] == "P" for row in rows], away, (away + np.pi) % (2 * np.pi) - np.pi)).max(axis=1)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ARMS)
 def test_no_start_leads_to_an_arm_that_is_not_told(name, random):

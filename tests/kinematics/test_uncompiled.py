@@ -44,6 +44,7 @@ def test_each_reading_of_the_loop_by_itself_finds_the_rows_of_all(name, random):
             assert all(nearest(every.q[0], row) < 1e-8 for row in alone.q[0, : alone.count[0]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["crx", "manseur_doty"])
 def test_readings_of_the_loop_give_all_rows_of_a_pose(name, random):
     own = random.uniform(-np.pi, np.pi, (2, 6))

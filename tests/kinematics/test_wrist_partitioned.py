@@ -59,6 +59,7 @@ def test_too_far_says_by_how_much(robot, outside):
         assert "e+" not in say(found)
 
 
+@pytest.mark.long
 @settings(max_examples=100)
 @given(
     lengths_m=st.tuples(number(0, 0.3), number(0.1, 1), number(-0.15, 0.15), number(0.2, 1)),

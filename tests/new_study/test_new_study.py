@@ -328,6 +328,7 @@ def test_shapes_that_always_overlap_are_named(tmp_path):
     assert "overlap in all of them, which no arm can do. Correct the shapes, or allow the contact" in text
 
 
+@pytest.mark.long
 def test_collisions_that_were_not_examined_are_named(tmp_path):
     arm = arm_of(None, None, "er3_600")
     ball = Envelope(0, (0.0, 0.0, 0.3), (0.0, 0.0, 0.3), 2.0)
@@ -365,6 +366,7 @@ def xacro(tmp_path) -> Path:
     return tmp_path / "arm_support/urdf/my arm.urdf.xacro"
 
 
+@pytest.mark.long
 def test_xacro_is_expanded_with_its_packages_arguments_and_meshes(xacro):
     packaged = load_robot("er3_600")
     arm = arm_of(xacro, None, None, xacro=("mesh:=box.stl",))

@@ -51,6 +51,7 @@ def every_sequence(grid):
                         yield slot
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_no_other_sequence_stays_within_limits_for_longer(name):
     robot, random = load_robot(name), np.random.default_rng(6)

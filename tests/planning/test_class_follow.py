@@ -93,6 +93,7 @@ def test_without_start_joints_the_arm_with_most_margin_is_taken_and_limits_count
     assert follow_by_class(narrow, line(T[0], T[1], 1.0)).joints(np.array([0.0]))[0, 1] < 0
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("uncompiled")
 def test_what_can_not_be_followed_is_told_with_the_time():
     T = forward(SCARA, by_hand(*np.array([[0.5, 0.0, 0.25, 0.0]]).T, 1))[0]
@@ -164,6 +165,7 @@ def test_seven_joints_follow_a_line_and_keep_margin(with_start):
         assert others.max() < margin(joints) + np.radians(2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("with_start", [True, False])
 def test_a_last_joint_of_two_turns_goes_on_through_half_a_turn(with_start):
     """At one arm angle the joints keep all limits; joint 7 passes 180 deg on the way, which is no leap."""

@@ -207,6 +207,7 @@ def test_branch_is_chosen_for_the_whole_path_not_for_its_first_point():
     assert any(ok and not within(robot, other.q).all() for ok, other in zip(at_start, others))
 
 
+@pytest.mark.long
 @OTHERS_LONG
 def test_turns_keep_the_limits_of_sums_where_some_turns_do(robot, random):
     """Joints 4 and 6 of five turns each: of all turns, tried by hand, the least time outside a limit of a sum."""

@@ -33,6 +33,7 @@ def test_the_comparison_can_fail(robot, random):
     assert found.missed_crossings > 0
 
 
+@pytest.mark.long
 @OTHERS_LONG
 def test_passes_of_lines_are_located_to_1e_9_of_the_way(robot, random):
     """Against plane trigonometry in extended precision, without inverse kinematics."""

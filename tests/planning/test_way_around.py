@@ -92,6 +92,7 @@ def test_equal_tasks_give_equal_bytes_whatever_was_planned_before(random):
     assert alone.motion.curve.angle.tobytes() == again.motion.curve.angle.tobytes()
 
 
+@pytest.mark.long
 def test_jerk_is_kept_where_it_is_bounded(random):
     jerk = np.full(6, 200.0)
     one = task(load_scene("data/scenes/table_and_post.yaml"), limits=joint_limits(ROBOT, np.ones(6), 0.25, jerk=jerk))

@@ -366,6 +366,7 @@ def test_targets_are_checked_though_there_is_no_time_for_proofs(tmp_path):
     assert {(14, "way_out_of_reach"), (15, "above_limit"), (16, "not_followed")} <= found
 
 
+@pytest.mark.long
 def test_a_round_of_a_loop_that_turns_the_wrist_on_leaves_its_limits(tmp_path):
     T = forward(ROBOT, HOME)
     turns = []

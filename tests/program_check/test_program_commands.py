@@ -54,6 +54,7 @@ def test_what_was_checked_is_said_once_and_findings_are_lines_as_compilers_print
     assert found.endswith("[above_limit]")
 
 
+@pytest.mark.long
 def test_the_exit_code_follows_what_is_asked():
     assert check("data/programs/weld_seam.src").exit_code == 0
     assert check("data/programs/weld_seam.src", "--require", "scene,tool").exit_code == 1
@@ -130,6 +131,7 @@ def test_json_holds_verdicts_and_parameters():
     assert moments["above_limit"] > 0
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 def test_no_motion_passes_by_numbers_that_look_like_another_unit(tmp_path):
     scene, program = yaml.safe_load(Path(SCENE).read_text()), "data/programs/weld_seam.src"

@@ -164,6 +164,7 @@ def refused(path):
     return None
 
 
+@pytest.mark.long
 @settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_programs_are_read_or_refused_clearly(data, tmp_path):

@@ -399,6 +399,7 @@ def wound_path(count):
     return q, forward(ROBOT, q)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", ["rpl", "xpl"])
 def test_joints_of_a_long_table_of_poses_are_those_it_was_made_of(language, tmp_path):
     q, poses = wound_path(2500)  # more than are solved at once

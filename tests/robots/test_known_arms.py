@@ -99,6 +99,7 @@ def test_a_far_table_is_not_named(tmp_path):
     assert min(each["different_entries"] for each in found["nearest"]) > 1
 
 
+@pytest.mark.long
 def test_one_wrong_entry_or_another_unit_does_not_hide_an_arm():
     robots = {name: arm.robot for name, arm in known_arms().items()}
     random = np.random.default_rng(0)

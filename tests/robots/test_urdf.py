@@ -122,6 +122,7 @@ def test_snapping_gives_the_real_arm_and_says_what_it_changed(tmp_path):
     np.testing.assert_allclose(forward(load_robot(path), q), forward(got, q), atol=1e-12)
 
 
+@pytest.mark.long
 def test_any_six_axes_get_an_exact_table(random):
     for k in range(300):
         alpha = random.uniform(-np.pi, np.pi, 6) if k % 3 else random.choice([0, np.pi / 2, -np.pi / 2, np.pi], 6)

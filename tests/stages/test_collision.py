@@ -80,6 +80,7 @@ def test_what_lies_below_the_floor_is_lost(results):
     assert not rows.clear[rows.middle_mm[:, 2] < -100].any()
 
 
+@pytest.mark.long
 def test_page_and_recording_say_what_was_found(folder, tmp_path):
     for view, file in (("report", "page.html"), ("record", "collision.rrd")):
         run.show(view, "collision", study_with(), NAME, folder, tmp_path / file)
@@ -107,6 +108,7 @@ def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results
     assert f" {', '.join(met)}. " in say(found)
 
 
+@pytest.mark.long
 def test_a_path_that_collides_though_it_is_meant_to_be_run_is_no_pass(tmp_path):
     content = study_with(samples=1000, rounds=0).model_dump()
     text = Path(content["robots"][NAME]["paths"]).read_text(encoding="utf-8")

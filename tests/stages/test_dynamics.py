@@ -139,6 +139,7 @@ def test_an_arm_of_four_joints_without_masses_gets_page_and_recording(tmp_path):
         assert (tmp_path / name).stat().st_size > 1000
 
 
+@pytest.mark.long
 def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     summary = bare.results.summary
     verdict = summary.verdict.finding
@@ -167,6 +168,7 @@ def test_the_tables_torques_are_those_of_the_public_function(bare):
     assert np.abs(rows.power_w - rows.torque * qd)[5:-5].max() < 0.02 * np.abs(rows.power_w).max()
 
 
+@pytest.mark.long
 def test_within_the_limits_it_fits(full):
     found = full[1]
     summary = found.results.summary
@@ -220,6 +222,7 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("group", "need"), [("drives", "drives_guess"), ("wrist_load", "wrist_guess")])
 def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
     def guessed(content: dict[str, Any]) -> None:
@@ -247,6 +250,7 @@ def test_limits_that_no_path_was_held_against_are_no_pass(full):
     assert (verdict.status, verdict.finding.not_run) == ("caution", tuple(each.name for each in summary.paths))
 
 
+@pytest.mark.long
 def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
     study, found = full
     summary = found.results.summary
@@ -266,6 +270,7 @@ def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
     assert ("; for sizing motors and gears" in page, "not for sizing motors and gears" in page) == (known, not known)
 
 
+@pytest.mark.long
 def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
     left = {each.reason: each for each in bare.results.summary.assumed}
     assert left["link_masses"].names == ("6",)
@@ -284,6 +289,7 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
     assert "friction of the joints" in say(verdict)
 
 
+@pytest.mark.long
 def test_a_path_that_is_to_be_run_and_may_not_be_is_no_pass(tmp_path):
     study = a_study(tmp_path, limited(1.0), entry={"payload": CLAIM | {"body": LOAD}})
     paths = yaml.safe_load((tmp_path / "paths.yaml").read_text())
@@ -361,6 +367,7 @@ def test_forces_on_the_tool_count_to_the_wrist_at_rest_and_along_the_paths(tmp_p
     assert more[5] != 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrist_load", [{"payload_kg": 1.0}, {}])
 def test_a_wrist_of_which_no_moment_is_known_is_compared_by_its_payload_alone(tmp_path, wrist_load):
     def only(content: dict[str, Any]) -> None:
@@ -374,6 +381,7 @@ def test_a_wrist_of_which_no_moment_is_known_is_compared_by_its_payload_alone(tm
     assert found.status == ("fail" if wrist_load else "caution")
 
 
+@pytest.mark.long
 def test_beyond_the_limits_it_is_an_overload(tmp_path, full):
     study = a_study(tmp_path, limited(0.3), entry={"payload": CLAIM | {"body": LOAD}}, kept=ONE)
     beyond = computed(tmp_path, study)
@@ -404,6 +412,7 @@ def test_doubtful_masses_are_no_pass(tmp_path):
     assert [each.code for each in found.results.summary.findings] == ["centre_outside"]
 
 
+@pytest.mark.long
 def test_a_guess_is_made_on_request_and_graded_inferred(tmp_path):
     def change(content: dict[str, Any]) -> None:
         del content["inertia"]
@@ -417,6 +426,7 @@ def test_a_guess_is_made_on_request_and_graded_inferred(tmp_path):
     assert "inferred" in say(summary.verdict.finding)
 
 
+@pytest.mark.long
 def test_process_forces_and_gravity_reach_the_results(tmp_path, bare):
     payload = CLAIM | {"body": {"mass_kg": 0.0}, "force_n": [0.0, 0.0, 100.0]}
     study = a_study(tmp_path, entry={"payload": payload}, settings={"gravity_m_s2": 0.0}, kept=ONE)
@@ -427,6 +437,7 @@ def test_process_forces_and_gravity_reach_the_results(tmp_path, bare):
     assert np.abs(bare.results.torques.tool).max() == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("gravity", "named"), [(0.0, True), (1.62, True), (9.8, False)])
 def test_no_verdict_passes_by_a_gravity_that_is_not_earths(tmp_path, gravity, named):
     """Weightless, any drive is strong enough."""
@@ -452,6 +463,7 @@ def test_a_load_concerns_this_stage_alone(full):
         assert "mass_kg" not in str(study.computed_from("er3a_c60", stage))
 
 
+@pytest.mark.long
 def test_page_and_recording_say_what_was_found(full, tmp_path):
     study, found = full
     report(study, found, tmp_path / "page.html")
@@ -550,6 +562,7 @@ def test_the_loads_moments_along_a_path_have_tolerances(full):
             assert 0 < moment.tolerance < 1.5 * 9.81 * (0.3 * 0.17 + 0.035) * 1.5
 
 
+@pytest.mark.long
 def test_forces_of_joints_that_slide_are_not_called_torques_in_newton_metres(full, tmp_path):
     study, found = full
     summary = found.results.summary
@@ -576,6 +589,7 @@ def test_moments_about_a_joint_that_slides_are_refused():
         check_masses(None, wrist_group, [False, False, True, False])
 
 
+@pytest.mark.long
 def test_the_load_that_a_program_names_is_no_part_of_the_torques(tmp_path):
     move = "movej([{}, -0.17, -0.17, 0, -1.22, 0])\n"
     text = f"def p():\n{move.format(0.2)}set_payload(2, [0.02, 0, 0.09])\n{move.format(0)}end\n"

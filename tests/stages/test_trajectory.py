@@ -417,6 +417,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     assert {name for name, mark in marks.items() if mark == "pass"} == {*paths} - {fault.name for fault in wrong}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("status", "told"), [("fail", "Never use this table"), ("pass", None), (None, "was not validated")]
 )

@@ -249,6 +249,7 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     assert replace(path, collisions=()).outcomes == ("leaves limits",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "duration", "came_to"),
     [
@@ -386,6 +387,7 @@ def test_a_fault_has_its_place_along_the_path(tmp_path, name):
         np.testing.assert_allclose(far, 1000 * np.linalg.norm(tool - start), atol=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("expect", "status", "shown"), [(None, "fail", 0), ("unreachable", "caution", 1), ("collides", "fail", 0)]
 )
@@ -448,6 +450,7 @@ def test_a_rate_far_beyond_its_limit_is_told_to_two_digits_and_none_where_it_has
     assert times_needed(112.0) == "110 × its limit"
 
 
+@pytest.mark.long
 def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_first(tmp_path):
     """Speeds towards the edge of the reach come before it in time and are told after it. Of assumed limits and known
     ones the earliest is told first, with the word that it is assumed; the player opens where that is worst."""
@@ -475,6 +478,7 @@ def test_what_follows_from_another_fault_is_told_after_it_and_the_singular_pose_
     assert both[0].t_s < both[1].t_s
 
 
+@pytest.mark.long
 def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_path):
     """Against the tool's speed itself, of the repair and of the path at the same place, by differences."""
     results = compute(study_of(tmp_path, "line_wrist_near"), ROBOT)
@@ -499,6 +503,7 @@ def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_
     assert slowed(replace(path, strategy="branch"), rows, repair) is None
 
 
+@pytest.mark.long
 def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_too(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", "line_wrist_near"), ROBOT)
     robot = load_robot(ROBOT)

@@ -219,6 +219,7 @@ def test_what_is_read_is_written_as_the_same_bytes(study, folders, stored, tmp_p
     assert list(read.checks.subject) == [check.subject for check in read.summary.checks]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("edit", "missed", "finding"),
     [
@@ -245,6 +246,7 @@ def test_the_studys_tool_and_base_do_not_matter(study, folders, tmp_path):
     assert (tmp_path / "checks.parquet").read_bytes() == (folders["er3_600"] / "checks.parquet").read_bytes()
 
 
+@pytest.mark.long
 def test_a_robot_without_references_and_speeds(study, tmp_path):
     def edit(content):
         content["references"] = []
@@ -257,6 +259,7 @@ def test_a_robot_without_references_and_speeds(study, tmp_path):
     assert "names no reference set" in page_of(bare, stored, tmp_path)
 
 
+@pytest.mark.long
 def test_speeds_that_the_robot_file_lacks_are_not_judged(study, tmp_path):
     results = computed(edited_robot(study, tmp_path, lambda content: content.pop("speeds")), tmp_path / "out").results
     assert results.summary.verdict.status == "caution"

@@ -167,6 +167,7 @@ def test_a_box_lower_than_the_layers_of_places_stands_whole_or_is_told_why_not()
     assert stand.why_none in (None, "in_the_way", "out_of_reach")
 
 
+@pytest.mark.long
 def test_a_box_stands_on_a_surface_where_the_arm_leaves_it_room_or_is_told_why_not():
     def block(name: str, size: list[float], x: float, top: float) -> Box:
         return Box(name, transform(np.array([x, 0.0, top - size[2] / 2]), np.zeros(3)), np.array(size))

@@ -125,6 +125,7 @@ def test_a_verdict_says_which_limit_makes_the_void():
 # --- reach ---
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "reach_mm"), [("er3_600", 592.8 + 78.5), ("er3a_c60", 627.1 + 78.5), ("er3a_c60_article", 1301.61 + 125.6)]
 )

@@ -7,6 +7,7 @@ import io
 import re
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from er3a.collision.shapes import arm_shapes
@@ -48,6 +49,7 @@ def test_what_is_near_covers_what_is_far_and_lies_where_perspective_puts_it():
         assert shown[HEIGHT // 2, WIDTH // 2 + 120, 0] > 100  # red around it
 
 
+@pytest.mark.long
 def test_a_player_has_one_that_is_the_same_each_time_and_shows_the_contact():
     robot = load_robot("er3a_c60")
     q = np.zeros((20, 6))

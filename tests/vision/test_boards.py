@@ -250,6 +250,7 @@ def seen_corners(random: np.random.Generator, places: list[np.ndarray]) -> list[
     return [each + random.normal(0, 0.3, each.shape) for each in exact]
 
 
+@pytest.mark.long
 def test_another_board_is_not_found():
     random = np.random.default_rng(5)
     image = rendered(CHESS, board_places(random, 1)[0], random)

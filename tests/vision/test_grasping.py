@@ -283,6 +283,7 @@ def test_without_the_planner_the_object_says_so(monkeypatch):
     assert plan.refusal == fact("no_transfer", why=fact("library_missing", name="OMPL"))
 
 
+@pytest.mark.long
 def test_a_start_outside_the_limits_is_named():
     robot = load_robot(FIXED.robot)
     _, _, plan = chosen_from(BEHIND_THE_POST + np.array([robot.upper[0], 0, 0, 0, 0, 0]))
@@ -290,6 +291,7 @@ def test_a_start_outside_the_limits_is_named():
     assert is_one(plan.refusal.why, "no_end")
 
 
+@pytest.mark.long
 def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):
     """With an error along one axis alone the probability is known: 2 Phi(tolerance / deviation) - 1."""
     made, robot, found = cell

@@ -238,6 +238,7 @@ def test_a_pose_written_again_at_the_end_is_no_other_setup():
     assert not any(is_one(each, "moved_between") for each in calibrate_hand_eye(samples).warnings)
 
 
+@pytest.mark.long
 def test_places_are_the_same_in_any_order():
     """A chain of small steps, each near the next: one place, whichever comes first."""
     chain = a_set("eye_in_hand", 6, 8)
@@ -275,6 +276,7 @@ def a_pnp_set(setup: str, seed: int, given: np.ndarray) -> CalibrationSet:
     return CalibrationSet(setup, flange_of(setup, T), by_solve_pnp(T, random, 0.1, given))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_poses_computed_with_a_wrong_focal_length_or_principal_point_are_named(setup):
     """No sample shows it alone; the camera is off by several mm."""
@@ -387,6 +389,7 @@ def test_a_step_of_the_setup_is_named_with_and_without_stated_deviations(stated)
     assert (step.sample, step.what) == (samples.names[8], "camera")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_the_other_setup_is_named(setup):
     samples = a_set(setup, 15)
@@ -531,6 +534,7 @@ def test_a_set_of_two_setups_is_named_with_the_sample_between(setup, last, what,
     assert named.moved_mm == pytest.approx(truth, rel=0.3, abs=3)
 
 
+@pytest.mark.long
 def test_sound_sets_are_not_of_two_setups():
     for samples in (a_set(setup, seed, 15) for setup in SETUPS for seed in range(40, 50)):
         assert moved_between(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None

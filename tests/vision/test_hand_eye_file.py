@@ -223,6 +223,7 @@ def test_the_command_ends_with_an_error_where_a_calibration_cant_be_used(tmp_pat
     assert "its positions are (x, −y, −z)" in " ".join(found.output.split())
 
 
+@pytest.mark.long
 def test_touched_points_that_contradict_a_calibration_end_the_command_with_code_1(tmp_path, poses):
     """Points of the board, touched where it is, and 20 mm beside."""
     flange, target = poses

@@ -13,6 +13,7 @@ from er3a.vision.vision_findings import grave_warnings
 from testing.hand_eye_coverage import ROBOT, a_set
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", ["eye_in_hand", "eye_to_hand"])
 def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined(setup):
     for joint, deg in ((3, 5.0), (6, 5.0), (3, 0.0)):
@@ -33,6 +34,7 @@ def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_e
     assert zeros_tried(calibrate_hand_eye(poses), ROBOT)[1] == ("J1", "J2", "J3", "J4", "J5", "J6")
 
 
+@pytest.mark.long
 def test_a_joint_zero_below_the_size_that_is_stated_goes_unnamed():
     for share, named in ((0.5, False), (1.5, True)):
         least = zeros_tried(calibrate_hand_eye(a_set("eye_to_hand", 5, {}, 12, stated=False)), ROBOT)[2]

@@ -165,6 +165,7 @@ def test_the_criterion_is_the_least_over_box_and_cone(random):
     assert limit_margin == pytest.approx(places.limit_margin[0], abs=1e-9)
 
 
+@pytest.mark.long
 def test_harder_tasks_are_never_easier():
     robot = load_robot("er3a_c60")
     easy = places_of(robot, TRAY)

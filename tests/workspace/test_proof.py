@@ -93,6 +93,7 @@ def test_filled_cells_are_reached_at_random_points(proven, random):
     assert not missed
 
 
+@pytest.mark.long
 def test_filled_cells_about_axis_1_are_reached(proven, random):
     """Their proof is another one: a cube about the axis, for joint 1 at rest."""
     robot, proof = proven
@@ -113,6 +114,7 @@ def test_bracket_narrows(proven):
     assert finer.width < 0.7 * coarse.width
 
 
+@pytest.mark.long
 def test_points_that_are_filled_one_by_one_are_reached_and_contradict_no_cell(proven, random):
     robot, proof = proven
     reached = forward(robot, samples(robot, 20_000))[:, :3, 3]
@@ -143,6 +145,7 @@ def test_a_void_is_open_to_all_sides_but_the_axis_and_nothing_is_reached_beyond_
     assert beyond.tolist() == [EMPTY, FILLED]
 
 
+@pytest.mark.long
 def test_the_small_void_at_the_articles_shoulder_is_found():
     """About 40 mm in radius, in a workspace of 1.4 m: no cloud of 10 000 points shows it."""
     robot = load_robot("er3a_c60_article")
@@ -229,6 +232,7 @@ def test_no_sample_of_a_random_arm_lies_in_an_empty_cell(limits, tool, base, off
     assert 0 <= proof.proof.bounds[0] <= proof.proof.bounds[1]
 
 
+@pytest.mark.long
 def test_filled_holds_for_an_offset_tool_and_a_short_joint_4(random):
     plain = load_robot("er3_600")
     lower, upper = plain.lower.copy(), plain.upper.copy()
@@ -246,6 +250,7 @@ def test_filled_holds_for_an_offset_tool_and_a_short_joint_4(random):
 # --- parts ---
 
 
+@pytest.mark.long
 @settings(max_examples=200)
 @given(st.lists(st.tuples(st.floats(-20, 20), st.floats(0, 7)), max_size=8), st.booleans())
 def test_arcs_agree_with_a_fine_grid(cuts, more):
