@@ -489,6 +489,7 @@ def _known(names: Iterable[str]) -> str:
 SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
 WIDE_DEG = 30.0
 HALF_DEG, COMMANDED_DEG = 0.5, 2.5
+LEAST_COMMANDED = 4  # values of a row; rounded to whole degrees they would all be commanded ones once in 600 rows
 LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 _COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
@@ -635,18 +636,22 @@ def _fill_uncertainty(format: Format, fields: Fields) -> None:
 
 
 def _fill_rounding(table: list[Fields]) -> None:
-    """Half the last digit of each joint value, cell by cell; none of commanded poses, which are exact.
+    """Half the last digit of each joint value, cell by cell; none of commanded values, which are exact.
 
     A table of whole and half degrees alone is of commanded poses. Beside typed ones of the same source, a row counts as
     commanded only if all its values are multiples of 2.5 degrees: six others, rounded to whole degrees, are so once in
-    15 000 rows.
+    15 000 rows. Four and more such values in a row whose others are written longer are commanded, too.
     """
     typed = [[fields[name] for name in (*_POSE, *_FURTHER) if fields.get(name) is not None] for fields in table]
     mixed = {fields["source"] for fields, values in zip(table, typed) if not _multiples_of(HALF_DEG, values)}
     for fields, values in zip(table, typed):
         commanded = _multiples_of(COMMANDED_DEG if fields["source"] in mixed else HALF_DEG, values)
         cells = [fields.get(name) for name in (*_POSE, *_FURTHER)]
-        halves = [0.0 if cell is None else 0.5 * 10.0**-cell.decimals for cell in cells]
+        short = [value for value in values if value.decimals <= 1]
+        exact = short if len(short) >= LEAST_COMMANDED and _multiples_of(COMMANDED_DEG, short) else []
+        halves = [
+            0.0 if cell is None or any(cell is each for each in exact) else 0.5 * 10.0**-cell.decimals for cell in cells
+        ]
         fields["rounding"] = () if commanded else tuple(halves)
 
 
