@@ -32,7 +32,10 @@ rule all:
 onerror:
     print(
         "\nWhat failed, in short:",
-        *(told("error: ") or ["no job gave a reason: the run was stopped, or see the logs named above"]),
+        *(
+            told("error: ")
+            or ["see the lines marked ✗ above, and the logs that they name; without any the run was stopped"]
+        ),
         sep="\n",
     )
 

@@ -132,11 +132,12 @@ class RunLog(LogHandlerBase):
         elif event == LogEvent.JOB_ERROR:
             job = record.__dict__
             name, logs = self._job_name(job), [str(log) for log in job.get("log") or ()]
-            self._print(f"✗ {name}: ended with an error; see {', '.join(logs)}")
-            if logs and (number := self._killed.get(logs[0], 0)) and (log := Path(logs[0])).is_file():
-                why = "; out of memory?" if number == SIGKILL else ""
+            number = self._killed.get(logs[0], 0) if logs else 0
+            reason = f"killed (signal {number}{'; out of memory?' * (number == SIGKILL)})"
+            self._print(f"✗ {name}: {reason if number else 'ended with an error'}; see {', '.join(logs)}")
+            if number and (log := Path(logs[0])).is_file():
                 with log.open("a", encoding="utf-8") as told:  # where reasons are looked for when the run has ended
-                    told.write(f"\nerror: {name}: killed (signal {number}{why})\n")
+                    told.write(f"\nerror: {name}: {reason}\n")
         elif event == LogEvent.ERROR:
             if ended := _JOB_ENDED.search(record.getMessage()):
                 self._killed[ended[1]] = int(ended[2] or max(int(ended[3]) - 128, 0))
