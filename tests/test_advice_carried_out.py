@@ -81,7 +81,7 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
     *("payload", "payload.ask"),
-    *("validation.off", "validation.defined_otherwise", "far_from_table"),
+    *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }
 NO_ADVICE = {"not_of_this_arm", "below_limit", "trajectory.paths"}
 

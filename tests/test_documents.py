@@ -64,7 +64,7 @@ STANDS_FOR = {
     "--help": {},
 }
 # Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
-OF_A_STUDY = {"new", "run", "verdicts", "view", "diff", "--install-completion"}
+OF_A_STUDY = {"new", "compute", "run", "verdicts", "view", "diff", "--install-completion"}
 
 
 def all_blocks(*languages: str) -> list[Any]:

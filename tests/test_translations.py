@@ -14,6 +14,7 @@ PAIRS = {
     "docs/new-robot.md": "docs/new-robot.zh-CN.md",
     "docs/paths.md": "docs/paths.zh-CN.md",
     "docs/confirm.md": "docs/confirm.zh-CN.md",
+    "docs/install.md": "docs/install.zh-CN.md",
     "docs/notebooks/article_steps.md": "docs/notebooks/article_steps_zh.md",
 }
 COMMENT = re.compile(r"\s*#.*")

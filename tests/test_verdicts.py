@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -139,7 +139,7 @@ def test_jobs_that_fail_leave_an_error_which_the_next_run_takes_away(study, tmp_
 
     monkeypatch.setattr("er3a.pipeline.run_study.check_study", lambda file: study)
     monkeypatch.setattr("er3a.pipeline.run_study._snakemake", snakemake)
-    monkeypatch.setattr("er3a.pipeline.run_study._taken_lock", lambda: os.open(os.devnull, os.O_RDWR))
+    monkeypatch.setattr("er3a.pipeline.run_study._taken_lock", lambda: SimpleNamespace(release=lambda: None))
     started = Path("study.yaml"), Path("results"), Path("reports"), ["--verbose", "--executor", "local"]
     assert not run_study(*started)
     assert "did not end well" in the_error(report)
@@ -277,7 +277,7 @@ def row_of(page: str, robot: str) -> str:
 
 def cells_of(page: str, robot: str) -> dict[str, str]:
     """The marks of a robot's stages in the index, by stage."""
-    cells = re.findall(rf'<td class="(\w+)"><a href="{robot}/(\w+)\.html"><b>', row_of(page, robot))
+    cells = re.findall(rf'<td class="(\w+)"><a href="{robot}/(\w+)\.html"(?: title="[^"]*")?><b>', row_of(page, robot))
     return {stage: mark for mark, stage in cells}
 
 

@@ -177,7 +177,7 @@ def test_a_path_that_leaves_the_reach_is_given_a_point_that_is_reached(study, re
     robot, path = study.robot("er3a_c60"), by_name(results["er3a_c60"])["line_out"]
     (fault,) = (each for each in faults(results["er3a_c60"]) if each.name == "line_out")
     t = float(re.search(r"&t=(.*?)&until=\1#", fault.instead[1])[1])
-    xyz = [float(value) for value in re.search(r"x, y, z = (.*?) mm", fault.to_do)[1].split(", ")]
+    xyz = [float(value) for value in re.search(r"\((.*?)\) mm", fault.to_do)[1].split(", ")]
     assert 0 < t <= min(part.t0_s for part in (*path.too_fast, *path.unreachable))
     assert xyz[1:] == [0.0, 400.0]
     assert 350 < xyz[0] < 350 + 1000 * path.unreachable[0].s0_m

@@ -208,12 +208,12 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     said = advice(path)
     (entry,) = (each for each in load_paths(f"data/paths/{robot}.yaml").paths if each.name == name)
     start, end = np.array(entry.start.xyz_mm), np.array(entry.end.xyz_mm)
-    found = re.search(r"x, y, z = (.*?) mm: (.*?) s before the first fault; a stop takes (.*?) s", said)
+    found = re.search(r"s, \((.*?)\) mm: (.*?) s before the first fault; a stop takes (.*?) s", said)
     named = np.array([float(x) for x in found[1].split(", ")])
     part = float(np.linalg.norm(named - start) / np.linalg.norm(end - start))
     there = {"xyz_mm": named.tolist(), "rpy_deg": list(entry.end.rpy_deg)}
     shorter, *_ = paths_of(tmp_path, name, robot=robot, end=there, duration_s=path.duration_s * part)
-    assert f"x, y, z = {found[1]} mm: {found[2]} s before" in fault.to_do
+    assert f"({found[1]}) mm: {found[2]} s before" in fault.to_do
     assert named == pytest.approx(start + part * (end - start), abs=0.06)
     assert shorter.verdict == "safe"
     assert shorter.clearance is None or shorter.clearance.least_mm >= 20
