@@ -26,7 +26,7 @@ for stage in STAGES.values():
         message:
             f"{{wildcards.robot}}: compute {stage.name}"
         shell:
-            ER3A + " compute {params.stage} {wildcards.robot} 2> {log}"
+            f"{ER3A} compute {{params.stage}} {{wildcards.robot}} 2> {{log}}"
 
     rule:
         name:

@@ -44,7 +44,7 @@ for robot in ROBOTS:
         message:
             f"{robot}: write pages and recordings"
         shell:
-            ER3A + " views {params.robot} {params.pages} 2> {log}"
+            f"{ER3A} views {{params.robot}} {{params.pages}} 2> {{log}}"
 
 
 rule index:
@@ -73,7 +73,7 @@ rule index:
     message:
         "write the index"
     shell:
-        ER3A + " index 2> {log}"
+        f"{ER3A} index 2> {{log}}"
 
 
 if STUDY.article:
@@ -108,4 +108,4 @@ if STUDY.article:
         message:
             "write the page on the article"
         shell:
-            ER3A + " article 2> {log}"
+            f"{ER3A} article 2> {{log}}"
