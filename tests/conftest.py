@@ -125,7 +125,9 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name tests of the fast set that are long: mark them so."""
+    """With ``--durations`` name tests of the fast set that are long, so that they are marked; cold kernels count, too."""
+    if terminalreporter.config.getoption("durations") is None:
+        return
     passed = terminalreporter.stats.get("passed", ())
     spent = [(dict(each.user_properties).get("processor_s", 0.0), each) for each in passed]
     slow = [(used, each.nodeid) for used, each in spent if used > MOST_FAST_S and "long" not in each.keywords]

@@ -226,7 +226,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     )
     unsettled = [*open_, *getattr(finding, "unbounded", ())] if isinstance(finding, LeftOpen) else open_
     if any(name.startswith("direction") for name in unsettled):
-        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#entries"))
+        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#table-entries"))
     left = [
         each for each in dict.fromkeys(unsettled) if each.rstrip("0123456789") in ("a", "alpha", "d", "beta", "offset")
     ]
@@ -236,7 +236,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
         steps.append((text, f"{address}#table-described"))
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
     if any(part.settled + part.up_to_signs < part.entries for part in limits):
-        steps.append((tr("Enter limits and speeds from the controller."), f"{address}#entries"))
+        steps.append((tr("Enter limits and speeds from the controller."), f"{address}#table-entries"))
     return steps
 
 
