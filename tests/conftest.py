@@ -125,7 +125,7 @@ def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """With ``--durations`` name tests of the fast set that are long, so that they are marked; cold kernels count, too."""
+    """With ``--durations`` name long tests of the fast set, so that they are marked; cold kernels count, too."""
     if terminalreporter.config.getoption("durations") is None:
         return
     passed = terminalreporter.stats.get("passed", ())
