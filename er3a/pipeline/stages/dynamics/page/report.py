@@ -138,7 +138,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         not_run=[_not_run(path) for path in summary.paths if not path.counts],
         margins=any(path.payload or path.speed_scale for path in summary.paths),
         figures=figures,
-        player=player(robot, motions(robot, results)),
+        player=player(robot, motions(robot, results), opened=_greatest(results)),
         drawing_head=drawing_head(),
         wrist=_wrist(summary),
         wrist_uses=_wrist_uses(summary),
@@ -146,6 +146,20 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         holding=holding,
         held=_held(summary.holding),
     )
+
+
+def _greatest(results: model.DynamicsResults) -> tuple[str, float] | None:
+    """The path and the time (s) of the greatest torque that the headline names; None without paths."""
+    rows, motors = results.torques, results.summary.motors
+    if not motors or not len(rows):
+        return None
+    worst = _worst(motors)
+    at = int(np.argmin(np.abs(np.abs(rows.torque[:, worst.joint - 1]) - worst.peak)))
+    return str(rows.path[at]), float(rows.t_s[at])
+
+
+def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
+    return max(motors, key=lambda motor: motor.peak if motor.unit == motors[0].unit else 0.0)
 
 
 def _answer(summary: model.DynamicsSummary) -> Answer:
@@ -156,7 +170,7 @@ def _answer(summary: model.DynamicsSummary) -> Answer:
             return Answer(tr("Torques need the links' masses."), tr("None are given."))
         size = with_unit(number(abs(held.torque), 2), held.unit)
         return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size))
-    worst = max(summary.motors, key=lambda motor: motor.peak if motor.unit == summary.motors[0].unit else 0.0)
+    worst = _worst(summary.motors)
     most = with_unit(number(worst.peak, 2), worst.unit)
     limited = all(motor.peak_limit is not None for motor in summary.motors)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
