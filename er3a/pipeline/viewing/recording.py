@@ -138,7 +138,7 @@ class Recorded:
     points : arrays (N, 3), m, to be in sight when the views open, besides the arm
     ghost : a further arm, see-through, that moves along; at ``<stage>/corrected``
     now : title of the text on what is shown now
-    verdict : of the stage, for who reads the recording's properties
+    verdict : of the stage, one of the recording's properties
     """
 
     robot: Robot
