@@ -64,6 +64,7 @@ def test_the_studies_that_ship_load(name):
         (lambda c: c.update(seed=1.5), "seed", "1.5 is refused. Write a whole number"),
         (lambda c: c.update(robots={}), "robots", "{} is refused"),
         (lambda c: c.update(robots={"Ärm": c["robots"]["er3_600"]}), "robots.Ärm.[key]", "'Ärm' is refused"),
+        (lambda c: c.update(robots={"con": c["robots"]["er3_600"]}), "robots.con.[key]", "Windows keeps the name con"),
         (lambda c: c["workspace"].update(samples=4, blocks=5), "workspace", "4 samples can't fill 5 blocks. Lower"),
         (lambda c: c["workspace"].update(samples=1e6), "workspace.samples", "1000000.0 is refused. Write a whole"),
         (lambda c: c["trajectory"].update(near_wrist_deg=float("nan")), "trajectory.near_wrist_deg", "not a finite"),

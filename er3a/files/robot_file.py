@@ -33,6 +33,8 @@ from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, mo
 from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
+"""What no file or folder can be called on Windows."""
 HEAVIEST_LINK_KG = 20_000.0
 HEAVIEST_PAYLOAD_KG = 2_500.0
 """The strongest arms carry 2.3 t."""
@@ -57,6 +59,12 @@ def _positive(value: float) -> float:
     return value
 
 
+def _name(value: str) -> str:
+    if value in DEVICES:
+        raise ValueError(f"Windows keeps the name {value} for a device | Choose another: folders are named after it")
+    return value
+
+
 def _mass(value: float) -> float:
     if value < 0:
         raise ValueError(f"{value:g} kg is below 0 | Write the mass in kg")
@@ -66,7 +74,7 @@ def _mass(value: float) -> float:
 
 
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
-Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+Name = Annotated[str, Field(pattern=NAME_PATTERN), AfterValidator(_name)]
 JointNumber = Annotated[int, Field(ge=1, le=MAX_JOINTS)]
 Mass = Annotated[float, AfterValidator(_mass)]
 Positive = Annotated[float, AfterValidator(_positive)]

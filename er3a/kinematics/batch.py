@@ -11,7 +11,7 @@ from er3a.errors import PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
-from er3a.kinematics.by_class import arm_solver, checked_parameters, misses, slots_of_class, task_mask
+from er3a.kinematics.by_class import arm_solver, checked_parameters, meets_poses, misses, slots_of_class
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import REACHED, SLOTS
@@ -168,7 +168,7 @@ def _by_class(
     valid = np.isfinite(q[..., 0])
     branch = np.broadcast_to(np.arange(q.shape[1]), valid.shape)
     turn_range = _turn_range(robot, q) if turns else None
-    freed = None if task_mask(robot).all() else misses(robot, T[:, None], q)[2]
+    freed = None if meets_poses(robot) else misses(robot, T[:, None], q)[2]
     return Solutions(robot, q, valid, inside, branch, method, turn_range=turn_range, certain=certain, freed_turn=freed)
 
 

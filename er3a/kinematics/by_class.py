@@ -580,6 +580,17 @@ def task_mask(robot: Robot) -> Reals:
 
 
 @derived
+def meets_poses(robot: Robot) -> bool:
+    """Whether the arm's solutions meet all of a pose, with nothing left open by :func:`task_mask`.
+
+    Returns
+    -------
+    whole : True for arms of six joints and more
+    """
+    return bool(task_mask(robot).all())
+
+
+@derived
 def with_task_frame(robot: Robot) -> Robot:
     """The robot with its tool turned to the frame in which :func:`task_mask` counts.
 

@@ -21,7 +21,7 @@ def confirmed(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Flags]:
 
     Parameters
     ----------
-    T : (k, 4, 4), m
+    T : (k or 1, 4, 4), m
     q : (k, n), rad or m, some of which may be NaN
 
     Returns
@@ -32,7 +32,7 @@ def confirmed(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Flags]:
     failing = np.isfinite(q[:, 0]) & ~confirms(robot, T, q)
     if not failing.any():
         return q, failing
-    rows, poses = q[failing], T[failing]
+    rows, poses = q[failing], np.broadcast_to(T, (len(q), 4, 4))[failing]
     frame = arm_solver(robot).task_frame
     better = nearest_equivalent(robot, polished(with_task_frame(robot), poses @ frame, rows, task_mask(robot)), rows)
     good = confirms(robot, poses, better) & (np.abs(shortest_move(robot, better - rows)).max(axis=1) < MOVED)

@@ -30,8 +30,9 @@ from er3a.kinematics.forward import forward, frames, jacobian
 from er3a.kinematics.singularity import SingularityType, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
+from er3a.numerics.jit import kernel
 from er3a.robots.joint_limits import nearest_equivalent, within
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE, whole_turns
 
 SOLVES_M = SOLVES_RAD = 0.9e-9  # a family is given where it solves the pose to 1e-9, rounding included
@@ -124,6 +125,7 @@ def wrist_centre_on_axis(robot: Robot, T: Reals, q: Reals, joint: int) -> Reals:
     return moved
 
 
+@derived
 def arm_folds_fully(robot: Robot) -> bool:
     """Whether upper arm and forearm are equally long, so that the wrist centre can lie on axis 2.
 
@@ -300,8 +302,6 @@ def families(robot: Robot, T: Reals, q: Reals, q_ref: Reals) -> tuple[Family, ..
     -------
     families : nearest to the reference first within each kind
     """
-    if is_regular(robot, q):
-        return ()
     found: list[Family] = []
     for pair, on_line in aligned_arms(robot, T, q):
         _add(found, _wrist_families(robot, T, on_line, q_ref, pair))
@@ -326,9 +326,18 @@ def is_regular(robot: Robot, q: Reals) -> bool:
     regular : by the factors of the Jacobian's determinant, far beyond where two branches or a family could meet
     """
     factors = determinant_factors(robot, q)
-    bent = np.abs(wrap_to_pi(2 * factors.elbow)) / 2 if arm_folds_fully(robot) else np.inf
-    near = (np.abs(factors.wrist) < REGULAR_RAD) | (np.abs(factors.shoulder) < REGULAR_M) | (bent < REGULAR_RAD)
-    return not near.any()
+    return _away(factors.wrist, factors.elbow, factors.shoulder, arm_folds_fully(robot))
+
+
+@kernel
+def _away(wrist: Reals, elbow: Reals, shoulder: Reals, folds: bool) -> bool:
+    """Whether factors (N,) are away from 0, the elbow's (rad, in half a turn) only where the arm folds fully."""
+    away = True
+    for k in range(len(wrist)):
+        near = abs(wrist[k]) < REGULAR_RAD or abs(shoulder[k]) < REGULAR_M
+        bent = abs(elbow[k] - np.pi * np.round(elbow[k] / np.pi))
+        away &= not (near or (folds and bent < REGULAR_RAD))
+    return away
 
 
 def _add(found: list[Family], new: list[Family]) -> None:

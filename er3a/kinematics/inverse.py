@@ -13,13 +13,13 @@ from er3a.finding import fact, is_one
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
-from er3a.kinematics.by_class import CONFIRMS, confirms, misses, task_mask
+from er3a.kinematics.by_class import CONFIRMS, confirms, meets_poses, misses, task_mask
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
 from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
 from er3a.kinematics.confirmed import confirmed
-from er3a.kinematics.families import Family, families
+from er3a.kinematics.families import Family, families, is_regular
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
 from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
@@ -87,26 +87,33 @@ def inverse(
         found = _by_class(robot, T, q_ref, redundancy, self_motion_rows)
     else:
         found = _by_closed_form(robot, T, q_ref)
-    return _at_exit(robot, found, T, q_ref if redundancy is None else None)
+    return _at_exit(robot, found, T, q_ref if redundancy is None and not found.regular else None)
 
 
 class _Found(NamedTuple):
-    """Rows (k, n) and their branches (k,), as :class:`er3a.kinematics.solutions.Solutions` has them."""
+    """Rows (k, n) and their branches (k,), as :class:`er3a.kinematics.solutions.Solutions` has them.
+
+    ``regular``: all are so far from singular poses that they are known to rounding.
+    """
 
     q: Reals
     branch: Integers
     method: solutions.Method
     unsolved: tuple[solutions.Unsolved, ...]
     families: Sequence[Family | SelfMotionCurve] = ()
+    regular: bool = False
 
 
 def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     """Rows of an arm with a spherical wrist: each branch once per turn, and the nearest member of each self-motion."""
     q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
+    slots = np.flatnonzero(fault == REACHED)
+    if is_regular(robot, q):
+        rows, of = equivalents_within(robot, q[slots], q_ref)
+        return _Found(rows, slots[of], solutions.CLOSED_FORM, _unsolved(robot, fault, gap), regular=True)
     continua = families(robot, T, q, q_ref)
     if continua:
         q = _free_joints_near(robot, T, q, q_ref, continua)
-    slots = np.flatnonzero(fault == REACHED)
     away = np.abs(wrap_to_pi(q[slots, None] - q[slots])).max(axis=2, initial=0.0)
     slots = slots[~np.triu(away < SAME_JOINTS, 1).any(axis=0)]
     rows, of = equivalents_within(robot, q[slots], q_ref)
@@ -123,16 +130,18 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
     ``own`` (n,) is a reference that joins the rows if it keeps the limits, solves the pose to rounding and is none of
     them: next to two singularities roots are known to 1e-8 rad only, so the arm's own row can lie beyond a limit.
     """
-    q, branch, method, unsolved, motions = found
-    rows, failing = confirmed(robot, np.broadcast_to(T, (len(q), 4, 4)), q)
-    kept, certain = np.isfinite(rows[:, 0]), not failing.any()
-    if len(q) and not kept.any():
-        position, rotation, _ = misses(robot, T, q)
-        nearest = fact(
-            "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
-        )
-        unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=nearest)),)
-    q, branch = rows[kept], branch[kept]
+    q, branch, method, unsolved, motions, _ = found
+    rows, failing = confirmed(robot, T[None], q)
+    certain = not failing.any()
+    if not certain:
+        kept = np.isfinite(rows[:, 0])
+        if not kept.any():
+            position, rotation, _ = misses(robot, T, q)
+            nearest = fact(
+                "nearest_miss", position_mm=float(position.min() * 1000), rotation_deg=float(np.degrees(rotation.min()))
+            )
+            unsolved = (fact("pose_unsolved", pose=0, why=fact("no_solution_of_class", miss=nearest)),)
+        q, branch = rows[kept], branch[kept]
     if own is not None and within(robot, own) and np.abs(forward(robot, own) - T).max() <= SOLVES:
         away = max_joint_move(q, own)
         if away[within(robot, q)].min(initial=np.inf) > SAME_MEMBER:
@@ -140,20 +149,22 @@ def _at_exit(robot: Robot, found: _Found, T: Reals, own: Reals | None) -> soluti
             branch = np.append(branch, branch[away.argmin()] if len(q) else 0)
             q = np.concatenate([q, own[None]])
             unsolved = tuple(each for each in unsolved if not is_one(each, "pose_unsolved"))
-    freed = None if task_mask(robot).all() else misses(robot, T, q)[2]
-    order = np.arange(len(q)) if freed is None else np.argsort(np.where(freed <= CONFIRMS, 0.0, freed), kind="stable")
+    freed = None if meets_poses(robot) else misses(robot, T, q)[2]
+    if freed is not None:
+        order = np.argsort(np.where(freed <= CONFIRMS, 0.0, freed), kind="stable")
+        q, branch, freed = q[order], branch[order], freed[order]
     if isinstance(motions, tuple):
         motions = tuple(each for each in motions if confirms(robot, T, each.q0))
     return solutions.Solutions(
         robot,
-        q[order],
+        q,
         solved=np.ones(len(q), dtype=bool),
-        within_limits=within(robot, q[order]),
-        branch=branch[order],
+        within_limits=within(robot, q),
+        branch=branch,
         method=method if certain else solutions.in_doubt(method),
         unsolved=unsolved,
         families=motions,
-        freed_turn=None if freed is None else freed[order],
+        freed_turn=freed,
     )
 
 
@@ -350,10 +361,8 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:
     """Why a shoulder side has no branch: by that of its four slots which misses least."""
     found = []
-    for shoulder in (0, 1):
+    for shoulder in np.flatnonzero((fault.reshape(2, 4) != REACHED).all(axis=1)).tolist():
         part = slice(4 * shoulder, 4 * shoulder + 4)
-        if (fault[part] == REACHED).any():
-            continue
         best = 4 * shoulder + int(np.argmin(gap[part]))
         found.append(
             fact(

@@ -153,6 +153,12 @@ def wrist_and_forearm(robot: Robot) -> tuple[Reals, bool]:
     return wrist_partitioned_arm(robot).wrist_in_tool, False
 
 
+@derived
+def _of_factors(robot: Robot) -> tuple[Reals, Reals, bool]:
+    """What the kernel of factors takes of an arm: its links, its wrist in the tool, where its forearm ends."""
+    return constant_links(robot), *wrist_and_forearm(robot)
+
+
 def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     """Signed distances from the wrist, elbow and shoulder singularities [1]_.
 
@@ -171,12 +177,11 @@ def determinant_factors(robot: Robot, q: Reals) -> DeterminantFactors:
     ShapeError, PoseError
         if q has the wrong shape, or is no array of numbers
     """
-    wrist_in_tool, to_axis_4 = wrist_and_forearm(robot)
     q = checked_joints(robot, q)
     out = np.empty((q.size // 6, 3))
-    links = constant_links(robot)
-    _factors(row_values(robot, q).reshape(-1, 6), robot.direction, robot.offset, links, wrist_in_tool, to_axis_4, out)
-    return DeterminantFactors(*(out[:, k].reshape(q.shape[:-1]) for k in range(3)))
+    _factors(row_values(robot, q).reshape(-1, 6), (robot.direction, robot.offset), *_of_factors(robot), out)
+    out = out.reshape(*q.shape[:-1], 3)
+    return DeterminantFactors(out[..., 0], out[..., 1], out[..., 2])
 
 
 def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
@@ -198,9 +203,10 @@ def factors_where_defined(robot: Robot, q: Reals) -> DeterminantFactors:
 
 @kernel
 def _factors(
-    q: Reals, direction: Reals, offset: Reals, links: Reals, wrist_in_tool: Reals, to_axis_4: bool, out: Reals
+    q: Reals, zeros: tuple[Reals, Reals], links: Reals, wrist_in_tool: Reals, to_axis_4: bool, out: Reals
 ) -> None:
     """Fill ``out`` (N, 3): wrist, elbow and shoulder at joint angles ``q`` (N, 6)."""
+    direction, offset = zeros
     w, p = np.empty((6, 3)), np.empty((6, 3))
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])

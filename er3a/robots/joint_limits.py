@@ -11,10 +11,20 @@ from er3a.finding import Amount, Finding, fact, turned_or_moved
 from er3a.geometry.vectors import TURN, max_joint_move, wrap_to_pi
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_rows, rows_within, shortest_move, turns_in, whole_turns
+from er3a.robots.whole_turns import (
+    LIMIT_TOLERANCE,
+    nearest_rows,
+    rows_within,
+    shortest_move,
+    turned_alone,
+    turns_alone,
+    turns_in,
+    whole_turns,
+)
 
 SAME_DIGITS = 9  # of rad, m: joint values that are alike to these are one
 MAX_ROWS = 10_000  # turns of one pose: more make no list that anyone reads, and fill memory
+ROOMS = 64, 4096  # rows that turns of most poses fill, without a search in order
 
 
 Exceeded = Finding
@@ -218,6 +228,10 @@ def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> tuple[Reals, Int
     Er3aError
         if the limits allow more than ``MAX_ROWS``
     """
+    for room in ROOMS if turns_alone(robot) else ():
+        rows, of = np.empty((room, robot.joints)), np.empty(room, np.int64)
+        if (count := turned_alone(np.ascontiguousarray(q), q_ref, (robot.lower, robot.upper), rows, of)) >= 0:
+            return rows[:count], of[:count]
     rows, counts = rows_within(robot, q, q_ref, MAX_ROWS)
     if (counts > MAX_ROWS).any():
         raise Er3aError(f"{robot.name}: the limits allow more than {MAX_ROWS} turns of one pose; narrow them")

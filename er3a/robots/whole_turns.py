@@ -188,6 +188,88 @@ def rows_within(robot: Robot, q: Reals, q_ref: Reals, most: int) -> tuple[Reals,
     return found[:total], counts
 
 
+@derived
+def turns_alone(robot: Robot) -> bool:
+    """Whether each joint turns by itself between limits of its own, as those of most arms do.
+
+    Parameters
+    ----------
+    robot : without slides, gears, continuous joints or limits on sums, if so
+    """
+    turns = whole_turns(robot)
+    return turns.each and bool(turns.alone.all()) and not robot.combined and not robot.continuous.any()
+
+
+@kernel
+def turned_alone(q: Reals, q_ref: Reals, limits: tuple[Reals, Reals], rows: Reals, of: Integers) -> int:
+    """Fill in the turns of poses whose joints turn by themselves, of each pose the nearest to the reference first.
+
+    Kernel, for arms that :func:`turns_alone` is true of. A pose that no turns bring within the limits has the row that
+    :func:`er3a.robots.joint_limits.nearest_equivalent` names.
+
+    Parameters
+    ----------
+    q : (N, n), rad
+    q_ref : (n,), rad
+    limits : lower and upper (n,), rad
+    rows, of : (k, n), rad, and (k,), filled with the turns and the number of the pose that each is of
+
+    Returns
+    -------
+    count : how many are filled in, -1 if they have too little room
+    """
+    (lower, upper), joints, count = limits, q.shape[1], 0
+    least, size = np.empty(joints), np.empty(joints, np.int64)
+    move, numbers = np.empty(len(rows)), np.empty(len(rows), np.int64)
+    for pose in range(len(q)):
+        fitting = 1
+        for j in range(joints):
+            least[j] = np.ceil((lower[j] - LIMIT_TOLERANCE - q[pose, j]) / TURN)
+            size[j] = max(np.floor((upper[j] + LIMIT_TOLERANCE - q[pose, j]) / TURN) - least[j] + 1.0, 0.0)
+            fitting = min(fitting * size[j], len(rows) + 1)
+        if count + max(fitting, 1) > len(rows):
+            return -1
+        for number in range(fitting):
+            _turn_by_number(q[pose], number, (least, size), rows[count])
+            away = 0.0
+            for j in range(joints):
+                away = max(away, abs(rows[count, j] - q_ref[j]))
+            at = number
+            while at > 0 and away < move[at - 1]:
+                move[at], numbers[at] = move[at - 1], numbers[at - 1]
+                at -= 1
+            move[at], numbers[at] = away, number
+        for k in range(fitting):
+            _turn_by_number(q[pose], numbers[k], (least, size), rows[count + k])
+        if fitting == 0:
+            fitting = 1
+            for j in range(joints):
+                rows[count, j] = _nearest_turn(q[pose, j], q_ref[j], lower[j], upper[j])
+        of[count : count + fitting] = pose
+        count += fitting
+    return count
+
+
+@inner_kernel
+def _turn_by_number(q: Reals, number: int, turns: tuple[Reals, Integers], row: Reals) -> None:
+    """Fill in joints (n,) with the turns of that number, those of the last joint counted first."""
+    least, size = turns
+    for j in range(len(q) - 1, -1, -1):
+        row[j] = q[j] + TURN * (least[j] + number % size[j])
+        number //= size[j]
+
+
+@inner_kernel
+def _nearest_turn(angle: float, reference: float, lower: float, upper: float) -> float:
+    """The turn of a joint that is nearest to the reference within the limits, else the nearest to the limits."""
+    near = angle + TURN * np.round((reference - angle) / TURN)
+    low = np.ceil((lower - LIMIT_TOLERANCE - near) / TURN)
+    high = np.floor((upper + LIMIT_TOLERANCE - near) / TURN)
+    below, above = near + TURN * (low - 1.0), near + TURN * low
+    outside: float = below if lower - below < above - upper else above
+    return near + TURN * min(max(0.0, low), high) if low <= high else outside
+
+
 def nearest_rows(
     robot: Robot, q: Reals, q_ref: Reals, around: tuple[Reals, Reals] | None = None
 ) -> tuple[Reals, Flags]:

@@ -25,7 +25,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from sysconfig import get_path
 from tempfile import TemporaryDirectory
 from urllib.parse import urlencode
 
@@ -36,6 +35,7 @@ from er3a.files.kept_files import write_atomically
 
 LOOPBACK = "127.0.0.1"
 LONGEST_S = 120
+PROGRAMS = ("Rerun.app/Contents/MacOS/Rerun", "rerun.exe", "rerun")
 
 
 def viewer_command(recordings: Sequence[Path], *words: str) -> list[str]:
@@ -49,7 +49,12 @@ def viewer_command(recordings: Sequence[Path], *words: str) -> list[str]:
     -------
     command : bound to the loopback address; by itself the viewer would listen on all of the machine's addresses
     """
-    return [str(Path(get_path("scripts"), "rerun")), *map(str, recordings), "--bind", LOOPBACK, *words]
+    import rerun_cli
+
+    # The program itself: Rerun's script would start it as a process of its own, which outlives the script on Windows.
+    folder = Path(str(rerun_cli.__file__)).parent
+    program = next(folder / name for name in PROGRAMS if (folder / name).is_file())
+    return [str(program), *map(str, recordings), "--bind", LOOPBACK, *words]
 
 
 def free_port() -> int:
@@ -77,8 +82,7 @@ def viewer_running(
     messages : file for its errors
     """
     limited = ["timeout", str(LONGEST_S)] if shutil.which("timeout") else []
-    stderr = messages.open("wb") if messages else subprocess.DEVNULL
-    with without_statistics() as environment:
+    with without_statistics() as environment, (messages or Path(os.devnull)).open("wb") as stderr:
         viewer = subprocess.Popen(
             [*limited, *viewer_command(recordings, *words)],
             env=environment | {"RUST_LOG": "error", "RUST_BACKTRACE": "0"},  # warnings would be shown in the picture
@@ -91,8 +95,6 @@ def viewer_running(
         finally:
             _end_all(viewer)
             viewer.wait()
-            if not isinstance(stderr, int):
-                stderr.close()
 
 
 def _end_all(viewer: subprocess.Popen[bytes]) -> None:

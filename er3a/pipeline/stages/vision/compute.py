@@ -314,7 +314,7 @@ def open_of_calibration(
         # Touched points show where a fixed camera is. Of a camera on the flange they show where the board is, and a
         # wrong focal length may leave that as it is.
         confirmed = head.simulated or (samples.setup == "eye_to_hand" and touched)
-        points[Open("pose_intrinsics" if confirmed else "intrinsics")] = True
+        points[Open("given_intrinsics" if confirmed else "intrinsics")] = True
     return tuple(each for each, is_so in points.items() if is_so)
 
 
