@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.errors import with_extra
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
@@ -36,6 +37,9 @@ from er3a.kinematics.wrist_partitioned import (
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns, joint_columns, limits_exceeded, shown
 from er3a.robots.robot import Robot, derived
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Side = Literal["front", "back"]
 LABELS: tuple[BranchLabel, ...] = get_args(BranchLabel)
@@ -226,6 +230,29 @@ class Solutions(ByValue, Displayed):
         """
         names = "q", "solved", "within_limits", "branch", *(("freed_turn",) if self.freed_turn is not None else ())
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def to_frame(self) -> pd.DataFrame:
+        """The solutions as a table.
+
+        Returns
+        -------
+        table : a row for each solution, with the pose's number where there are many, the branch's code, joint values in
+            deg (mm of prismatic joints) and whether they keep the limits
+
+        Raises
+        ------
+        MissingLibraryError
+            without pandas (``er3a[study]``)
+        """
+        try:
+            import pandas as pd
+        except ModuleNotFoundError as error:
+            raise with_extra(error) from None
+        at = np.argwhere(self.solved)
+        found: dict[str, Any] = {"pose": at[:, 0]} if at.shape[1] > 1 else {}
+        found |= {"branch": self.label[self.solved]}
+        found |= dict(zip(joint_columns(self.robot), shown(self.robot, self.q[self.solved]).T))
+        return pd.DataFrame(found | {"within_limits": self.within_limits[self.solved]})
 
     def without_turns(self) -> Solutions:
         """Solutions of one pose that differ by more than whole turns.

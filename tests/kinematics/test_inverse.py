@@ -316,3 +316,12 @@ def test_many_turns_are_all_listed():
 def test_public_names_are_these_functions(robot):
     assert er3a.inverse.__wrapped__ is inverse
     assert er3a.forward.__wrapped__ is forward
+
+
+def test_a_table_of_solutions_has_joint_values_that_reproduce_their_poses(robot, random):
+    poses = forward(robot, joints_at_random(robot, random, 5))
+    table = er3a.inverse_batch(robot, poses).to_frame()
+    rows = np.radians(table[[f"q{k}_deg" for k in range(1, 7)]].to_numpy())
+    assert_rows_reproduce(robot, poses[table["pose"]], rows)
+    one = er3a.inverse(robot, poses[0])
+    assert list(one.to_frame()["within_limits"]) == list(one.within_limits)

@@ -7,9 +7,11 @@ from itertools import product
 import numpy as np
 import pytest
 
+from er3a.files.robot_library import load_robot
 from er3a.kinematics.batch import inverse_batch
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
+from er3a.robots import joint_limits
 from er3a.robots.joint_limits import nearest_equivalent
 from er3a.robots.robot import CombinedLimit, Robot
 
@@ -122,3 +124,15 @@ def test_a_continuous_joint_behind_a_gear_is_taken_where_the_others_keep_their_l
         q[0] = random.uniform(-9, 9)
         batch = inverse_batch(robot, forward(robot, q)[None])
         assert (np.abs(batch.q[0][batch.within_limits[0]] - q)[:, 1:3].max(axis=1) < 1e-7).any()
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "ur5e", "lbr_iiwa_14"])
+def test_turns_of_joints_that_turn_by_themselves_are_those_that_the_search_finds(name, random, monkeypatch):
+    robot = load_robot(name)
+    for _ in range(50):
+        q, q_ref = random.uniform(-4, 4, (random.integers(1, 9), robot.joints)), random.uniform(-3, 3, robot.joints)
+        listed = joint_limits.equivalents_within(robot, q, q_ref)
+        with monkeypatch.context() as searching:
+            searching.setattr(joint_limits, "ROOMS", ())
+            found = joint_limits.equivalents_within(robot, q, q_ref)
+        assert all(np.array_equal(one, other) for one, other in zip(listed, found))
