@@ -14,7 +14,7 @@ from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Fitter, Solution
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
-from er3a.confirmation.pairs import Pairs
+from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
 from er3a.errors import ArgumentError, Er3aError
 from er3a.finding import Finding, fact
@@ -181,11 +181,9 @@ def confirm(
 
 
 def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
-    some = np.unique(np.linspace(0, len(pairs) - 1, SEARCHED).astype(np.int64))
-    found = search(Fitter(robot, pairs.some(some)))
+    found = search(Fitter(robot, pairs.some(spread(len(pairs), SEARCHED))))
     chosen, noise = _chosen(found)
-    more = np.unique(np.linspace(0, len(pairs) - 1, FITTED).astype(np.int64))
-    fitter = Fitter(robot, pairs.some(more))
+    fitter = Fitter(robot, pairs.some(spread(len(pairs), FITTED)))
     fitter.widen = noise
     final = _on_more(fitter, chosen)
     whole = Fitter(robot, pairs)

@@ -25,6 +25,7 @@ FORMS: dict[str, tuple[str, ...]] = {
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
     "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
 }
+OF_THREE = ("abc", "rpy", "zyz", "xyz", "rotation_vector")  # forms of three angles without a unit
 LONGEST_VECTOR = 2 * np.pi * 1.01
 
 
@@ -80,12 +81,8 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         a quaternion without unit length, a skewed or mirrored matrix, a rotation vector of more than a turn
     """
     values = np.asarray(values, float)
-    if form == "rpy_deg":
-        return _turned(values)
-    if form == "zyz_deg":
-        first, second, third = (np.zeros_like(values) for _ in range(3))
-        first[:, 2], second[:, 1], third[:, 2] = values.T
-        return np.asarray(_turned(first) @ _turned(second) @ _turned(third))
+    if form.endswith("_deg"):
+        return of_angles(form.removesuffix("_deg"), np.radians(values))
     if form == "rotation_vector_rad":
         length = np.hypot.reduce(values, axis=1)
         _refuse(length > LONGEST_VECTOR, "{:.4g} rad are more than a turn, and can only be degrees", length, "Convert")
@@ -106,9 +103,26 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
     return np.asarray(U @ Vt)
 
 
-def _turned(rpy_deg: Reals) -> Reals:
-    turned: Reals = transform(np.zeros_like(rpy_deg), np.radians(rpy_deg))[:, :3, :3]
-    return turned
+def of_angles(form: str, angles: Reals) -> Reals:
+    """Rotations of three angles.
+
+    Parameters
+    ----------
+    form : one of ``OF_THREE``: ``abc`` Rz(1) Ry(2) Rx(3), ``rpy`` Rz(3) Ry(2) Rx(1), ``zyz`` Rz(1) Ry(2) Rz(3), ``xyz``
+        Rx(1) Ry(2) Rz(3), or ``rotation_vector``
+    angles : (N, 3), rad, in the order of the columns
+
+    Returns
+    -------
+    R : (N, 3, 3)
+    """
+    if form == "rotation_vector":
+        return exp_rotation(angles)
+    if form == "zyz":
+        return np.asarray(of_angles("abc", angles * [1, 1, 0]) @ of_angles("rpy", angles * [0, 0, 1]))
+    rpy = {"abc": angles[:, ::-1], "xyz": -angles}.get(form, angles)
+    R = transform(np.zeros_like(rpy), rpy)[:, :3, :3]
+    return np.asarray(R.mT if form == "xyz" else R)
 
 
 def _refuse(wrong: Any, problem: str, values: Reals, remedy: str) -> None:

@@ -24,6 +24,8 @@ from er3a.numerics.si_units import NEAR_QUARTER, RADIANS_BELOW_DEG, may_be_radia
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MAX_JOINTS, Robot
 
+IN_SI = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "deg": math.pi / 180, "rad": 1.0}
+"""Metres or radians of a unit, by the names that :data:`er3a.files.arithmetic.UNITS` has."""
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 METRES_BELOW_MM = 5.0
 MAX_DISTANCE_MM = 100_000.0
