@@ -12,7 +12,7 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Fitter, Solution
+from er3a.confirmation.fit import Fitter, Solution, State
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
@@ -241,11 +241,10 @@ def _chosen(found: Attempts) -> tuple[Solution, float]:
 
 def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
     """The chosen explanation fitted to more rows, without those that don't fit."""
-    start = chosen.Y, chosen.X, chosen.amounts
-    solution = fitter.fit(chosen.explanation, start)
+    solution = fitter.fit(chosen.explanation, chosen.values)
     bad = fitter.at(chosen).by_row > 9.0 * fitter.dimensions
     if solution.per_freedom > EXPLAINED and 0 < bad.sum() <= 0.2 * len(bad):
-        solution = fitter.fit(chosen.explanation, start, np.where(bad, 0.0, 1.0))
+        solution = fitter.fit(chosen.explanation, chosen.values, np.where(bad, 0.0, 1.0))
     return solution
 
 
@@ -330,7 +329,7 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
         out = rows[fold::FOLDS]
         weights = solution.rows.astype(float)
         weights[out] = 0.0
-        left = fitter.fit(solution.explanation, (solution.Y, solution.X, solution.amounts), weights)
+        left = fitter.fit(solution.explanation, solution.values, weights)
         squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
     return float(MM * np.sqrt(np.mean(squares)))
 
@@ -364,9 +363,8 @@ def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[
     """Entries that could be off by 1 mm or 0.1 deg: without a trace, and because base or tool acts alike."""
     every = [each for each in fitter.every if each not in solution.entries]
     explanation = replace(solution.explanation, entries=(*solution.entries, *every), small=False)
-    J, _ = fitter.linear(
-        explanation, (solution.Y, solution.X, np.concatenate([solution.amounts, np.zeros(len(every))]))
-    )
+    amounts = np.concatenate([solution.amounts, np.zeros(len(every))])
+    J, _ = fitter.linear(State(explanation, explanation.entries, solution.Y, solution.X, amounts))
     first = J.shape[1] - len(every)
     least = INTERVAL_95 / np.array([OPEN_M if each.unit == "mm" else OPEN_RAD for each in every])
     Q = np.linalg.qr(J[:, :first])[0]
