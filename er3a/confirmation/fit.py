@@ -110,7 +110,7 @@ class State:
     def prior(self) -> Reals:
         """(k,), by how much entries are held at 0, per m or rad: those that are off by a little."""
         own = len(self.explanation.entries)
-        return np.r_[np.zeros(own), np.full(len(self.entries) - own, 1 / SMALL)]
+        return np.concatenate([np.zeros(own), np.full(len(self.entries) - own, 1 / SMALL)])
 
     def stepped(self, step: Reals, turned: bool) -> State:
         """The state after a step of all that is free.

@@ -258,7 +258,7 @@ def _pairs(path: Path, robot: Robot, lines: Lines, lengths: str | None) -> Pairs
 
 def _joint_columns(columns: _Columns, families: Mapping[str, list[str]], count: int) -> list[str] | None:
     likely = {start: names for start, names in families.items() if len(names) == count}
-    first = [start for start in ("actual_q", "q", "j", "a", "joint", "axis") if start in likely]
+    first: list[str] = [start for start in ("actual_q", "q", "j", "a", "joint", "axis") if start in likely]
     for start in first or [start for start in likely if not NO_POSITIONS.search(start)]:
         return likely[start]
     own = [

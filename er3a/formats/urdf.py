@@ -317,8 +317,8 @@ def link_visuals(
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
     missing = dict[str, Er3aError]()
     for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
+        T, number = place or (np.eye(4), 0)
         for visual in visuals if place else ():
-            T, number = place
             try:
                 points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
