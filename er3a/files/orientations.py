@@ -26,6 +26,12 @@ FORMS: dict[str, tuple[str, ...]] = {
     "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
 }
 OF_THREE = ("abc", "rpy", "zyz", "xyz", "rotation_vector")  # forms of three angles without a unit
+BY_ROW: dict[str, tuple[str, ...]] = {
+    **{form: FORMS[form] for form in ("rpy_deg", "quaternion_wxyz")},
+    "rotation_vector_deg": ("rx_deg", "ry_deg", "rz_deg"),
+    "matrix_of_columns": ("nx", "ny", "nz", "ox", "oy", "oz", "ax", "ay", "az"),
+}
+"""Forms in which each row of a table may have its own: the matrix column by column, nx, ny, nz being the x axis."""
 LONGEST_VECTOR = 2 * np.pi * 1.01
 
 
@@ -67,7 +73,7 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
 
     Parameters
     ----------
-    form : one of ``FORMS``
+    form : one of ``FORMS`` or ``BY_ROW``
     values : (N, k), in the order of the form's columns: deg, rad for rotation vectors, else without unit
     tolerance : by which a quaternion's length, and R R^T of a matrix, may differ from 1
 
@@ -93,6 +99,7 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
         return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())
     R = values.reshape(-1, 3, 3)
+    R = R.mT if form == "matrix_of_columns" else R
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(R @ R.mT - np.eye(3)).max(axis=(1, 2))
     remedy = f"Its rows must be orthonormal to {tolerance:g}; write more digits"

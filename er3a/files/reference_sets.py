@@ -15,7 +15,7 @@ import numpy as np
 from er3a.errors import InputError, InputWarning
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, Written, read_csv
 from er3a.files.kept_files import names, own_or_shipped
-from er3a.files.orientations import NoRotationError, rotations
+from er3a.files.orientations import BY_ROW, NoRotationError, rotations
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
@@ -54,20 +54,7 @@ _SOURCE = {
 _POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
-_RPY = ("roll_deg", "pitch_deg", "yaw_deg")
-_QUATERNION = ("qw", "qx", "qy", "qz")
-_ROTATION_VECTOR = ("rx_deg", "ry_deg", "rz_deg")
-_MATRIX = ("nx", "ny", "nz", "ox", "oy", "oz", "ax", "ay", "az")
-ORIENTATIONS: dict[str, tuple[str, ...]] = {
-    "roll, pitch and yaw": _RPY,
-    "quaternion": _QUATERNION,
-    "rotation vector": _ROTATION_VECTOR,
-    "matrix": _MATRIX,
-}
-"""Columns of the flange's orientation, by how it is written: rpy as in URDF, the matrix column by column: nx, ny, nz is
-the flange's x axis in the base frame."""
-_FORM_OF = dict(zip(ORIENTATIONS.values(), ("rpy_deg", "quaternion_wxyz", "rotation_vector_rad", "matrix")))
-ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
+ORIENTATION_COLUMNS = tuple(column for columns in BY_ROW.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
 _FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
@@ -81,8 +68,6 @@ class Format:
     Attributes
     ----------
     columns : without source, grade, origin and uncertainty, which every table has
-    digits, sliding_digits : if a line gives no uncertainty, it is half the last digit of these columns; the latter for
-        prismatic joints
     gather : converts a line's fields to those of the row
     faults : errors of a line
     coarse : the default uncertainty of tables without digits
@@ -90,8 +75,6 @@ class Format:
     """
 
     columns: Mapping[str, CsvColumn]
-    digits: tuple[str, ...] = ()
-    sliding_digits: tuple[str, ...] = ()
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
     coarse: float | None = None
@@ -116,7 +99,9 @@ class Format:
         digits : the columns whose last printed digits fill it in
         """
         uncertainties = [name for name in self.columns if name in UNCERTAINTIES]
-        return (uncertainties[-1], self.sliding_digits) if _slides(fields) else (uncertainties[0], self.digits)
+        column = uncertainties[-1 if _slides(fields) else 0]
+        ending = column.removeprefix("uncertainty")
+        return column, tuple(name for name in self.columns if name.endswith(ending) and name[0] not in "uq")
 
 
 def _axis_fields(fields: Fields) -> Fields:
@@ -145,51 +130,28 @@ def _position_fields(fields: Fields) -> Fields:
     return fields
 
 
-def _written_as(fields: Fields) -> list[tuple[str, ...]]:
-    """The columns of each way of writing an orientation that a row uses."""
-    return [columns for columns in ORIENTATIONS.values() if any(fields[name] is not None for name in columns)]
+def _written_as(fields: Fields) -> list[str]:
+    """The forms of ``BY_ROW`` that a row uses."""
+    return [form for form, columns in BY_ROW.items() if any(fields[name] is not None for name in columns)]
+
+
+def _rotation(form: str, fields: Fields, tolerance: float = math.inf) -> Reals:
+    """The rotation (3, 3) nearest to what a row states in a form; :class:`NoRotationError` if it is off by more."""
+    return rotations(form, [[fields[name] for name in BY_ROW[form]]], tolerance)[0]
 
 
 def _orientation(fields: Fields) -> Rotation3 | None:
     """Rows of the rotation matrix that a row states; None if it states no orientation."""
     written = _written_as(fields)
-    if not written:
-        return None
-    values = np.array([fields[name] for name in written[0]])
-    R = rotation_of(written[0], values)
-    return tuple(tuple(row) for row in R.tolist())  # type: ignore[return-value]
-
-
-def rotation_of(columns: tuple[str, ...], values: Reals, tolerance: float = math.inf) -> Reals:
-    """The rotation matrix nearest to an orientation as a document writes it.
-
-    Parameters
-    ----------
-    columns : one of the forms of ``ORIENTATIONS``
-    values : in their order: deg, the four numbers of a quaternion (w first), or a matrix by columns n, o, a
-    tolerance : by which a quaternion or matrix may be off a rotation
-
-    Returns
-    -------
-    R : (3, 3), see :func:`er3a.files.orientations.rotations`
-
-    Raises
-    ------
-    NoRotationError
-        for a quaternion or matrix that is off by more than that, or mirrored
-    """
-    if columns == _ROTATION_VECTOR:
-        values = np.radians(values)
-    if columns == _MATRIX:
-        values = values.reshape(3, 3).T.ravel()
-    return rotations(_FORM_OF[columns], values[None], tolerance)[0]
+    return tuple(map(tuple, _rotation(written[0], fields).tolist())) if written else None  # type: ignore[return-value]
 
 
 def _position_faults(fields: Fields) -> Iterator[Fault]:
     written = _written_as(fields)
     if len(written) > 1:
-        yield written[1][0], "the orientation is written in two ways", "Keep one of the two"
-    for columns in written[:1]:
+        yield BY_ROW[written[1]][0], "the orientation is written in two ways", "Keep one of the two"
+    for form in written[:1]:
+        columns = BY_ROW[form]
         missing = [name for name in columns if fields[name] is None]
         if missing:
             yield missing[0], "empty, but the row gives other parts of the orientation", f"Give {', '.join(columns)}"
@@ -197,7 +159,7 @@ def _position_faults(fields: Fields) -> Iterator[Fault]:
             yield "point", f"an orientation of the {fields['point']}", "Write flange: its orientation alone is checked"
         else:
             try:
-                rotation_of(columns, np.array([fields[name] for name in columns]), NOT_RIGID)
+                _rotation(form, fields, NOT_RIGID)
             except NoRotationError as error:
                 yield columns[0], error.problem, error.remedy
 
@@ -291,7 +253,6 @@ FORMATS: dict[str, Format] = {
             "uncertainty_mm": _OPTIONAL,
             **dict.fromkeys((*ORIENTATION_COLUMNS, "uncertainty_deg"), CsvColumn(Written, optional=True, always=False)),
         },
-        digits=_XYZ,
         gather=_position_fields,
         faults=_position_faults,
         mixed_lengths=True,
@@ -302,7 +263,6 @@ FORMATS: dict[str, Format] = {
             "angle_from_vertical_deg": _NUMBER,
             "uncertainty_deg": _OPTIONAL,
         },
-        digits=("angle_from_vertical_deg",),
     ),
     "envelope": Format(
         {
@@ -312,7 +272,6 @@ FORMATS: dict[str, Format] = {
             "value_mm": _NUMBER,
             "uncertainty_mm": _OPTIONAL,
         },
-        digits=("value_mm",),
         gather=_envelope_fields,
         faults=_envelope_faults,
     ),
@@ -324,7 +283,6 @@ FORMATS: dict[str, Format] = {
             "value_mm": _NUMBER,
             "uncertainty_mm": _OPTIONAL,
         },
-        digits=("value_mm",),
         faults=_reach_faults,
         mixed_lengths=True,
     ),
@@ -334,8 +292,6 @@ FORMATS: dict[str, Format] = {
             **dict.fromkeys(("lower_deg", "upper_deg", "uncertainty_deg"), _OPTIONAL),
             **dict.fromkeys(("lower_mm", "upper_mm", "uncertainty_mm"), _OF_SLIDES),
         },
-        digits=("lower_deg", "upper_deg"),
-        sliding_digits=("lower_mm", "upper_mm"),
         gather=_in_one_unit,
         faults=_limit_faults,
         mixed_limits=True,
@@ -346,8 +302,6 @@ FORMATS: dict[str, Format] = {
             **dict.fromkeys(("speed_deg_s", "uncertainty_deg_s"), _OPTIONAL),
             **dict.fromkeys(("speed_mm_s", "uncertainty_mm_s"), _OF_SLIDES),
         },
-        digits=("speed_deg_s",),
-        sliding_digits=("speed_mm_s",),
         gather=_in_one_unit,
         faults=_speed_faults,
     ),
@@ -369,7 +323,6 @@ FORMATS: dict[str, Format] = {
             "value_mm": _NUMBER,
             "uncertainty_mm": _OPTIONAL,
         },
-        digits=("value_mm",),
     ),
     "angles": Format(
         {
@@ -378,7 +331,6 @@ FORMATS: dict[str, Format] = {
             "value_deg": _NUMBER,
             "uncertainty_deg": _OPTIONAL,
         },
-        digits=("value_deg",),
     ),
 }
 
@@ -622,15 +574,12 @@ def _documents_beside(path: Path) -> Documents | None:
 
 def _fill_uncertainty(format: Format, fields: Fields) -> None:
     """Half the last digit that the source prints, where the row gives no uncertainty; then plain numbers."""
-    if format.digits:
-        column, digits = format.filled(fields)
-        if fields[column] is None:
-            decimals = [fields[name].decimals for name in digits if fields[name] is not None]
-            fields[column] = 0.5 * 10.0 ** -max(decimals, default=0)
+    column, digits = format.filled(fields)
+    if fields[column] is None:
+        decimals = [fields[name].decimals for name in digits if fields[name] is not None]
+        fields[column] = format.coarse or 0.5 * 10.0 ** -max(decimals, default=0)
     if ORIENTATION_COLUMNS[0] in fields:
         _fill_orientation_uncertainty(fields)
-    if format.coarse and fields["uncertainty_deg"] is None:
-        fields["uncertainty_deg"] = format.coarse
     for name, value in fields.items():
         fields[name] = float(value) if isinstance(value, Written) else value
 
@@ -672,13 +621,12 @@ def _fill_orientation_uncertainty(fields: Fields) -> None:
     if not written:
         fields["uncertainty_deg"] = 0.0
     elif fields["uncertainty_deg"] is None and not any(_position_faults(fields)):
-        values = np.array([fields[name] for name in written[0]])
-        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in written[0])
-        if written[0] in (_QUATERNION, _MATRIX):
+        form, values = written[0], np.array([fields[name] for name in BY_ROW[written[0]]])
+        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in BY_ROW[form])
+        if not form.endswith("_deg"):
             half = min(half, NOT_RIGID)  # 0 and 1 alone are no rounded numbers, which would not be rigid to this
-        R = rotation_of(written[0], values)
-        turned = [rotation_of(written[0], values + step) @ R.T for step in half * np.eye(len(values))]
-        fields["uncertainty_deg"] = float(np.abs(rotation_vectors_deg(np.array(turned))).sum(axis=0).max())
+        turned = rotations(form, values + half * np.eye(len(values)), math.inf) @ _rotation(form, fields).T
+        fields["uncertainty_deg"] = float(np.abs(rotation_vectors_deg(turned)).sum(axis=0).max())
 
 
 def _check_row(path: Path, format: Format, fields: Fields) -> None:
