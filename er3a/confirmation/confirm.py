@@ -342,10 +342,10 @@ def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
         if found.total(each) > found.total(chosen) + ALIKE or any(before <= parts for before in seen):
             continue
         seen.append(parts)
-        entries = tuple(entry.name for entry in each.explanation.entries)
-        named.append(
-            fact("explains_too", joints=each.explanation.joints.faults, places=each.explanation.free, entries=entries)
-        )
+        joints, places = each.explanation.joints.faults, each.explanation.free
+        zeros = tuple(entry.joint for entry in each.explanation.entries if entry.column == "offset")
+        entries = tuple(entry.name for entry in each.explanation.entries if entry.column != "offset")
+        named.append(fact("explains_too", joints=joints, places=places, zeros=zeros, entries=entries))
     return tuple(named)
 
 

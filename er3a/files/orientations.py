@@ -7,7 +7,7 @@ of Universal Robots.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ import numpy as np
 import scipy
 
 from er3a.errors import InputError
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, transform
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, posed, transform
 from er3a.numerics.arrays import Reals
 
+POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
     "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
     "zyz_deg": ("z1_deg", "y_deg", "z2_deg"),
@@ -108,6 +109,42 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
     _refuse(mirrored < 0, "the matrix is left-handed (its determinant is {:.0f})", mirrored, "Change one axis's sign")
     U, _, Vt = np.linalg.svd(R)
     return np.asarray(U @ Vt)
+
+
+def poses_of(
+    path: Path,
+    rows: Sequence[Mapping[str, Any]],
+    form: str,
+    prefix: str = "",
+    tolerance: float = ORTHONORMAL_TOLERANCE,
+) -> Reals:
+    """The poses that rows of a table give.
+
+    Parameters
+    ----------
+    rows : values by column, with the line as ``row``; positions in mm
+    form : of the orientation, one of ``FORMS``
+    prefix : before the names of the columns, such as ``flange_``
+    tolerance : as of :func:`rotations`
+
+    Returns
+    -------
+    T : (N, 4, 4), m
+
+    Raises
+    ------
+    InputError
+        naming the row whose numbers are no rotation
+    """
+    xyz, values = (
+        np.array([[row[prefix + name] for name in names] for row in rows], float) for names in (POSITION, FORMS[form])
+    )
+    try:
+        return posed(rotations(form, values, tolerance), xyz / 1000)
+    except NoRotationError as error:
+        columns = ", ".join(prefix + name for name in FORMS[form])
+        where = f"row {rows[error.row]['row']}, column {columns}"
+        raise InputError(path, where, error.problem, error.remedy) from None
 
 
 def of_angles(form: str, angles: Reals) -> Reals:

@@ -30,22 +30,21 @@ from pydantic import BeforeValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
-from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
+from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import KNOWN_FORMS, POSITION, PoseEntry
+from er3a.files.target_file import KNOWN_FORMS, PoseEntry
 from er3a.files.units import (
-    JOINT_COLUMN,
     JointsDeg,
     PositionMm,
     Triple,
     check_degrees,
     check_millimetres,
     doubt_degrees,
+    joint_names,
     joint_rates,
     joint_values,
 )
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse, read_yaml
-from er3a.geometry.transforms import posed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning import commands
@@ -108,7 +107,7 @@ def read_path_table(path: str | Path) -> PathTable:
     beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
     header -= beside
     form = form_in(path, header)
-    own = _joint_columns(path, header)
+    own = joint_names(path, header)
     of_joints = bool(own)
     if of_joints and (form or header & set(POSITION)):
         raise InputError(path, "header", "the table has both joint angles and poses", "Keep one of the two")
@@ -129,7 +128,7 @@ def read_path_table(path: str | Path) -> PathTable:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
-        poses, joints = _poses(path, lines, rows, str(form)), None
+        poses, joints = _poses(path, rows, str(form)), None
         turn = scipy.spatial.transform.Rotation.from_matrix(
             np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
         ).magnitude()
@@ -253,16 +252,6 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
     return sorted(range(len(names)), key=numbers.__getitem__)
 
 
-def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
-    """The columns of the joints, in order; :class:`InputError` if one is missing or repeated."""
-    found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
-    numbers = sorted(found.values())
-    if numbers != list(range(1, len(numbers) + 1)):
-        missing = next((k for k in range(1, max(numbers) + 1) if k not in numbers), numbers[0])
-        raise InputError(path, "header", f"joint {missing} has no column, or two", "Give q1_deg, q2_deg ... once each")
-    return tuple(sorted(found, key=found.__getitem__))
-
-
 def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) -> Reals:
     """Joint values (n, joints) in rad, or m of columns in mm."""
     turning = [name for name in names if name.endswith("_deg")]
@@ -289,15 +278,11 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
         raise InputError(path, places[-1], f"{times[-1]:g} s is too long", "Write seconds, not ms")
 
 
-def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
-    position = _block(path, rows, POSITION, check_millimetres)
-    names = FORMS[form]
-    angles = form in ("rpy_deg", "zyz_deg")
-    values = _block(path, rows, names) if angles else np.array([[row[name] for name in names] for row in rows])
-    try:
-        return posed(rotations(form, values), position / 1000)
-    except NoRotationError as error:
-        raise InputError(path, _where(lines[error.row], names), error.problem, error.remedy) from None
+def _poses(path: Path, rows: list[dict[str, Any]], form: str) -> Reals:
+    _block(path, rows, POSITION, check_millimetres)
+    if form in ("rpy_deg", "zyz_deg"):
+        _block(path, rows, FORMS[form])
+    return poses_of(path, rows, form)
 
 
 def _block(

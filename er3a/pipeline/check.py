@@ -13,6 +13,7 @@ from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
+from er3a.files.orientations import POSITION
 from er3a.files.path_file import (
     TRAJECTORIES,
     PathFile,
@@ -35,7 +36,7 @@ from er3a.files.reference_sets import (
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import URDF, holds_table, load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
-from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
+from er3a.files.target_file import TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
 from er3a.pipeline.stages.registry import STAGES

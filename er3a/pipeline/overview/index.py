@@ -219,17 +219,13 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
         return [(tr("Validate the table."), address)]
-    finding, evidence = results.summary.verdict.finding, results.summary.evidence
+    evidence = results.summary.evidence
+    entries = evidence.entries if evidence else ()
+    unsettled = [each for each in entries if each.status in ("open", "weak", "consistent")]
     steps = []
-    open_ = (
-        [each.entry for each in evidence.entries if each.status in ("open", "weak", "consistent")] if evidence else []
-    )
-    unsettled = [*open_, *getattr(finding, "unbounded", ())] if isinstance(finding, LeftOpen) else open_
-    if any(name.startswith("direction") for name in unsettled):
+    if any(each.column == "direction" for each in unsettled):
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#table-entries"))
-    left = [
-        each for each in dict.fromkeys(unsettled) if each.rstrip("0123456789") in ("a", "alpha", "d", "beta", "offset")
-    ]
+    left = [each.entry for each in unsettled if each.column in ("a", "alpha", "d", "beta", "offset")]
     if left:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
