@@ -11,9 +11,22 @@ from dataclasses import dataclass, field
 
 LONGEST = 200  # characters of an expression
 DEEPEST = 20  # brackets within each other, and names that are given by other names
-UNITS = {"mm": "mm", "毫米": "mm", "cm": "cm", "m": "m", "米": "m", "in": "in", "inch": "in"}
-UNITS |= {"°": "deg", "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "度": "deg", "rad": "rad"}
-UNITS |= {"rads": "rad", "radian": "rad", "radians": "rad", "metre": "m", "meter": "m", "metres": "m", "meters": "m"}
+
+
+def words_of(text: str) -> dict[str, str]:
+    """What words mean.
+
+    Parameters
+    ----------
+    text : pairs such as ``metre=m``, or words without a meaning, with blanks between them
+    """
+    return {word: meaning for word, _, meaning in (pair.partition("=") for pair in text.split())}
+
+
+UNITS = words_of(
+    "mm=mm 毫米=mm cm=cm m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
+    "°=deg deg=deg degs=deg degree=deg degrees=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
+)
 _RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}
 _DEGREES = {"rad2deg", "degrees"}
 _FUNCTIONS: dict[str, Callable[..., float]] = {

@@ -20,7 +20,7 @@ from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, start
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CsvColumn, columns_of, read_csv, read_header
 from er3a.files.orientations import POSITION
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.files.units import MIN_SPAN_MM, joint_names, refuse_radians
@@ -37,7 +37,6 @@ from er3a.robots.robot import Robot, Source
 if TYPE_CHECKING:
     import pandas as pd
 
-_NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
 WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
 
@@ -54,14 +53,8 @@ def measurement_columns(joints: Sequence[str]) -> dict[str, CsvColumn]:
     columns : by name; joint values and ``point`` are required. ``x_mm``, ``y_mm``, ``z_mm`` may hold empty cells;
         standard deviation, place and plane may also be left out as columns
     """
-    return {
-        **dict.fromkeys(joints, _NUMBER),
-        "point": CsvColumn(str, choices=("flange", "tool")),
-        **dict.fromkeys(POSITION, CsvColumn(float, optional=True)),
-        "standard_deviation_mm": CsvColumn(float, always=False),
-        "place": CsvColumn(str, optional=True, always=False),
-        "plane": CsvColumn(str, optional=True, always=False),
-    }
+    own = "point:flange|tool x_mm? y_mm? z_mm? standard_deviation_mm~ place:word?~ plane:word?~"
+    return columns_of(f"{' '.join(joints)} {own}")
 
 
 SIX = tuple(f"q{joint}_deg" for joint in range(1, 7))
@@ -127,7 +120,7 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
     """
     path, joints = Path(path), joint_columns(robot)
     unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(joints).items()}
-    table = read_csv(path, unread | dict.fromkeys(joints, _NUMBER))
+    table = read_csv(path, unread | columns_of(" ".join(joints)))
     rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
     _check_units(path, rows, joints)
     check_poses(rows, robot, path)

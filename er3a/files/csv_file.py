@@ -59,8 +59,25 @@ class CsvColumn:
     quantity: str = "length or angle"
 
 
+def columns_of(text: str, number: type = float) -> dict[str, CsvColumn]:
+    """The columns of a table, by name.
+
+    Parameters
+    ----------
+    text : names of columns of numbers; ``name:int`` holds whole numbers, ``name:word`` texts, ``name:a|b`` one of some
+        words. A field may be empty with ``?`` behind, and the column be missing with ``~``
+    number : type of numbers
+    """
+    found: dict[str, CsvColumn] = {}
+    for word in text.split():
+        name, _, kind = word.rstrip("?~").partition(":")
+        choices = tuple(kind.split("|")) if kind not in ("", "int", "word") else ()
+        found[name] = CsvColumn({"": number, "int": int}.get(kind, str), "?" in word, choices, "~" not in word)
+    return found
+
+
 UNITS_CHECKED = "units_checked"
-CHECKED_COLUMN = {UNITS_CHECKED: CsvColumn(str, optional=True, choices=("yes",), always=False)}
+CHECKED_COLUMN = columns_of(f"{UNITS_CHECKED}:yes?~")
 """The column that says yes where numbers which look like metres or radians are mm and degrees."""
 
 

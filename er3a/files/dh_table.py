@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_lines
+from er3a.files.csv_file import columns_of, read_csv, read_lines
 from er3a.files.printed_table import FIXED, MAX_BYTES, PER_MM, PrintedTable, check_size, printed_table, table_text
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
@@ -33,23 +33,11 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
-_NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
-NEEDED = {"joint": CsvColumn(int, optional=True), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
-OPTIONAL = {
-    "convention": CsvColumn(str, choices=CONVENTIONS),
-    "type": CsvColumn(str, choices=("revolute", "prismatic", "fixed", "tool")),
-    "theta_deg": _OF_KIND,
-    "beta_deg": CsvColumn(float),
-    "calibrated": CsvColumn(str, choices=("true", "false")),
-    "offset_deg": _OF_KIND,
-    "direction": CsvColumn(int, optional=True),
-    "lower_deg": _OF_KIND,
-    "upper_deg": _OF_KIND,
-    "lower_mm": _OF_KIND,
-    "upper_mm": _OF_KIND,
-    "speed_deg_s": _OF_KIND,
-    "speed_mm_s": _OF_KIND,
-}
+NEEDED = columns_of("joint:int? a_mm alpha_deg d_mm")
+OPTIONAL = columns_of(
+    f"convention:{'|'.join(CONVENTIONS)} type:revolute|prismatic|fixed|tool theta_deg? beta_deg calibrated:true|false "
+    "offset_deg? direction:int? lower_deg? upper_deg? lower_mm? upper_mm? speed_deg_s? speed_mm_s?"
+)
 ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "cm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]

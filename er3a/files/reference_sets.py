@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from er3a.errors import InputError, InputWarning
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, Written, read_csv
+from er3a.files.csv_file import UNITS_CHECKED, CsvColumn, Written, columns_of, read_csv
 from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.orientations import BY_ROW, NoRotationError, rotations
 from er3a.files.robot_file import NAME_PATTERN
@@ -39,26 +39,19 @@ Fields = dict[str, Any]
 Fault = tuple[str, str, str]
 """Column, problem and remedy."""
 
-_WORD, _NUMBER, _JOINT = CsvColumn(str), CsvColumn(Written), CsvColumn(int)
-_OPTIONAL, _OF_SLIDES = CsvColumn(Written, optional=True), CsvColumn(Written, optional=True, always=False)
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
 UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s", "uncertainty_mm_s")
-_SOURCE = {
-    "source": _WORD,
-    "grade": CsvColumn(str, choices=tuple(GRADES)),
-    "origin": _WORD,
-    STATED_AS: CsvColumn(str, optional=True, choices=("half_width", STANDARD_DEVIATION), always=False),
-    **CHECKED_COLUMN,
-}
-_POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
+_SOURCE = columns_of(
+    f"source:word grade:{'|'.join(GRADES)} origin:word {STATED_AS}:half_width|{STANDARD_DEVIATION}?~ "
+    f"{UNITS_CHECKED}:yes?~"
+)
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
 ORIENTATION_COLUMNS = tuple(column for columns in BY_ROW.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
 _FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
-_POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
 
 
 @dataclass(frozen=True)
@@ -231,107 +224,56 @@ def _mixed_units(fields: Fields) -> Iterator[Fault]:
             yield column, "given beside millimetres", "Leave it empty of a joint that slides"
 
 
+_JOINTS = " ".join([*_POSE, *(f"{name}~" for name in _FURTHER)])
+_TURN = " ".join(f"{name}?~" for name in ORIENTATION_COLUMNS)
+_POINT = "point:flange|wrist_centre"
+
+
+def _format(columns: str, **more: Any) -> Format:
+    return Format(columns_of(columns, Written), **more)
+
+
 FORMATS: dict[str, Format] = {
-    "axes": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(_DIRECTION, _NUMBER),
-            **dict.fromkeys(_XYZ, _OPTIONAL),
-            "signed": CsvColumn(str, choices=("yes", "no")),
-            "uncertainty_mm": _NUMBER,
-            "uncertainty_deg": _NUMBER,
-        },
+    "axes": _format(
+        "joint:int direction_x direction_y direction_z x_mm? y_mm? z_mm? signed:yes|no uncertainty_mm uncertainty_deg",
         gather=_axis_fields,
         faults=_axis_faults,
     ),
-    "positions": Format(
-        {
-            "name": _WORD,
-            "point": _POINT,
-            **_POSE_COLUMNS,
-            **dict.fromkeys(_XYZ, _OPTIONAL),
-            "uncertainty_mm": _OPTIONAL,
-            **dict.fromkeys((*ORIENTATION_COLUMNS, "uncertainty_deg"), CsvColumn(Written, optional=True, always=False)),
-        },
+    "positions": _format(
+        f"name:word {_POINT} {_JOINTS} x_mm? y_mm? z_mm? uncertainty_mm? {_TURN} uncertainty_deg?~",
         gather=_position_fields,
         faults=_position_faults,
         mixed_lengths=True,
     ),
-    "directions": Format(
-        {
-            "segment": CsvColumn(str, choices=("upper_arm", "forearm")),
-            "angle_from_vertical_deg": _NUMBER,
-            "uncertainty_deg": _OPTIONAL,
-        },
-    ),
-    "envelope": Format(
-        {
-            "quantity": CsvColumn(str, choices=(*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS)),
-            "q2_deg": _OPTIONAL,
-            "q3_deg": _OPTIONAL,
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
+    "directions": _format("segment:upper_arm|forearm angle_from_vertical_deg uncertainty_deg?"),
+    "envelope": _format(
+        f"quantity:{'|'.join((*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS))} q2_deg? q3_deg? value_mm uncertainty_mm?",
         gather=_envelope_fields,
         faults=_envelope_faults,
     ),
-    "reach": Format(
-        {
-            "point": _POINT,
-            "from_axis": CsvColumn(int),
-            "extreme": CsvColumn(str, choices=("greatest", "least")),
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
+    "reach": _format(
+        f"{_POINT} from_axis:int extreme:greatest|least value_mm uncertainty_mm?",
         faults=_reach_faults,
         mixed_lengths=True,
     ),
-    "limits": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(("lower_deg", "upper_deg", "uncertainty_deg"), _OPTIONAL),
-            **dict.fromkeys(("lower_mm", "upper_mm", "uncertainty_mm"), _OF_SLIDES),
-        },
+    "limits": _format(
+        "joint:int lower_deg? upper_deg? uncertainty_deg? lower_mm?~ upper_mm?~ uncertainty_mm?~",
         gather=_in_one_unit,
         faults=_limit_faults,
         mixed_limits=True,
     ),
-    "speeds": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(("speed_deg_s", "uncertainty_deg_s"), _OPTIONAL),
-            **dict.fromkeys(("speed_mm_s", "uncertainty_mm_s"), _OF_SLIDES),
-        },
+    "speeds": _format(
+        "joint:int speed_deg_s? uncertainty_deg_s? speed_mm_s?~ uncertainty_mm_s?~",
         gather=_in_one_unit,
         faults=_speed_faults,
     ),
-    "observations": Format(
-        {
-            **_POSE_COLUMNS,
-            "joint": _JOINT,
-            "point": _POINT,
-            "seen": CsvColumn(str, choices=SEEN),
-            "uncertainty_deg": _OPTIONAL,
-        },
+    "observations": _format(
+        f"{_JOINTS} joint:int {_POINT} seen:{'|'.join(SEEN)} uncertainty_deg?",
         gather=_observation_fields,
         coarse=COARSE_DEG,
     ),
-    "lengths": Format(
-        {
-            "joint": _JOINT,
-            "length": CsvColumn(str, choices=("a", "d")),
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
-    ),
-    "angles": Format(
-        {
-            "joint": _JOINT,
-            "angle": CsvColumn(str, choices=("alpha", "offset")),
-            "value_deg": _NUMBER,
-            "uncertainty_deg": _OPTIONAL,
-        },
-    ),
+    "lengths": _format("joint:int length:a|d value_mm uncertainty_mm?"),
+    "angles": _format("joint:int angle:alpha|offset value_deg uncertainty_deg?"),
 }
 
 
@@ -358,8 +300,7 @@ check_complete("kinds of reference tables", KINDS, FORMATS)
 
 
 FILE = "documents.csv"
-_TEXT = CsvColumn(str)
-COLUMNS = {"name": _TEXT, "title": _TEXT, "publisher": _TEXT, "derived_from": CsvColumn(str, optional=True)}
+COLUMNS = columns_of("name:word title:word publisher:word derived_from:word?")
 
 
 def load_documents(path: str | Path) -> Documents:
