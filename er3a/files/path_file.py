@@ -411,20 +411,13 @@ class JointPath(NamedPath):
         InputError
             if values or rates are not as many as the joints
         """
-        return commands.JointMoveCommand(
-            commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
-            joint_values(robot, self.end_deg, "end_deg"),
-            self.duration_s,
-            (
-                _rates(robot, self.start_velocity_deg_s, "start_velocity_deg_s"),
-                _rates(robot, self.end_velocity_deg_s, "end_velocity_deg_s"),
-            ),
-            (
-                _rates(robot, self.start_acceleration_deg_s2, "start_acceleration_deg_s2"),
-                _rates(robot, self.end_acceleration_deg_s2, "end_acceleration_deg_s2"),
-            ),
-            source=source,
-        )
+        rates = [
+            tuple(_rates(robot, getattr(self, f"{end}_{key}"), f"{end}_{key}") for end in ("start", "end"))
+            for key in ("velocity_deg_s", "acceleration_deg_s2")
+        ]
+        start = commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after)
+        end = joint_values(robot, self.end_deg, "end_deg")
+        return commands.JointMoveCommand(start, end, self.duration_s, *rates, source=source)
 
 
 class JointSequencePath(Profiled):

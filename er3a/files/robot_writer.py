@@ -18,11 +18,9 @@ from er3a.files.robot_file import (
     MIN_LONGEST_MM,
     RESIDUE_MM,
     SHORTEST_PLAIN_LENGTH_MM,
-    SLIDING,
-    TURNING,
     BodyFields,
     RobotFile,
-    drive_field,
+    drive_keys,
     link_visual,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
@@ -71,9 +69,8 @@ def _link(link: int, body: MassBody) -> dict[str, Any]:
 def _drive(robot: Robot, k: int) -> dict[str, float]:
     drives = robot.masses.drives
     assert drives is not None
-    keys = SLIDING if robot.slides[k] else TURNING
-    named = {key: getattr(drives, drive_field(key)) for key in (*keys, "gear_ratio")}
-    return {key: float(column[k]) for key, column in named.items() if np.isfinite(column[k])}
+    named = {key: getattr(drives, name)[k] for name, key in drive_keys(bool(robot.slides[k])).items()}
+    return {key: float(value) for key, value in named.items() if np.isfinite(value)}
 
 
 _UNKNOWN = Source("not stated", "inferred")

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 from er3a.files.arithmetic import UNITS, plain, words_of
 
-QUANTITIES = ("joint", "theta", "d", "a", "alpha", "offset", "beta", "type")
 _JOINT = words_of(
-    "joint joints joint# jointi jointno jointno. jointnumber link links link# linki linkno linkno. linknumber axis i j n "
-    "no no. # frame kinematics gelenk achse articulation 关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
+    "joint joints joint# jointi jointno jointno. jointnumber link links link# linki linkno linkno. linknumber axis "
+    "i j n no no. # frame kinematics gelenk achse articulation "
+    "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
     "a=a r=a l=a d=d q=theta th=theta t= offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset "
@@ -31,8 +31,9 @@ _BEFORE = re.compile(r"[ijn]-1")
 
 @dataclass(frozen=True)
 class Heading:
-    """``quantity``: one of QUANTITIES; ``unit``: "" where none is printed; ``before``: whether it belongs to the link
-    before the joint, as in Craig's tables; ``sign``: the letter that was printed for a length."""
+    """``quantity``: joint, theta, d, a, alpha, offset, beta or type; ``unit``: "" where none is printed; ``before``:
+    whether it belongs to the link before the joint, as in Craig's tables; ``sign``: the letter that was printed for a
+    length."""
 
     quantity: str
     unit: str
