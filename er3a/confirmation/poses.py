@@ -16,7 +16,7 @@ import numpy as np
 
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.errors import ArgumentError, InputError
-from er3a.files.arithmetic import UNITS
+from er3a.files.arithmetic import UNITS, words_of
 from er3a.files.csv_file import LARGEST_DIGITS, CsvColumn, Lines, Written, cell_value, check_widths, csv_text, lines_of
 from er3a.files.orientations import OF_THREE, NoRotationError, of_angles, rotations
 from er3a.files.path_file import UR_JOINTS
@@ -43,16 +43,13 @@ NO_POSITIONS = re.compile(
 OF_TOOL = re.compile(r"^(?!.*(vel|speed|target|force|offset|_c$|_d$)).*(tcp|pose|cart|ee$|flange)")
 RATES = re.compile(r"(^|_)(actual_qd|qd|dq|vel\w*)$")
 COMMENT = r"[ \t]*[#!%]"
-ANGLES: dict[tuple[str, ...], tuple[str, ...]] = {
-    ("a", "b", "c"): ("abc",),
-    ("w", "p", "r"): ("rpy",),
-    ("roll", "pitch", "yaw"): ("rpy",),
-    ("o", "a", "t"): ("zyz",),
-    ("z1", "y", "z2"): ("zyz",),
-    ("rx", "ry", "rz"): ("rotation_vector", "rpy", "zyz", "xyz"),
-    ("r", "p", "y"): ("rpy",),
+ANGLES = {
+    tuple(names.split(",")): tuple(forms.split(","))
+    for names, forms in words_of(
+        "a,b,c=abc w,p,r=rpy roll,pitch,yaw=rpy o,a,t=zyz z1,y,z2=zyz rx,ry,rz=rotation_vector,rpy,zyz,xyz r,p,y=rpy"
+    ).items()
 }
-QUATERNIONS = (("qw", "qx", "qy", "qz"), ("w", "x", "y", "z"), ("q1", "q2", "q3", "q4"), ("q_1", "q_2", "q_3", "q_4"))
+QUATERNIONS = [tuple(names.split(",")) for names in words_of("qw,qx,qy,qz w,x,y,z q1,q2,q3,q4 q_1,q_2,q_3,q_4")]
 MATRICES = (
     tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)),
     tuple(f"{axis}{row}" for row in "xyz" for axis in ("n", "o", "a")),

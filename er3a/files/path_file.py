@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -490,28 +490,30 @@ class ToolStart(Profiled):
         return commands.Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
 
 
-class LineTo(StrictModel):
-    """A straight line to a pose; ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg."""
+class ToolMove(StrictModel):
+    """A straight line to a pose, or a circular arc through a point to it.
 
+    ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg.
+    """
+
+    kind: Literal["line", "arc"]
     end: PoseEntry
+    via_mm: PositionMm | None = None
     half_turn_axis: Triple | None = None
 
-    def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units: its end T_base_tool (4, 4), m."""
-        return commands.SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
+    @model_validator(mode="after")
+    def _an_arc_has_a_point(self) -> Self:
+        if (self.via_mm is None) == (self.kind == "arc"):
+            raise ValueError("via_mm: an arc passes a point, and a line none | Add or remove it, or change kind")
+        return self
+
+    def segment(self, blend: float = 0.0) -> commands.SegmentCommand:
+        """The segment in SI units: its end T_base_tool (4, 4), and the point (3,) that an arc passes, m."""
+        via = None if self.via_mm is None else np.array(self.via_mm) / 1000
+        return commands.SegmentCommand(self.end.pose(), via, _axis(self.half_turn_axis), blend)
 
 
-class ArcTo(LineTo):
-    """A circular arc through a point to a pose."""
-
-    via_mm: PositionMm
-
-    def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units: its end T_base_tool (4, 4), and the point (3,) that it passes, m."""
-        return replace(super().segment(), via=np.array(self.via_mm) / 1000)
-
-
-class ToolMovePath(ToolStart, LineTo):
+class ToolMovePath(ToolStart, ToolMove):
     """One line or arc of the tool."""
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
@@ -531,29 +533,9 @@ class ToolMovePath(ToolStart, LineTo):
         )
 
 
-class LinePath(ToolMovePath):
-    """A straight line of the tool."""
+class Segment(ToolMove):
+    """A line or arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
 
-    kind: Literal["line"]
-
-
-class ArcPath(ToolMovePath, ArcTo):
-    """A circular arc of the tool."""
-
-    kind: Literal["arc"]
-
-
-class LineSegment(LineTo):
-    """A line of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
-
-    kind: Literal["line"]
-    blend_mm: Blend = 0.0
-
-
-class ArcSegment(ArcTo):
-    """An arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
-
-    kind: Literal["arc"]
     blend_mm: Blend = 0.0
 
 
@@ -561,9 +543,7 @@ class SequencePath(ToolStart):
     """Lines and arcs one after another; the tool stops at each corner that is not rounded."""
 
     kind: Literal["sequence"]
-    segments: Annotated[
-        list[Annotated[LineSegment | ArcSegment, Field(discriminator="kind")]], Field(min_length=1, max_length=1000)
-    ]
+    segments: Annotated[list[Segment], Field(min_length=1, max_length=1000)]
 
     @model_validator(mode="after")
     def _no_corner_at_the_end(self) -> Self:
@@ -584,7 +564,7 @@ class SequencePath(ToolStart):
         -------
         command : segments and the blends at their ends in m, the duration of the whole in s
         """
-        segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
+        segments = tuple(part.segment(part.blend_mm / 1000) for part in self.segments)
         return commands.ToolSequenceCommand(
             self.start_command(robot), segments, self.duration_s, self.ramp, source=source
         )
@@ -707,7 +687,7 @@ class ProgramPath(NamedPath):
     start_deg: JointsDeg | None = None
 
 
-PathEntry = PlanPath | JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
+PathEntry = PlanPath | JointPath | JointSequencePath | ToolMovePath | SequencePath | TablePath
 
 
 class PathFile(InputFile):

@@ -64,15 +64,14 @@ class Format:
     gather : converts a line's fields to those of the row
     faults : errors of a line
     coarse : the default uncertainty of tables without digits
-    mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
+    mixed : whether single lines in metres or radians among others are refused
     """
 
     columns: Mapping[str, CsvColumn]
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
     coarse: float | None = None
-    mixed_lengths: bool = False
-    mixed_limits: bool = False
+    mixed: bool = False
 
     @property
     def all_columns(self) -> dict[str, CsvColumn]:
@@ -243,7 +242,7 @@ FORMATS: dict[str, Format] = {
         f"name:word {_POINT} {_JOINTS} x_mm? y_mm? z_mm? uncertainty_mm? {_TURN} uncertainty_deg?~",
         gather=_position_fields,
         faults=_position_faults,
-        mixed_lengths=True,
+        mixed=True,
     ),
     "directions": _format("segment:upper_arm|forearm angle_from_vertical_deg uncertainty_deg?"),
     "envelope": _format(
@@ -254,13 +253,13 @@ FORMATS: dict[str, Format] = {
     "reach": _format(
         f"{_POINT} from_axis:int extreme:greatest|least value_mm uncertainty_mm?",
         faults=_reach_faults,
-        mixed_lengths=True,
+        mixed=True,
     ),
     "limits": _format(
         "joint:int lower_deg? upper_deg? uncertainty_deg? lower_mm?~ upper_mm?~ uncertainty_mm?~",
         gather=_in_one_unit,
         faults=_limit_faults,
-        mixed_limits=True,
+        mixed=True,
     ),
     "speeds": _format(
         "joint:int speed_deg_s? uncertainty_deg_s? speed_mm_s?~ uncertainty_mm_s?~",
@@ -379,28 +378,37 @@ def _known(names: Iterable[str]) -> str:
     return f"Write one of: {', '.join(names) or 'none yet'}; or declare it in {FILE}"
 
 
-SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
-WIDE_DEG = 30.0
 HALF_DEG, COMMANDED_DEG = 0.5, 2.5
 LEAST_COMMANDED = 4  # values of a row; rounded to whole degrees they would all be commanded ones once in 600 rows
-LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
-_COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
-ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
 
 
 @dataclass(frozen=True)
 class Mistaken:
-    """A unit that values were written in by mistake."""
+    """A unit that values were written in by mistake.
+
+    Attributes
+    ----------
+    columns : which are looked at
+    least : values are in the other unit if all are smaller; small, large : or one row's among larger ones
+    """
 
     unit: str
     other: str
     remedy: str
+    columns: tuple[str, ...]
+    least: float
+    small: float
+    large: float
 
 
 AS_WRITTEN = f"if the values are meant as they are written, add a column {UNITS_CHECKED} that says yes"
-METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}")
-RADIANS = Mistaken("deg", "radians", f"Convert to degrees; {AS_WRITTEN}")
+LENGTHS = (*_XYZ, "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
+ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
+METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}", LENGTHS, MIN_SPAN_MM, 2.0, 100.0)
+RADIANS = Mistaken(
+    "deg", "radians", f"Convert to degrees; {AS_WRITTEN}", ANGLES, WIDEST_IN_RADIANS, WIDEST_IN_RADIANS, 30.0
+)
 
 
 def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> ReferenceSet:
@@ -588,36 +596,26 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
     """Reject values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
-    _check_span(path, table, LENGTHS, MIN_SPAN_MM, METRES)
-    if format.mixed_lengths:
-        _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
-    if format.mixed_limits:
-        _check_mixed(path, table, ANGLES, WIDEST_IN_RADIANS, WIDE_DEG, RADIANS)
+    for mistaken in (METRES, RADIANS):
+        _check_sizes(path, table, mistaken, format.mixed)
     if _POSE[0] in format.columns:
         _check_angles(path, table)
-    _check_span(path, table, ANGLES, WIDEST_IN_RADIANS, RADIANS)
 
 
-def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least: float, mistaken: Mistaken) -> None:
-    """Reject a table whose values are all too small."""
-    present = [column for column in columns if column in table[0]]
-    largest = max(_sizes(table, present))
-    if "length" not in table[0] and 0 < largest < least:
-        problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
-        raise InputError(path, f"columns {', '.join(present)}", problem, mistaken.remedy)
-
-
-def _check_mixed(
-    path: Path, table: list[Fields], columns: tuple[str, ...], least: float, most: float, mistaken: Mistaken
-) -> None:
-    """Reject a row of small values beside rows of large ones."""
-    present = [column for column in columns if column in table[0]]
+def _check_sizes(path: Path, table: list[Fields], mistaken: Mistaken, mixed: bool) -> None:
+    """Reject a table whose values are all too small, and a row of small values among large ones."""
+    present = [column for column in mistaken.columns if column in table[0]]
+    columns = f"columns {', '.join(present)}"
     sizes = _sizes(table, present)
+    largest = max(sizes)
+    if "length" not in table[0] and 0 < largest < mistaken.least:
+        problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
+        raise InputError(path, columns, problem, mistaken.remedy)
     for fields, size in zip(table, sizes):
-        if 0 < size < least and max(sizes) > most:
-            beside = f"{size:g} {mistaken.unit} at most beside up to {max(sizes):g} {mistaken.unit} in other rows"
-            where = f"row {fields['row']}, columns {', '.join(present)}"
-            raise InputError(path, where, f"{beside} looks like {mistaken.other}", mistaken.remedy)
+        if mixed and 0 < size < mistaken.small and largest > mistaken.large:
+            problem = f"{size:g} {mistaken.unit} at most, with up to {largest:g} {mistaken.unit} in other rows,"
+            where = f"row {fields['row']}, {columns}"
+            raise InputError(path, where, f"{problem} looks like {mistaken.other}", mistaken.remedy)
 
 
 def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
@@ -628,7 +626,7 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 def _check_angles(path: Path, table: list[Fields]) -> None:
     """Reject poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
     all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
-    if all_small and _COORDINATES[0] in table[0]:
+    if all_small and _XYZ[0] in table[0]:
         _check_arcs(path, table)
     for fields in table:
         for column in (*_POSE, *(each for each in _FURTHER if fields[each] is not None)):
@@ -644,10 +642,10 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
 def _check_arcs(path: Path, table: list[Fields]) -> None:
     """Reject points that move by more than joints that turn so little can move them."""
     first: dict[tuple[str, str], Fields] = {}
-    whole = [row for row in table if all(row[column] is not None for column in _COORDINATES)]
+    whole = [row for row in table if all(row[column] is not None for column in _XYZ)]
     for row in whole:
         start = first.setdefault((row.get("point", "point"), row["source"]), row)
-        point, other = (np.array([each[column] for column in _COORDINATES]) for each in (start, row))
+        point, other = (np.array([each[column] for column in _XYZ]) for each in (start, row))
         turned = sum(abs((row[column] or 0.0) - (start[column] or 0.0)) for column in (*_POSE, *_FURTHER))
         moved, longest = np.linalg.norm(other - point), LONGEST_ARM * max(map(np.linalg.norm, (point, other)))
         if turned and moved > longest * math.radians(turned):

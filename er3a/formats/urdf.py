@@ -327,10 +327,8 @@ def link_visuals(
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
     found = []
     for number, meshes in sorted(parts.items()):
-        starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
-        faces = np.concatenate([faces + start for (_, faces), start in zip(meshes, starts)])
-        points = np.concatenate([points for points, _ in meshes])
-        points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
+        whole = link_mesh(number, np.concatenate([points[faces] for points, faces in meshes]))
+        points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         used, corners = np.unique(faces, return_inverse=True)
         found.append(LinkMesh(number, points[used], corners.reshape(-1, 3)))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
@@ -395,26 +393,23 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
     in degrees."""
     rows, notes, assumed = [], [], []
     for joint in sources:
-        lower, upper = joint.lower, joint.upper
+        lower, upper, turns = joint.lower, joint.upper, joint.type == "revolute"
+        widest = max(abs(lower), abs(upper))
+        none = "no limits" if math.isnan(lower) else "the limits 0 and 0" if lower == upper == 0 else ""
+        none = none or ("limits beyond ten turns (in radians)" if turns and widest > urdf_tree.MAX_TURNED else "")
         if joint.type == "continuous":
             notes.append(f"joint {joint.name} is continuous: one turn is sampled")
             lower, upper = -math.pi, math.pi
-        elif lower == upper == 0 or (math.isnan(lower) and math.isnan(upper)):
-            has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
-            turns = joint.type == "revolute"
+        elif none:
             half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
-            notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
+            notes.append(f"joint {joint.name} has {none}: +-{shown} were assumed")
             assumed.append(joint.name)
             lower, upper = -half, half
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > urdf_tree.MAX_TURNED:
-            notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
-            assumed.append(joint.name)
-            lower, upper = -NO_RANGE, NO_RANGE
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
+        elif turns and widest > MANY_TURNS:
             shown = f"{lower:g} to {upper:g} rad"
             notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
             assumed.append(joint.name)
-        elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MAX_SLID_M:
+        elif not turns and widest > MAX_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)
         rows.append((lower, upper))

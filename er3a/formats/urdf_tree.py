@@ -546,20 +546,14 @@ def _within_soft_limits(
     """Limits of a joint, NaN where it has none, held within those of its safety controller, as MoveIt plans."""
     soft, where = joint.find("safety_controller"), f"joint {joint.get('name', '?')}"
     keys = ("soft_lower_limit", "soft_upper_limit")
-    if soft is None or not any(key in soft.attrib for key in keys) or kind not in MOVING:
+    if soft is None or not any(key in soft.attrib for key in keys) or kind not in ("revolute", "prismatic"):
         return limits
-    least, most = (_numbers(path, where, soft, key, (0.0,))[0] for key in keys)
-    said = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
-    if kind == "continuous":
-        notes.append(f"{said}, but is continuous: they are not kept")
+    least, most = (float(_numbers(path, where, soft, key, (0.0,))[0]) for key in keys)
+    given = (math.nan, math.nan) if limits == (0, 0) else limits
+    lower, upper = float(np.fmax(given[0], least)), float(np.fmin(given[1], most))
+    if lower >= upper or (lower, upper) == limits:
         return limits
-    none_given = limits == (0, 0)
-    lower, upper = (least, most) if none_given else (float(np.fmax(limits[0], least)), float(np.fmin(limits[1], most)))
-    if lower >= upper:
-        notes.append(f"{said}, which leave nothing of its limits: they are not kept")
-        return limits
-    if (lower, upper) != limits:
-        notes.append(f"{said}: its limits are held to {lower:g} to {upper:g}")
+    notes.append(f"{where} has soft limits {least:g} to {most:g}: its limits are held to {lower:g} to {upper:g}")
     return lower, upper
 
 
