@@ -11,7 +11,7 @@ import difflib
 import math
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -132,7 +132,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         found, from_code = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
-    tables = [table for n, table in enumerate(found[:9]) if [row for _, row in table] not in _rows_of(found[:n])]
+    tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
     if not tables:
         return None
     if len(tables) > 1:
@@ -168,33 +168,30 @@ def is_printed_table(header: Iterable[str]) -> bool:
     return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
 
 
-def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
-    return [[row for _, row in grid] for grid in grids]
-
-
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    bare = code_grids(text, headed=False) if columns else []
-    if tables := [table for grid in bare for table in _headed(grid, columns)]:
-        return tables, True
-    page = html_grids(text) or latex_grids(text)
-    if tables := [table for grid in page for table in _headed(grid, columns)]:
-        return tables, False
-    if tables := [table for grid in code_grids(text) for table in _headed(grid, columns)]:
-        return tables, True
-    for mark, grid in line_grids(text):
-        if tables := _headed(grid, columns):
-            return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
-    if tables := [table for grid in _stacked(text) for table in _headed(grid, columns)]:
-        return tables, False
+    for grids, from_code in _read(text, columns):
+        if tables := [table for grid in grids for table in _headed(grid, columns)]:
+            return tables, from_code
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
+
+
+def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], bool]]:
+    """What each reader makes of a text, and whether that reads programs."""
+    if columns:
+        yield code_grids(text, headed=False), True
+    yield html_grids(text) or latex_grids(text), False
+    yield code_grids(text), True
+    for grid in line_grids(text):
+        yield [grid], False
+    yield _stacked(text), False
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -224,7 +221,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
                 raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
             else:
                 tables[-1].append((line, cells))
-    return [table for table in tables if len(table) > 1] or _turned(grid)
+    return [_trimmed(table) for table in tables if len(table) > 1] or _turned(grid)
 
 
 def _numeric(cells: list[str]) -> bool:
