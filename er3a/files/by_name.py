@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -156,24 +158,20 @@ def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
 
 
 def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
+    """Reject points of the same joint values that are farther apart than their deviations explain."""
+    if any(row.deviation_mm is None for row in rows):
+        return
     by_pose: dict[tuple[Pose, str], list[Measurement]] = {}
     for row in rows:
-        if row.deviation_mm is None:
-            return
-        if row.touched:
-            continue
-        by_pose.setdefault((row.pose, row.point), []).append(row)
-    for same in (rows for rows in by_pose.values() if len(rows) > 1):
-        xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything
-        deviation = np.array([row.deviation_mm for row in same], dtype=float)
-        for n, row in enumerate(same):
-            apart = np.abs(xyz[:n] - xyz[n])
-            far = np.argwhere(apart > APART_DEVIATIONS * np.hypot(deviation[:n], deviation[n])[:, None])
-            if len(far):
-                k, c = far[0]
+        if not row.touched:
+            by_pose.setdefault((row.pose, row.point), []).append(row)
+    for first, row in (pair for same in by_pose.values() for pair in combinations(same, 2)):
+        most = APART_DEVIATIONS * math.hypot(first.deviation_mm or 0.0, row.deviation_mm or 0.0)
+        for name, one, other in zip("xyz", first.xyz_mm, row.xyz_mm):
+            if one is not None and other is not None and abs(one - other) > most:
                 problem = (
-                    f"contradicts row {same[k].row}: same joints, {apart[k, c]:.3g} mm apart in {'xyz'[c]}, "
-                    f"far beyond the stated standard deviations"
+                    f"contradicts row {first.row}: same joints, {abs(one - other):.3g} mm apart in {name}, "
+                    "far beyond the stated standard deviations"
                 )
                 raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")
 

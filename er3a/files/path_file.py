@@ -411,13 +411,13 @@ class JointPath(NamedPath):
         InputError
             if values or rates are not as many as the joints
         """
-        rates = [
-            tuple(_rates(robot, getattr(self, f"{end}_{key}"), f"{end}_{key}") for end in ("start", "end"))
+        velocities, accelerations = (
+            (_rates(robot, self, f"start_{key}"), _rates(robot, self, f"end_{key}"))
             for key in ("velocity_deg_s", "acceleration_deg_s2")
-        ]
+        )
         start = commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after)
         end = joint_values(robot, self.end_deg, "end_deg")
-        return commands.JointMoveCommand(start, end, self.duration_s, *rates, source=source)
+        return commands.JointMoveCommand(start, end, self.duration_s, velocities, accelerations, source=source)
 
 
 class JointSequencePath(Profiled):
@@ -737,5 +737,6 @@ def _branch(words: str | None) -> str | None:
     return code if code in get_args(BranchLabel) else words
 
 
-def _rates(robot: Robot, values: list[float] | None, field: str) -> Reals | float:
+def _rates(robot: Robot, path: JointPath, field: str) -> Reals | float:
+    values = getattr(path, field)
     return 0.0 if values is None else joint_rates(robot, values, field)
