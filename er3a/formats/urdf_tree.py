@@ -551,10 +551,12 @@ def _within_soft_limits(
     least, most = (float(_numbers(path, where, soft, key, (0.0,))[0]) for key in keys)
     given = (math.nan, math.nan) if limits == (0, 0) else limits
     lower, upper = float(np.fmax(given[0], least)), float(np.fmin(given[1], most))
-    if lower >= upper or (lower, upper) == limits:
+    if (lower, upper) == limits:
         return limits
-    notes.append(f"{where} has soft limits {least:g} to {most:g}: its limits are held to {lower:g} to {upper:g}")
-    return lower, upper
+    held = f"its limits are held to {lower:g} to {upper:g}"
+    kept = held if lower < upper else "they leave nothing of its limits and are not kept"
+    notes.append(f"{where} has soft limits {least:g} to {most:g} (safety_controller): {kept}")
+    return (lower, upper) if lower < upper else limits
 
 
 def _numbers(
