@@ -173,9 +173,9 @@ def is_printed_table(header: Iterable[str]) -> bool:
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    for grids, from_code in _read(text, columns):
+    for grids, kind in _read(text, columns):
         if tables := [table for grid in grids for table in _headed(grid, columns)]:
-            return tables, from_code
+            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -183,15 +183,15 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     return [], False
 
 
-def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], bool]]:
-    """What each reader makes of a text, and whether that reads programs."""
+def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
+    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
     if columns:
-        yield code_grids(text, headed=False), True
-    yield html_grids(text) or latex_grids(text), False
-    yield code_grids(text), True
-    for grid in line_grids(text):
-        yield [grid], False
-    yield _stacked(text), False
+        yield code_grids(text, headed=False), "program"
+    yield html_grids(text) or latex_grids(text), "marks"
+    yield code_grids(text), "program"
+    for mark, grid in line_grids(text):
+        yield [grid], "blanks" if mark in ("  ", " ") else "marks"
+    yield _stacked(text), "marks"
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -221,7 +221,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
                 raise InputError(None, f"line {broken}", "a line of text within the table", "Remove it")
             else:
                 tables[-1].append((line, cells))
-    return [_trimmed(table) for table in tables if len(table) > 1] or _turned(grid)
+    return [table for table in tables if len(table) > 1] or _turned(grid)
 
 
 def _numeric(cells: list[str]) -> bool:
