@@ -77,14 +77,9 @@ class EntryEvidence:
     at_least: bool = False
 
     @property
-    def column(self) -> str:
-        """Of the table that it is in, such as ``d``."""
-        return column_of(self.entry)
-
-    @property
     def moves_tool(self) -> bool:
         """Whether it is one of those that say where the tool is."""
-        return self.column not in ("lower", "upper", "speed")
+        return column_of(self.entry) not in ("lower", "upper", "speed")
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from er3a.files.by_name import load_measurements
 from er3a.files.csv_file import read_header
 from er3a.files.dh_table import read_dh_table
 from er3a.files.hand_eye_file import HandEyeFile, check_samples, load_hand_eye, sample_rows
-from er3a.files.orientations import POSITION
 from er3a.files.path_file import (
     TRAJECTORIES,
     PathFile,
@@ -210,10 +209,10 @@ def _check_table(path: Path) -> str:
     if path.stem not in FORMATS and table_in(path):
         read_dh_table(path, "arm")
         return "a D-H table"
-    if {"name", *POSITION} <= set(header):
+    if {"name", "x_mm"} <= set(header):
         read_targets(path)
         return _WORDS["targets"]
-    if {"q1_deg", "q1_mm", *POSITION} & set(header):
+    if {"q1_deg", "q1_mm", "x_mm"} & set(header):
         read_path_table(path)
         return "a path"
     if path.stem not in FORMATS:
