@@ -136,7 +136,7 @@ def _table(path: Path, text: str, joints: int) -> Lines:
     which holds the headings."""
     text = re.sub(rf"(?m)^{COMMENT}.*\n(?={COMMENT})", "\n", text)
     text = re.sub(rf"(?m)^{COMMENT}.*$", "", re.sub(r"\A\s*[#!%][#!% ]*", "", text))
-    lines = lines_of(path, text)
+    lines = lines_of(path, text, mixed=True)
     if not lines:
         raise InputError(path, None, "the file is empty", REMEDY)
     header = lines[0][1]

@@ -170,7 +170,7 @@ def read_lines(path: Path) -> Lines:
     return lines_of(path, OWN_HEAD.sub("", csv_text(path)))
 
 
-def lines_of(path: Path, text: str) -> Lines:
+def lines_of(path: Path, text: str, mixed: bool = False) -> Lines:
     """Lines of a table that aren't blank, with their numbers; the first is the header.
 
     Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points. Fields
@@ -179,6 +179,7 @@ def lines_of(path: Path, text: str) -> Lines:
     Parameters
     ----------
     path : named in errors
+    mixed : whether numbers may have points in one column and commas in another
 
     Raises
     ------
@@ -196,7 +197,7 @@ def lines_of(path: Path, text: str) -> Lines:
         raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
     while lines and all(len(line) == len(lines[0][1]) > 1 and not line[-1].strip() for _, line in lines):
         lines = [(number, line[:-1]) for number, line in lines]  # columns that a spreadsheet leaves behind
-    return lines if mark == "," else _with_points(path, lines)
+    return lines if mark == "," else _with_points(path, lines, mixed)
 
 
 def check_widths(path: Path, lines: Lines) -> None:
@@ -218,13 +219,13 @@ def check_widths(path: Path, lines: Lines) -> None:
             raise InputError(path, f"row {number}", problem, "Correct the separators; quote texts that hold one")
 
 
-def _with_points(path: Path, lines: Lines) -> Lines:
+def _with_points(path: Path, lines: Lines, mixed: bool) -> Lines:
     """Lines with decimal points, of a table in which commas separate nothing."""
     comma = re.compile(r"\s*[-+−]?\d+,\d+(?:[eE][-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?\s*")
     fields = [field for _, line in lines[1:] for field in line]
     written = next((field.strip() for field in fields if comma.fullmatch(field)), "")
     pointed = next((field.strip() for field in fields if "." in field and comma.fullmatch(field.replace(".", ","))), "")
-    if written and pointed:
+    if written and pointed and not mixed:
         problem = f"decimal commas and points in one table ('{written}', '{pointed}')"
         raise InputError(path, None, problem, "Write all numbers with a point")
     return [
