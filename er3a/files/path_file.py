@@ -533,7 +533,7 @@ class ToolMovePath(ToolStart, ToolMove):
         )
 
 
-class Segment(ToolMove):
+class SequenceSegment(ToolMove):
     """A line or arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
 
     blend_mm: Blend = 0.0
@@ -543,7 +543,7 @@ class SequencePath(ToolStart):
     """Lines and arcs one after another; the tool stops at each corner that is not rounded."""
 
     kind: Literal["sequence"]
-    segments: Annotated[list[Segment], Field(min_length=1, max_length=1000)]
+    segments: Annotated[list[SequenceSegment], Field(min_length=1, max_length=1000)]
 
     @model_validator(mode="after")
     def _no_corner_at_the_end(self) -> Self:
