@@ -20,7 +20,7 @@ import er3a
 from er3a.confirmation.fit import Fitter, Solution
 from er3a.confirmation.layers import Attempts, search
 from er3a.confirmation.pairs import Pairs
-from er3a.confirmation.poses import OF_THREE, of_angles
+from er3a.files.orientations import OF_THREE, of_angles
 from er3a.geometry.transforms import rot_y, rot_z, rpy_of, translation
 
 ARMS = ("er3_600", "er3a_c60", "lbr_iiwa_14", "ur5e")

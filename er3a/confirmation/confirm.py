@@ -12,9 +12,9 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Fitter, Solution
+from er3a.confirmation.fit import Fitter, Solution, State
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
-from er3a.confirmation.pairs import Pairs
+from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
 from er3a.errors import ArgumentError, Er3aError
 from er3a.finding import Finding, fact
@@ -181,11 +181,9 @@ def confirm(
 
 
 def _answer(robot: Robot, pairs: Pairs) -> Confirmation:
-    some = np.unique(np.linspace(0, len(pairs) - 1, SEARCHED).astype(np.int64))
-    found = search(Fitter(robot, pairs.some(some)))
+    found = search(Fitter(robot, pairs.some(spread(len(pairs), SEARCHED))))
     chosen, noise = _chosen(found)
-    more = np.unique(np.linspace(0, len(pairs) - 1, FITTED).astype(np.int64))
-    fitter = Fitter(robot, pairs.some(more))
+    fitter = Fitter(robot, pairs.some(spread(len(pairs), FITTED)))
     fitter.widen = noise
     final = _on_more(fitter, chosen)
     whole = Fitter(robot, pairs)
@@ -243,11 +241,10 @@ def _chosen(found: Attempts) -> tuple[Solution, float]:
 
 def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
     """The chosen explanation fitted to more rows, without those that don't fit."""
-    start = chosen.Y, chosen.X, chosen.amounts
-    solution = fitter.fit(chosen.explanation, start)
+    solution = fitter.fit(chosen.explanation, chosen.values)
     bad = fitter.at(chosen).by_row > 9.0 * fitter.dimensions
     if solution.per_freedom > EXPLAINED and 0 < bad.sum() <= 0.2 * len(bad):
-        solution = fitter.fit(chosen.explanation, start, np.where(bad, 0.0, 1.0))
+        solution = fitter.fit(chosen.explanation, chosen.values, np.where(bad, 0.0, 1.0))
     return solution
 
 
@@ -332,7 +329,7 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
         out = rows[fold::FOLDS]
         weights = solution.rows.astype(float)
         weights[out] = 0.0
-        left = fitter.fit(solution.explanation, (solution.Y, solution.X, solution.amounts), weights)
+        left = fitter.fit(solution.explanation, solution.values, weights)
         squares += (left.off[out, :3] ** 2).sum(axis=1).tolist()
     return float(MM * np.sqrt(np.mean(squares)))
 
@@ -345,10 +342,10 @@ def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
         if found.total(each) > found.total(chosen) + ALIKE or any(before <= parts for before in seen):
             continue
         seen.append(parts)
-        entries = tuple(entry.name for entry in each.explanation.entries)
-        named.append(
-            fact("explains_too", joints=each.explanation.joints.faults, places=each.explanation.free, entries=entries)
-        )
+        joints, places = each.explanation.joints.faults, each.explanation.free
+        zeros = tuple(entry.joint for entry in each.explanation.entries if entry.column == "offset")
+        entries = tuple(entry.name for entry in each.explanation.entries if entry.column != "offset")
+        named.append(fact("explains_too", joints=joints, places=places, zeros=zeros, entries=entries))
     return tuple(named)
 
 
@@ -366,9 +363,8 @@ def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[
     """Entries that could be off by 1 mm or 0.1 deg: without a trace, and because base or tool acts alike."""
     every = [each for each in fitter.every if each not in solution.entries]
     explanation = replace(solution.explanation, entries=(*solution.entries, *every), small=False)
-    J, _ = fitter.linear(
-        explanation, (solution.Y, solution.X, np.concatenate([solution.amounts, np.zeros(len(every))]))
-    )
+    amounts = np.concatenate([solution.amounts, np.zeros(len(every))])
+    J, _ = fitter.linear(State(explanation, explanation.entries, solution.Y, solution.X, amounts))
     first = J.shape[1] - len(every)
     least = INTERVAL_95 / np.array([OPEN_M if each.unit == "mm" else OPEN_RAD for each in every])
     Q = np.linalg.qr(J[:, :first])[0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from er3a.confirmation.confirm import Confirmation, confirm
-from er3a.confirmation.pairs import Pairs
+from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
 from er3a.errors import InputError
 from er3a.geometry.transforms import inverted, posed
@@ -56,7 +56,7 @@ def controller_set(robot: Robot, model: Robot, file: Path) -> ReferenceSet:
 
 def _rows(robot: Robot, base: Reals, pairs: Pairs, found: Confirmation, name: str) -> list[PositionRow]:
     chosen = np.flatnonzero(found.fits)
-    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, MOST).astype(np.int64))]
+    chosen = chosen[spread(len(chosen), MOST)]
     turns = pairs.turns.get(found.form)
     xyz = pairs.xyz / found.factor
     q_deg = shown(robot, pairs.q)

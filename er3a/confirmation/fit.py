@@ -28,6 +28,8 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
 Place = Literal["base", "tool"]
+Start = tuple[Reals, Reals, Reals]
+"""Base and tool, (4, 4), and amounts of entries, from which a fit starts."""
 STEP = 1e-5  # m or rad, of central differences
 STEPS, HALVINGS = 16, 6
 DONE = 1e-9  # m or rad
@@ -84,18 +86,13 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
-    """An explanation with the values that fit best.
+class State:
+    """An explanation with values.
 
     Attributes
     ----------
-    Y, X : (4, 4), m, the controller's base and tool; amounts : (k,), m and rad, of ``entries``
-    off : (N, 6), m and rad, model minus controller, position and rotation vector, 0 where no orientation is given
-    by_row : (N,), squares of these in standard deviations
-    prior : squares of small corrections in their standard deviations
-    freedom : degrees of freedom; J : (r, p), derivatives of what is left by base, tool and entries, as far as free, in
-        standard deviations
-    rows : (N,) bool, those that were fitted
+    Y, X : (4, 4), m, the controller's base and tool; amounts : (k,), m and rad, of ``entries``, those of the
+        explanation first, then those that are off by a little
     """
 
     explanation: Explanation
@@ -103,17 +100,60 @@ class Solution:
     Y: Reals
     X: Reals
     amounts: Reals
+
+    @property
+    def values(self) -> Start:
+        """From which to start a fit."""
+        return self.Y, self.X, self.amounts
+
+    @property
+    def prior(self) -> Reals:
+        """(k,), by how much entries are held at 0, per m or rad: those that are off by a little."""
+        own = len(self.explanation.entries)
+        return np.concatenate([np.zeros(own), np.full(len(self.entries) - own, 1 / SMALL)])
+
+    def stepped(self, step: Reals, turned: bool) -> State:
+        """The state after a step of all that is free.
+
+        Parameters
+        ----------
+        step : (p,), m and rad, of base, tool and entries
+        turned : whether the tool's rotation is free, too
+        """
+        Y, X = self.Y, self.X
+        if "base" in self.explanation.free:
+            Y = posed(exp_rotation(step[3:6]) @ Y[:3, :3], Y[:3, 3] + step[:3])
+            step = step[6:]
+        if "tool" in self.explanation.free:
+            turn = exp_rotation(step[3:6]) if turned else np.eye(3)
+            X = posed(X[:3, :3] @ turn, X[:3, 3] + step[:3])
+            step = step[6 if turned else 3 :]
+        return replace(self, Y=Y, X=X, amounts=self.amounts + step)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution(State):
+    """An explanation with the values that fit best.
+
+    Attributes
+    ----------
+    off : (N, 6), m and rad, model minus controller, position and rotation vector, 0 where no orientation is given
+    by_row : (N,), squares of these in standard deviations
+    freedom : degrees of freedom; J : (r, p), derivatives of what is left by base, tool and entries, as far as free, in
+        standard deviations
+    rows : (N,) bool, those that were fitted
+    """
+
     off: Reals
     by_row: Reals
-    prior: float
     freedom: int
     J: Reals
     rows: Flags
 
     @property
     def chi2(self) -> float:
-        """Of fitted rows and small corrections."""
-        return float(self.by_row[self.rows].sum()) + self.prior
+        """Of fitted rows and small corrections, in their standard deviations."""
+        return float(self.by_row[self.rows].sum() + ((self.prior * self.amounts) ** 2).sum())
 
     @property
     def plausible(self) -> bool:
@@ -148,52 +188,55 @@ class Fitter:
         self.every = parameters_of(robot, "all_entries")
         self.widen = 1.0
 
-    def flanges(self, entries: Sequence[Entry], amounts: Reals, u: Reals) -> Reals:
-        """Flanges of tables with amounts added.
+    @property
+    def dimensions(self) -> int:
+        """Numbers of a pose: 6, or 3 without orientations."""
+        return 6 if self.pairs.turns else 3
+
+    def flanges(
+        self, joints: Sequence[JointReading], entries: Sequence[Entry] = (), amounts: Reals | None = None
+    ) -> Reals:
+        """Flanges of tables with amounts added, at the pairs' joint values.
 
         Parameters
         ----------
-        amounts : (H, k), m and rad, of k entries
-        u : (N, m), rad or m, row values
+        joints : M ways in which these are read
+        amounts : (H, k), m and rad, of k entries; none by default
 
         Returns
         -------
-        F : (H, N, 4, 4), m, from the arm's base
+        F : (H, M, N, 4, 4), m, from the arm's base
         """
-        found: Reals = frames_of(shifted(self.table, entries, amounts), self.bare, u)[:, :, -1]
+        amounts = np.zeros((1, 0)) if amounts is None else amounts
+        u = row_values(self.robot, np.concatenate([each.of(self.pairs.q) for each in joints]))
+        F = frames_of(shifted(self.table, entries, amounts), self.bare, u)[:, :, -1]
+        found: Reals = F.reshape(len(amounts), len(joints), -1, 4, 4)
         return found
 
-    def slopes(self, entries: Sequence[Entry], every: Sequence[Entry], amounts: Reals, u: Reals
-               ) -> tuple[Reals, Reals]:  # fmt: skip
-        """Twists of the flange by entries, at a table with amounts added to some.
+    def flanges_at(self, state: State) -> Reals:
+        """(N, 4, 4), m, from the arm's base."""
+        found: Reals = self.flanges([state.explanation.joints], state.entries, state.amounts[None])[0, 0]
+        return found
 
-        Parameters
-        ----------
-        entries : k, by which to derive
-        every, amounts : what is added to the table
-
-        Returns
-        -------
-        twists, F : (k, N, 6), of the flange's point (m) and rotation, base axes; and the flanges (N, 4, 4)
-        """
-        steps = STEP * np.eye(len(entries))
-        both = np.concatenate([steps, -steps, np.zeros((1, len(entries)))])
-        moved = np.concatenate([np.broadcast_to(amounts, (len(both), len(amounts))), both], axis=1)
-        F = self.flanges((*every, *entries), moved, u)
-        plus, minus = F[: len(entries)], F[len(entries) : -1]
+    def twists(self, state: State, by: Sequence[Entry]) -> Reals:
+        """Twists (k, N, 6) of the controller's tool point (m) and rotation by k entries, in the controller's axes."""
+        steps = STEP * np.eye(len(by))
+        both = np.concatenate([steps, -steps, np.zeros((1, len(by)))])
+        moved = np.concatenate([np.broadcast_to(state.amounts, (len(both), len(state.amounts))), both], axis=1)
+        F = self.flanges([state.explanation.joints], (*state.entries, *by), moved)[:, 0]
+        plus, minus = F[: len(by)], F[len(by) : -1]
         turn = (plus[..., :3, :3] @ transposed(minus[..., :3, :3]) - np.eye(3)) / (2 * STEP)
-        turn = turn[..., [2, 0, 1], [1, 2, 0]] - turn[..., [1, 2, 0], [2, 0, 1]]
-        turn = turn / 2
-        return np.concatenate([(plus - minus)[..., :3, 3] / (2 * STEP), turn], axis=-1), F[-1]
+        turn = (turn[..., [2, 0, 1], [1, 2, 0]] - turn[..., [1, 2, 0], [2, 0, 1]]) / 2
+        point = (plus - minus)[..., :3, 3] / (2 * STEP) + np.cross(turn, F[-1, :, :3, :3] @ state.X[:3, 3])
+        found: Reals = np.concatenate([point @ state.Y[:3, :3].T, turn @ state.Y[:3, :3].T], axis=-1)
+        return found
 
-    def fit(
-        self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
-    ) -> Solution:
+    def fit(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
         """The values that fit best.
 
         Parameters
         ----------
-        start : Y, X (4, 4), and amounts of the explanation's entries
+        start : Y, X (4, 4), and amounts of the explanation's first entries
         weights : (N,), of rows; 0 leaves one out
 
         Returns
@@ -203,74 +246,62 @@ class Fitter:
         entries = explanation.entries
         if explanation.small:
             entries = (*entries, *(each for each in self.every if each not in entries))
-        state = start[0], start[1], np.zeros(len(entries))
-        if start[2] is not None:
-            state[2][: len(start[2])] = start[2]
-        u = self.rows_at(explanation)
-        weights = np.ones(len(u)) if weights is None else weights
-        prior = np.array([0.0 if each in explanation.entries else 1 / SMALL for each in entries])
-        whiten = self._whitening(explanation, entries, state, u) * weights[:, None, None]
-        left, off = self._left(explanation, entries, state, u, whiten, prior)
+        amounts = np.zeros(len(entries))
+        amounts[: len(start[2])] = start[2]
+        state = State(explanation, entries, *start[:2], amounts)
+        weights = np.ones(len(self.pairs)) if weights is None else weights
+        by_row = weights[:, None, None]
+        whiten = self._whitening(state) * by_row
+        left = self._left(state, whiten)
         for number in range(STEPS if explanation.free or entries else 0):
-            J = self._jacobian(explanation, entries, state, u, whiten, prior)
-            step = np.asarray(np.linalg.lstsq(J, -left, rcond=SINGULAR)[0], np.float64)
+            step = np.asarray(np.linalg.lstsq(self._jacobian(state, whiten), -left, rcond=SINGULAR)[0], np.float64)
             for halving in range(HALVINGS):
-                tried = self._stepped(explanation, state, step * 0.5**halving)
-                now, now_off = self._left(explanation, entries, tried, u, whiten, prior)
+                tried = state.stepped(step * 0.5**halving, self.dimensions == 6)
+                now = self._left(tried, whiten)
                 if now @ now < left @ left:
                     break
             else:
                 break
             gain = 1 - (now @ now) / (left @ left)
-            state, left, off = tried, now, now_off
+            state, left = tried, now
             if number < 2:
-                whiten = self._whitening(explanation, entries, state, u) * weights[:, None, None]
-                left, off = self._left(explanation, entries, state, u, whiten, prior)
+                whiten = self._whitening(state) * by_row
+                left = self._left(state, whiten)
             elif gain < 1e-4 or np.abs(step).max() < DONE:
                 break
-        J = self._jacobian(explanation, entries, state, u, whiten, prior)
-        plain = self._whitening(explanation, entries, state, u)
-        by_row = (np.einsum("nij,nj->ni", plain, off) ** 2).sum(axis=1)
+        J = self._jacobian(state, whiten)
         rows = weights > 0
-        own = J.shape[1] - int((prior > 0).sum())
+        own = J.shape[1] - len(entries) + len(explanation.entries)
         freedom = max(int(rows.sum()) * self.dimensions - own, 1)
-        squares = float(((prior * state[2]) ** 2).sum())
-        return Solution(explanation, entries, *state, off, by_row, squares, freedom, J, rows)
+        none: Reals = np.zeros(0)
+        return self.at(Solution(**vars(state), off=none, by_row=none, freedom=freedom, J=J, rows=rows), rows)
 
-    def linear(self, explanation: Explanation, state: tuple[Reals, Reals, Reals]) -> tuple[Reals, Reals]:
+    def linear(self, state: State) -> tuple[Reals, Reals]:
         """Derivatives of the differences, and these, in standard deviations.
 
         Parameters
         ----------
-        state : base, tool and amounts of all entries of the explanation
+        state : whose entries are all the explanation's
 
         Returns
         -------
         J, left : (r, p), and (r,)
         """
-        entries, prior = explanation.entries, np.zeros(len(explanation.entries))
-        u = self.rows_at(explanation)
-        whiten = self._whitening(explanation, entries, state, u)
-        J = self._jacobian(explanation, entries, state, u, whiten, prior)
-        left = self._left(explanation, entries, state, u, whiten, prior)[0]
-        return J[: len(J) - len(prior)], left[: len(left) - len(prior)]
+        whiten = self._whitening(state)
+        count = len(self.pairs) * self.dimensions
+        return self._jacobian(state, whiten)[:count], self._left(state, whiten)[:count]
 
-    def at(self, solution: Solution) -> Solution:
+    def at(self, solution: Solution, rows: Flags | None = None) -> Solution:
         """A solution's differences at all of the pairs.
 
         Parameters
         ----------
         solution : of the same robot, fitted to any pairs
+        rows : (N,) bool, those of the pairs that were fitted; default: all
         """
-        explanation, state, u = (
-            solution.explanation,
-            (solution.Y, solution.X, solution.amounts),
-            self.rows_at(solution.explanation),
-        )
-        whiten = self._whitening(explanation, solution.entries, state, u)
-        _, off = self._left(explanation, solution.entries, state, u, whiten, np.zeros(len(solution.entries)))
-        by_row = (np.einsum("nij,nj->ni", whiten, off) ** 2).sum(axis=1)
-        return replace(solution, off=off, by_row=by_row, rows=np.ones(len(u), dtype=bool))
+        off = self._off(solution)
+        by_row = (np.einsum("nij,nj->ni", self._whitening(solution), off) ** 2).sum(axis=1)
+        return replace(solution, off=off, by_row=by_row, rows=np.ones(len(off), dtype=bool) if rows is None else rows)
 
     def expected(self, solution: Solution) -> tuple[float, float]:
         """What digits explain of a pose's distance (m) and turn (rad), root mean square.
@@ -279,110 +310,59 @@ class Fitter:
         ----------
         solution : of the same robot
         """
-        state = solution.Y, solution.X, solution.amounts
-        whiten = self._whitening(solution.explanation, solution.entries, state, self.rows_at(solution.explanation))
         size = self.dimensions
-        by_place = np.linalg.inv(whiten[:, :size, :size])
+        by_place = np.linalg.inv(self._whitening(solution)[:, :size, :size])
         squares = (by_place**2).sum(axis=2).mean(axis=0)
         return float(np.sqrt(squares[:3].sum())), float(np.sqrt(squares[3:].sum()))
 
-    def rows_at(self, explanation: Explanation) -> Reals:
-        """Row values (N, m), rad or m, of the model.
-
-        Parameters
-        ----------
-        explanation : which says how the pendant's joints are read
-        """
-        return row_values(self.robot, explanation.joints.of(self.pairs.q))
-
-    @property
-    def dimensions(self) -> int:
-        """Numbers of a pose: 6, or 3 without orientations."""
-        return 6 if self.pairs.turns else 3
-
-    def twists(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
-               by: Sequence[Entry]) -> Reals:  # fmt: skip
-        """Twists (k, N, 6) of the controller's tool point by entries, in the controller's axes."""
-        Y, X, amounts = state
-        moved, F = self.slopes(by, entries, amounts, u)
-        arm = F[:, :3, :3] @ X[:3, 3]
-        point = moved[..., :3] + np.cross(moved[..., 3:], arm)
-        found: Reals = np.concatenate([point @ Y[:3, :3].T, moved[..., 3:] @ Y[:3, :3].T], axis=-1)
-        return found
-
-    def _whitening(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals],
-                   u: Reals) -> Reals:  # fmt: skip
+    def _whitening(self, state: State) -> Reals:
         """(N, 6, 6), which make standard deviations of differences; rows of 0 for orientations that are not given."""
         robot, pairs = self.robot, self.pairs
         moving = [Entry("d" if slides else "offset", k + 1) for k, slides in enumerate(robot.sliding)]
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
-        by_joint = (robot.direction[:, None] * coupling) @ explanation.joints.factors
-        J = np.einsum("kni,kj->nij", self.twists(explanation, entries, state, u, moving), by_joint)
+        by_joint = (robot.direction[:, None] * coupling) @ state.explanation.joints.factors
+        J = np.einsum("kni,kj->nij", self.twists(state, moving), by_joint)
         J *= (pairs.q_digit * ROUNDED)[:, None]
         turned = np.repeat(pairs.turn_digit, 3, axis=1)
-        own = np.concatenate([pairs.xyz_digit * abs(explanation.factor), turned], axis=1) * ROUNDED
+        own = np.concatenate([pairs.xyz_digit * abs(state.explanation.factor), turned], axis=1) * ROUNDED
         covariance = J @ transposed(J)
         covariance[:, range(6), range(6)] += own**2 + FLOOR**2
         size = self.dimensions
-        found: Reals = np.zeros((len(u), 6, 6))
+        found: Reals = np.zeros((len(J), 6, 6))
         found[:, :size, :size] = np.linalg.inv(np.linalg.cholesky(covariance[:, :size, :size])) / self.widen
         return found
 
-    def _left(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
-              whiten: Reals, prior: Reals) -> tuple[Reals, Reals]:  # fmt: skip
-        """Differences in standard deviations, and in m and rad (N, 6)."""
-        Y, X, amounts = state
-        M = Y @ self.flanges(entries, amounts[None], u)[0] @ X
+    def _off(self, state: State) -> Reals:
+        """Differences (N, 6), m and rad."""
+        M = state.Y @ self.flanges_at(state) @ state.X
         off = np.zeros((len(M), 6))
-        off[:, :3] = M[:, :3, 3] - explanation.factor * self.pairs.xyz
+        off[:, :3] = M[:, :3, 3] - state.explanation.factor * self.pairs.xyz
         if self.pairs.turns:
-            off[:, 3:] = log_rotation(M[:, :3, :3] @ transposed(self.pairs.turns[explanation.form]))
-        left = np.einsum("nij,nj->ni", whiten, off)[:, : self.dimensions].ravel()
-        return np.concatenate([left, prior * amounts]), off
+            off[:, 3:] = log_rotation(M[:, :3, :3] @ transposed(self.pairs.turns[state.explanation.form]))
+        return off
 
-    def _jacobian(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
-                  whiten: Reals, prior: Reals) -> Reals:  # fmt: skip
-        """Derivatives of the differences in standard deviations by base, tool and entries."""
-        columns = self.columns(explanation, entries, state, u, entries)
-        count = len(columns) * self.dimensions
-        J = np.einsum("nij,njk->nik", whiten, columns)[:, : self.dimensions].reshape(count, columns.shape[-1])
-        rows = np.zeros((len(prior), J.shape[1]))
-        rows[:, J.shape[1] - len(prior) :] = np.diag(prior)
-        return np.concatenate([J, rows])
+    def _left(self, state: State, whiten: Reals) -> Reals:
+        """Differences, and small corrections, in standard deviations."""
+        left = np.einsum("nij,nj->ni", whiten, self._off(state))[:, : self.dimensions].ravel()
+        return np.concatenate([left, state.prior * state.amounts])
 
-    def columns(self, explanation: Explanation, entries: Sequence[Entry], state: tuple[Reals, Reals, Reals], u: Reals,
-                by: Sequence[Entry]) -> Reals:  # fmt: skip
-        """Derivatives (N, 6, p) of the differences, m and rad, by base and tool, as far as free, and by entries."""
-        Y, X, amounts = state
-        F = self.flanges(entries, amounts[None], u)[0]
-        R = Y[:3, :3] @ F[:, :3, :3]
-        parts = []
-        if "base" in explanation.free:
+    def _jacobian(self, state: State, whiten: Reals) -> Reals:
+        """Derivatives of what is left by base and tool, as far as free, and by entries."""
+        F, X, size = self.flanges_at(state), state.X, self.dimensions
+        R = state.Y[:3, :3] @ F[:, :3, :3]
+        parts = [np.zeros((len(F), 6, 0))]
+        if "base" in state.explanation.free:
             base = np.zeros((len(F), 6, 6))
             base[:, :3, :3] = base[:, 3:, 3:] = np.eye(3)
-            base[:, :3, 3:] = -skew(R @ X[:3, 3] + F[:, :3, 3] @ Y[:3, :3].T)
+            base[:, :3, 3:] = -skew(R @ X[:3, 3] + F[:, :3, 3] @ state.Y[:3, :3].T)
             parts.append(base)
-        if "tool" in explanation.free:
-            turned = self.dimensions == 6
-            tool = np.zeros((len(F), 6, 6 if turned else 3))
-            tool[:, :3, :3] = R
-            if turned:
-                tool[:, 3:, 3:] = R @ X[:3, :3]
-            parts.append(tool)
-        if by:
-            parts.append(np.moveaxis(self.twists(explanation, entries, state, u, by), 0, -1))
-        return np.concatenate(parts, axis=-1) if parts else np.zeros((len(F), 6, 0))
-
-    def _stepped(self, explanation: Explanation, state: tuple[Reals, Reals, Reals], step: Reals
-                 ) -> tuple[Reals, Reals, Reals]:  # fmt: skip
-        """Base, tool and amounts after a step of all that is free."""
-        Y, X, amounts = state
-        if "base" in explanation.free:
-            Y = posed(exp_rotation(step[3:6]) @ Y[:3, :3], Y[:3, 3] + step[:3])
-            step = step[6:]
-        if "tool" in explanation.free:
-            size = self.dimensions
-            turn = exp_rotation(step[3:6]) if size == 6 else np.eye(3)
-            X = posed(X[:3, :3] @ turn, X[:3, 3] + step[:3])
-            step = step[size:]
-        return Y, X, amounts + step
+        if "tool" in state.explanation.free:
+            tool = np.zeros((len(F), 6, 6))
+            tool[:, :3, :3], tool[:, 3:, 3:] = R, R @ X[:3, :3]
+            parts.append(tool[..., :size])
+        if state.entries:
+            parts.append(np.moveaxis(self.twists(state, state.entries), 0, -1))
+        columns = np.concatenate(parts, axis=-1)
+        J = np.einsum("nij,njk->nik", whiten, columns)[:, :size].reshape(len(F) * size, columns.shape[-1])
+        prior = state.prior[:, None]
+        return np.concatenate([J, prior * np.eye(len(prior), J.shape[1], J.shape[1] - len(prior))])

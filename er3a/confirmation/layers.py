@@ -15,8 +15,8 @@ from itertools import combinations
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Explanation, Fitter, Place, Solution
-from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
+from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, Start, State
+from er3a.confirmation.screen import Near, joined, nearest, nearest_rotations, plain, single_readings
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
 
@@ -76,8 +76,7 @@ class Attempts:
         every = (each for each in self.found if each.per_freedom <= EXPLAINED and each.plausible)
         return sorted(every, key=self.total)
 
-    def add(self, explanation: Explanation, start: tuple[Reals, Reals, Reals | None], weights: Reals | None = None
-            ) -> Solution:  # fmt: skip
+    def add(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
         """Fit an explanation and keep it."""
         self.found.append(self.fitter.fit(explanation, start, weights))
         return self.found[-1]
@@ -96,7 +95,7 @@ def search(fitter: Fitter) -> Attempts:
     """
     robot, found = fitter.robot, Attempts(fitter, [])
     for form in found.named:
-        found.add(Explanation(plain(robot), form), (robot.base, robot.tool, None))
+        found.add(Explanation(plain(robot), form), (robot.base, robot.tool, np.zeros(0)))
     if found.explained():
         return found
     candidates = _candidates(fitter, found)
@@ -151,7 +150,7 @@ def _with_frames(found: Attempts, near: Near) -> None:
     """Fit a way of reading with no frame, a tool, a base, and both."""
     fitter = found.fitter
     robot, pairs = fitter.robot, fitter.pairs
-    F = fitter.flanges((), np.zeros((1, 0)), np.asarray(near.joints.of(pairs.q)) @ _coupling(fitter).T)[0]
+    F = fitter.flanges([near.joints])[0, 0]
     for factor in _factors(near):
         for free in PLACES:
             Y, X = near.Y, near.X
@@ -162,28 +161,19 @@ def _with_frames(found: Attempts, near: Near) -> None:
                 if free == ("base",):
                     Y = _middle(C @ inverted(F @ robot.tool))
             explanation = Explanation(near.joints, near.form, factor, free)
-            start = Y if "base" in free else robot.base, X if "tool" in free else robot.tool, None
-            found.add(explanation, start)
-
-
-def _coupling(fitter: Fitter) -> Reals:
-    return np.eye(fitter.robot.rows) if fitter.robot.coupling is None else fitter.robot.coupling
+            Y, X = Y if "base" in free else robot.base, X if "tool" in free else robot.tool
+            found.add(explanation, (Y, X, np.zeros(0)))
 
 
 def _middle(T: Reals) -> Reals:
     """The transform in the middle of some (N, 4, 4), medians of positions."""
-    U, _, Vt = np.linalg.svd(T[:, :3, :3].mean(axis=0))
-    return posed(U @ np.diag([1, 1, np.sign(np.linalg.det(U @ Vt))]) @ Vt, np.median(T[:, :3, 3], axis=0))
+    return posed(nearest_rotations(T[:, :3, :3].mean(axis=0)), np.median(T[:, :3, 3], axis=0))
 
 
 def _nearest_of(found: Attempts, most: int) -> list[Solution]:
     """Solutions that leave least for what they ask."""
     robust = sorted(found.found, key=lambda each: float(np.median(each.by_row)) + PRICE * cost(each, found.named))
     return robust[:most]
-
-
-def _start_of(solution: Solution) -> tuple[Reals, Reals, Reals]:
-    return solution.Y, solution.X, solution.amounts
 
 
 def _without_rows(found: Attempts, solution: Solution) -> None:
@@ -195,12 +185,12 @@ def _without_rows(found: Attempts, solution: Solution) -> None:
     for _ in range(ROUNDS):
         size = max(float(np.median(solution.by_row)), 2.0 * numbers)
         weights = 1 / np.sqrt(1 + solution.by_row / size)
-        last, solution = solution, found.fitter.fit(solution.explanation, _start_of(solution), weights)
+        last, solution = solution, found.fitter.fit(solution.explanation, solution.values, weights)
         if (np.abs(last.by_row - solution.by_row) < 0.1 + 0.01 * solution.by_row).all():
             break
     bad = solution.by_row > ROW_OFF * numbers
     if 0 < bad.sum() <= most:
-        found.add(solution.explanation, _start_of(solution), np.where(bad, 0.0, 1.0))
+        found.add(solution.explanation, solution.values, np.where(bad, 0.0, 1.0))
 
 
 def _starts(found: Attempts) -> list[list[Solution]]:
@@ -246,7 +236,7 @@ def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
     every = [each for each in fitter.every if each not in own and each.column != "beta"]
     explanation = replace(state.explanation, entries=(*state.explanation.entries, *every))
     amounts = np.concatenate([state.amounts, np.zeros(len(every))])
-    J, left = fitter.linear(explanation, (state.Y, state.X, amounts))
+    J, left = fitter.linear(State(explanation, explanation.entries, state.Y, state.X, amounts))
     first = J.shape[1] - len(every)
     Q = np.linalg.qr(J[:, :first])[0] if first else np.zeros((len(J), 0))
     own_size = np.linalg.norm(J[:, first:], axis=0)
@@ -270,7 +260,7 @@ def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
 def _with_small(found: Attempts, starts: Sequence[Solution], states: Sequence[Solution]) -> None:
     """Small corrections of all entries, with the entries that are off by more free."""
     for start in [*starts, *sorted(states, key=lambda each: each.chi2)[: 2 * STATES]]:
-        solution = found.add(replace(start.explanation, small=True), _start_of(start))
+        solution = found.add(replace(start.explanation, small=True), start.values)
         for _ in range(MOST):
             own = len(solution.explanation.entries)
             if solution.plausible:

@@ -13,6 +13,16 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 ROUNDED = 12**-0.5  # standard deviation of rounding, in last digits
 
 
+def spread(count: int, most: int) -> Integers:
+    """Numbers of some of many rows, evenly over all.
+
+    Parameters
+    ----------
+    count : of rows, from 0; most : how many are taken
+    """
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).astype(np.int64))
+
+
 @dataclass(frozen=True, eq=False)
 class Pairs(ByValue):
     """N poses of a controller.

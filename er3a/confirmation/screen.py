@@ -23,7 +23,6 @@ import numpy as np
 from er3a.confirmation.fit import Fitter, JointReading
 from er3a.finding import fact
 from er3a.geometry.transforms import inverted, posed, transposed
-from er3a.kinematics.chain import row_values
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
@@ -140,17 +139,9 @@ def nearest(fitter: Fitter, readings: Sequence[JointReading], forms: Sequence[st
     return sorted(found, key=lambda each: each.score)
 
 
-def _flanges(fitter: Fitter, readings: Sequence[JointReading]) -> Reals:
-    """(H, N, 4, 4), of each reading."""
-    q = np.concatenate([each.of(fitter.pairs.q) for each in readings])
-    F = fitter.flanges((), np.zeros((1, 0)), row_values(fitter.robot, q))[0]
-    found: Reals = F.reshape(len(readings), -1, 4, 4)
-    return found
-
-
 def _products(fitter: Fitter, readings: Sequence[JointReading], form: str) -> tuple[Reals, Reals]:
     """The matrices (H, 9, 9) of the bilinear forms, and the flanges."""
-    F, C = _flanges(fitter, readings), fitter.pairs.turns[form]
+    F, C = fitter.flanges(readings)[0], fitter.pairs.turns[form]
     K = C.reshape(-1, 9).T @ F[..., :3, :3].reshape(*F.shape[:2], 9)  # (H, ab, cd)
     K = K.reshape(-1, 3, 3, 3, 3).transpose(0, 1, 3, 4, 2).reshape(-1, 9, 9)  # (a, c), (d, b)
     return K / len(C), F
@@ -162,8 +153,17 @@ def _agreement(K: Reals) -> Reals:
     return found
 
 
-def _rotations(M: Reals) -> Reals:
-    """The nearest rotations to matrices (H, 3, 3)."""
+def nearest_rotations(M: Reals) -> Reals:
+    """The rotations nearest to matrices.
+
+    Parameters
+    ----------
+    M : (..., 3, 3)
+
+    Returns
+    -------
+    R : (..., 3, 3)
+    """
     U, _, Vt = np.linalg.svd(M)
     U[..., -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     found: Reals = U @ Vt
@@ -175,7 +175,7 @@ def _with_orientations(fitter: Fitter, readings: Sequence[JointReading], form: s
     U, _, Vt = np.linalg.svd(K)
     first, last = U[..., 0].reshape(-1, 3, 3), Vt[:, 0].reshape(-1, 3, 3)  # of (a, c), and of (d, b)
     sign = np.sign(np.linalg.det(first))[:, None, None]
-    R_Y, R_X = _rotations(sign * first), _rotations(sign * last)
+    R_Y, R_X = nearest_rotations(sign * first), nearest_rotations(sign * last)
     traces = np.einsum("hac,hacdb,hdb->h", R_Y, K.reshape(-1, 3, 3, 3, 3), R_X)
     turned = np.sqrt(np.maximum(3 - traces, 0.0))
     R, t = R_Y[:, None] @ F[..., :3, :3], np.einsum("hij,hnj->hni", R_Y, F[..., :3, 3])
@@ -183,13 +183,9 @@ def _with_orientations(fitter: Fitter, readings: Sequence[JointReading], form: s
     A = np.concatenate([xyz, -R, -np.broadcast_to(np.eye(3), R.shape)], axis=-1).reshape(len(t), -1, 7)
     values, away = _solved(A, t.reshape(len(t), -1))
     return [
-        Near(form, each, *_placed(value, posed(base, value[4:]), posed(tool, value[1:4])), float(turn), float(far))
+        Near(form, each, float(value[0]), posed(base, value[4:]), posed(tool, value[1:4]), float(turn), float(far))
         for each, value, base, tool, turn, far in zip(readings, values, R_Y, R_X, turned, away)
     ]
-
-
-def _placed(value: Reals, Y: Reals, X: Reals) -> tuple[float, Reals, Reals]:
-    return float(value[0]), Y, X
 
 
 def _positions_alone(fitter: Fitter, readings: Sequence[JointReading]) -> list[Near]:
@@ -197,7 +193,7 @@ def _positions_alone(fitter: Fitter, readings: Sequence[JointReading]) -> list[N
     found = []
     for first in range(0, len(readings), BLOCK):
         some = readings[first : first + BLOCK]
-        F, m = _flanges(fitter, some), fitter.pairs.xyz
+        F, m = fitter.flanges(some)[0], fitter.pairs.xyz
         by_place = np.einsum("ij,nk->nijk", np.eye(3), m).reshape(len(m), 3, 9)
         by_place = np.broadcast_to(by_place, (len(F), *by_place.shape))
         shift = np.broadcast_to(np.eye(3), F[..., :3, :3].shape)
@@ -205,7 +201,7 @@ def _positions_alone(fitter: Fitter, readings: Sequence[JointReading]) -> list[N
         values, away = _solved(A, F[..., :3, 3].reshape(len(F), -1))
         M = values[:, :9].reshape(-1, 3, 3)
         size = np.cbrt(np.abs(np.linalg.det(M)))
-        R = _rotations(M)
+        R = nearest_rotations(M)
         for k, each in enumerate(some):
             inverse = posed(R[k], values[k, 9:12])
             tool = posed(np.eye(3), values[k, 12:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import re
 import unicodedata
@@ -10,9 +11,22 @@ from dataclasses import dataclass, field
 
 LONGEST = 200  # characters of an expression
 DEEPEST = 20  # brackets within each other, and names that are given by other names
-UNITS = {"mm": "mm", "毫米": "mm", "cm": "cm", "m": "m", "米": "m", "in": "in", "inch": "in"}
-UNITS |= {"°": "deg", "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "度": "deg", "rad": "rad"}
-UNITS |= {"rads": "rad", "radian": "rad", "radians": "rad", "metre": "m", "meter": "m", "metres": "m", "meters": "m"}
+
+
+def words_of(text: str) -> dict[str, str]:
+    """What words mean.
+
+    Parameters
+    ----------
+    text : pairs such as ``metre=m``, or words without a meaning, with blanks between them
+    """
+    return {word: meaning for word, _, meaning in (pair.partition("=") for pair in text.split())}
+
+
+UNITS = words_of(
+    "mm=mm 毫米=mm cm=cm m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
+    "°=deg deg=deg degs=deg degree=deg degrees=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
+)
 _RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}
 _DEGREES = {"rad2deg", "degrees"}
 _FUNCTIONS: dict[str, Callable[..., float]] = {
@@ -27,8 +41,10 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     "cos": math.cos,
 }
 _TOKEN = re.compile(
-    r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))"
+    r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"
 )
+_INDEX = re.compile(r"[(\[]\s*(\d+)\s*[)\]]\s*")
+_NONE = "is not a number or an expression"
 _SIGNS = str.maketrans("−–—﹣∗⋅·×∕÷º˚∘◦⍺", "----****//°°°°α")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
 
@@ -74,7 +90,7 @@ def amount_of(text: str, given: Mapping[str, str] | None = None) -> CellAmount:
     ValueError
         with what can't be read, in words
     """
-    return _Reader(plain(text), given or {}, 0).all()
+    return _amount(plain(text), given or {}, 0)
 
 
 def name_of(text: str) -> str:
@@ -82,156 +98,126 @@ def name_of(text: str) -> str:
     return re.sub(r"[\s_{}()\[\]]", "", plain(text))
 
 
-class _Reader:
-    """One expression; ``depth`` counts names that led here."""
+def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
+    """The amount of an expression; ``depth`` counts names that led here."""
+    if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
+        raise ValueError("is too long or too deep")
+    values: dict[str, CellAmount | str] = {}
+    expression = _in_python(re.sub(r"\^\s*°", "°", text), given, depth, values)
+    try:
+        found = _value(ast.parse(expression, mode="eval").body, values)
+    except SyntaxError:
+        raise ValueError(_NONE) from None
+    if not math.isfinite(found.number):
+        raise ValueError("is no finite number")
+    return found
 
-    def __init__(self, text: str, given: Mapping[str, str], depth: int):
-        if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
-            raise ValueError("is too long or too deep")
-        self.given, self.depth, self.text = given, depth, text
-        self.tokens: list[tuple[str, str]] = []
-        place, text = 0, text.rstrip()
-        while place < len(text):
-            found = _TOKEN.match(text, place)
-            if found is None:
-                raise ValueError("is not a number or an expression")
-            kind = "number" if found[1] else "name" if found[2] else "sign"
-            self.tokens.append((kind, found[1] or found[2] or found[3].replace("**", "^")))
-            place = found.end()
-        self.place = 0
 
-    def all(self) -> CellAmount:
-        """The amount of the whole text."""
-        found = self.sum()
-        if self.place < len(self.tokens):
-            raise ValueError("is not a number or an expression")
-        if not math.isfinite(found.number):
-            raise ValueError("is no finite number")
+def _in_python(text: str, given: Mapping[str, str], depth: int, values: dict[str, CellAmount | str]) -> str:
+    """An expression as Python would write it, with a name for each number and symbol, whose values are filled in.
+
+    A unit follows what it is of: that is ``@``, which binds as a product does.
+    """
+    made, place, follows, calls = "", 0, False, False
+    while place < len(text):
+        found = _TOKEN.match(text, place)
+        if found is None:
+            raise ValueError(_NONE)
+        place, (number, word, sign) = found.end(), found.groups()
+        if sign in ("(", "["):
+            made += "*(" if follows and not calls else "("
+            follows = calls = False
+        elif sign:
+            made += {"^": "**", "]": ")"}.get(sign, sign)
+            follows = sign in (")", "]")
+        else:
+            is_unit = follows and word and word.lower() in UNITS and word not in given
+            made += "@" if is_unit else "*" if follows else ""
+            low = (word or "").rpartition(".")[2].lower()
+            calls = text[place : place + 1] in ("(", "[") and low in _RADIANS | _DEGREES | {*_FUNCTIONS}
+            value: CellAmount | str = low
+            if number or is_unit:
+                value = CellAmount(float(number)) if number else CellAmount(1.0, UNITS[word.lower()])
+            elif not calls:
+                if not word[-1].isdigit() and (index := _INDEX.match(text, place)):
+                    word, place = f"{word}{index[1]}", index.end()
+                value = _named(word, low, given, depth)
+            name = f"v{len(values)}"
+            values[name], follows = value, True
+            made += name
+    return made
+
+
+def _named(word: str, low: str, given: Mapping[str, str], depth: int) -> CellAmount:
+    """The amount of pi, of a given name, of a degree as programs have it, or of a variable."""
+    if low in ("pi", "π", "m_pi"):
+        return CellAmount(math.pi, "rad")
+    for each in (word, name_of(word)):
+        if each in given:
+            return _amount(plain(given[each]), given, depth + 1)
+    if low in _RADIANS or UNITS.get(low) == "deg":
+        return CellAmount(math.radians(1.0), "rad")
+    return CellAmount(0.0, "", {name_of(word): 1.0})
+
+
+def _value(node: ast.expr, values: Mapping[str, CellAmount | str]) -> CellAmount:
+    """What a part of a parsed expression amounts to."""
+    if isinstance(node, ast.Name) and isinstance(found := values[node.id], CellAmount):
         return found
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        return _called(str(values[node.func.id]), [_value(each, values) for each in node.args])
+    if isinstance(node, ast.UnaryOp):
+        return _product(CellAmount(-1.0 if isinstance(node.op, ast.USub) else 1.0), _value(node.operand, values))
+    if not isinstance(node, ast.BinOp):
+        raise ValueError(_NONE)
+    a, b = _value(node.left, values), _value(node.right, values)
+    if isinstance(node.op, ast.MatMult) and a.variables:
+        raise ValueError(f"is a variable in {b.unit}")
+    if isinstance(node.op, ast.Mult | ast.MatMult):
+        return _product(a, b)
+    if isinstance(node.op, ast.Div):
+        return _quotient(a, b)
+    if isinstance(node.op, ast.Pow):
+        return _power(a, b)
+    return _sum(a, b, -1 if isinstance(node.op, ast.Sub) else 1)
 
-    def peek(self) -> str:
-        return self.tokens[self.place][1] if self.place < len(self.tokens) else ""
 
-    def kind(self) -> str:
-        return self.tokens[self.place][0] if self.place < len(self.tokens) else ""
-
-    def take(self) -> str:
-        token = self.peek()
-        self.place += 1
-        return token
-
-    def sum(self) -> CellAmount:
-        found = self.product()
-        while self.peek() in ("+", "-"):
-            sign = 1 if self.take() == "+" else -1
-            other = self.product()
-            if found.unit and other.unit and found.unit != other.unit:
-                raise ValueError(_two_units(found.unit, other.unit))
-            names = {*found.variables, *other.variables}
-            both = {each: found.variables.get(each, 0) + sign * other.variables.get(each, 0) for each in names}
-            found = CellAmount(found.number + sign * other.number, found.unit or other.unit, both)
-        return found
-
-    def product(self) -> CellAmount:
-        found = self.signed()
-        while self.peek() in ("*", "/") or self.kind() in ("number", "name") or self.peek() == "(":
-            divides = self.peek() == "/"
-            if self.peek() in ("*", "/"):
-                self.take()
-            found = _quotient(found, self.signed()) if divides else _product(found, self.signed())
-        return found
-
-    def signed(self) -> CellAmount:
-        sign = 1
-        while self.peek() in ("+", "-"):
-            sign *= 1 if self.take() == "+" else -1
-        return _product(CellAmount(sign), self.power())
-
-    def power(self) -> CellAmount:
-        found = self.atom()
-        if self.peek() == "^":
-            self.take()
-            if self.peek() == "°":  # ^° of LaTeX
-                return self.with_unit(found)
-            sign = -1 if self.peek() == "-" and self.take() else 1
-            exponent = _product(CellAmount(sign), self.atom())
-            if found.variables or exponent.variables or found.unit or exponent.unit:
-                raise ValueError("raises what is no plain number")
-            try:
-                found = CellAmount(math.pow(found.number, exponent.number))
-            except (OverflowError, ValueError):
-                raise ValueError("is no finite number") from None
-        return self.with_unit(found)
-
-    def with_unit(self, found: CellAmount) -> CellAmount:
-        """An amount with the unit that is written after it."""
-        if self.kind() == "name" and self.peek().lower() in UNITS and self.peek() not in self.given:
-            unit = UNITS[self.take().lower()]
-            if found.unit or found.variables:
-                raise ValueError(_two_units(found.unit, unit) or f"is a variable in {unit}")
-            return CellAmount(found.number, unit)
-        return found
-
-    def atom(self) -> CellAmount:
-        kind, token = self.kind(), self.take()
-        if kind == "number":
-            return CellAmount(float(token))
-        if token == "(":
-            found = self.sum()
-            if self.take() != ")":
-                raise ValueError("has a bracket that is not closed")
-            return found
-        if kind == "name":
-            return self.named(token)
-        raise ValueError("is not a number or an expression")
-
-    def named(self, token: str) -> CellAmount:
-        """The amount of a function's value, of pi, of a given name, or of a variable."""
-        word = token.rpartition(".")[2]
-        low = word.lower()
-        if self.peek() in ("(", "[") and low in _RADIANS | _DEGREES | {*_FUNCTIONS}:
-            return self.called(low)
-        name = token
-        if self.peek() in ("(", "[") and not token[-1].isdigit():
-            index = self.tokens[self.place + 1 : self.place + 3]
-            if len(index) == 2 and index[0][0] == "number" and index[1][1] in (")", "]"):
-                self.place += 3
-                name = f"{token}{index[0][1]}"
-        if low in ("pi", "π", "m_pi"):
-            return CellAmount(math.pi, "rad")
-        for each in (name, name_of(name)):
-            if each in self.given:
-                return _Reader(plain(self.given[each]), self.given, self.depth + 1).all()
-        if low in _RADIANS:
-            return CellAmount(math.radians(1.0), "rad")
-        if low in UNITS and UNITS[low] == "deg":
-            return CellAmount(math.radians(1.0), "rad")
-        return CellAmount(0.0, "", {name_of(name): 1.0})
-
-    def called(self, name: str) -> CellAmount:
-        """The value of a function."""
-        self.take()
-        values = [self.sum()]
-        while self.peek() == ",":
-            self.take()
-            values.append(self.sum())
-        if self.take() not in (")", "]") or any(each.variables for each in values):
-            raise ValueError(f"has no number in {name}(...)")
-        (value, *_rest) = values
-        if name in _RADIANS | _DEGREES:
-            turn = math.radians(value.number) if name in _RADIANS else math.degrees(value.number)
-            return CellAmount(turn, "rad" if name in _RADIANS else "deg")
-        numbers = [math.radians(each.number) if each.unit == "deg" else each.number for each in values]
-        try:
-            return CellAmount(_FUNCTIONS[name](*numbers), "rad" if name[0] == "a" else "")
-        except (TypeError, ValueError, OverflowError):
-            raise ValueError(f"has no value of {name}(...)") from None
+def _called(name: str, values: list[CellAmount]) -> CellAmount:
+    """The value of a function."""
+    if not values or any(each.variables for each in values):
+        raise ValueError(f"has no number in {name}(...)")
+    if name in _RADIANS:
+        return CellAmount(math.radians(values[0].number), "rad")
+    if name in _DEGREES:
+        return CellAmount(math.degrees(values[0].number), "deg")
+    numbers = [math.radians(each.number) if each.unit == "deg" else each.number for each in values]
+    try:
+        return CellAmount(_FUNCTIONS[name](*numbers), "rad" if name[0] == "a" else "")
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"has no value of {name}(...)") from None
 
 
 def _two_units(a: str, b: str) -> str:
     if {a, b} == {"deg", "rad"}:
         return "has fractions of pi in a column of degrees"
     return f"is in {a} and in {b}" if a and b else ""
+
+
+def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
+    if a.unit and b.unit and a.unit != b.unit:
+        raise ValueError(_two_units(a.unit, b.unit))
+    names = {*a.variables, *b.variables}
+    both = {each: a.variables.get(each, 0) + sign * b.variables.get(each, 0) for each in names}
+    return CellAmount(a.number + sign * b.number, a.unit or b.unit, both)
+
+
+def _power(a: CellAmount, b: CellAmount) -> CellAmount:
+    if a.variables or b.variables or a.unit or b.unit:
+        raise ValueError("raises what is no plain number")
+    try:
+        return CellAmount(math.pow(a.number, b.number))
+    except (OverflowError, ValueError):
+        raise ValueError("is no finite number") from None
 
 
 def _product(a: CellAmount, b: CellAmount) -> CellAmount:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -20,9 +22,10 @@ from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, start
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import CsvColumn, columns_of, read_csv, read_header
+from er3a.files.orientations import POSITION
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import JOINT_COLUMN, MIN_SPAN_MM, refuse_radians
+from er3a.files.units import MIN_SPAN_MM, joint_names, refuse_radians
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
@@ -30,40 +33,34 @@ from er3a.numerics.arrays import Reals
 from er3a.references.predict import with_rounding
 from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
-from er3a.robots.joint_limits import meant
-from er3a.robots.robot import MAX_JOINTS, Robot, Source
+from er3a.robots.joint_limits import joint_columns, meant
+from er3a.robots.robot import Robot, Source
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_NUMBER = CsvColumn(float)
 SAME = 1e-9  # m, rad, kg
 WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
 
 
-def measurement_columns(units: Sequence[str]) -> dict[str, CsvColumn]:
+def measurement_columns(joints: Sequence[str]) -> dict[str, CsvColumn]:
     """Columns of a table of measured positions: joint values, the measured point, and where it was.
 
     Parameters
     ----------
-    units : one per joint, ``deg`` for those that turn and ``mm`` for those that slide
+    joints : the columns of joint values, ``q1_deg`` .. (``q3_mm`` of a joint that slides)
 
     Returns
     -------
-    columns : by name; ``q1_deg`` .. (or ``q3_mm``) and ``point`` are required. ``x_mm``, ``y_mm``, ``z_mm`` may hold
-        empty cells; standard deviation, place and plane may also be left out as columns
+    columns : by name; joint values and ``point`` are required. ``x_mm``, ``y_mm``, ``z_mm`` may hold empty cells;
+        standard deviation, place and plane may also be left out as columns
     """
-    return {
-        **{f"q{joint}_{unit}": _NUMBER for joint, unit in enumerate(units, 1)},
-        "point": CsvColumn(str, choices=("flange", "tool")),
-        **{f"{c}_mm": CsvColumn(float, optional=True) for c in "xyz"},
-        "standard_deviation_mm": CsvColumn(float, always=False),
-        "place": CsvColumn(str, optional=True, always=False),
-        "plane": CsvColumn(str, optional=True, always=False),
-    }
+    own = "point:flange|tool x_mm? y_mm? z_mm? standard_deviation_mm~ place:word?~ plane:word?~"
+    return columns_of(f"{' '.join(joints)} {own}")
 
 
-COLUMNS = measurement_columns(["deg"] * 6)
+SIX = tuple(f"q{joint}_deg" for joint in range(1, 7))
+COLUMNS = measurement_columns(SIX)
 POSES_TO_JUDGE_SCALE = 4
 OTHER_UNITS_MM = {"metres": 1000.0, "feet": 304.8, "inches": 25.4, "cm": 10.0, "micrometres": 1e-3}
 MUCH, LEFT_BY_SCALE = 1.25, 0.05
@@ -87,13 +84,13 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
         values that can only be metres or radians, or rows that contradict each other
     """
     path = Path(path)
-    units = _units_in(path) if robot is None else ["mm" if slides else "deg" for slides in robot.slides]
-    table = read_csv(path, measurement_columns(units))
+    joints = joint_columns(robot) if robot else joint_names(path, read_header(path)) or SIX
+    table = read_csv(path, measurement_columns(joints))
     if not table:
         raise InputError(path, None, "the table has a header but no rows", "Add a row for each measured position")
     rows = []
     for fields in table:
-        xyz, deviation = tuple(fields[f"{c}_mm"] for c in "xyz"), fields["standard_deviation_mm"]
+        xyz, deviation = tuple(fields[name] for name in POSITION), fields["standard_deviation_mm"]
         names = {kind: fields[kind] for kind in get_args(TouchKind)}
         given = [kind for kind, value in names.items() if value]
         if given and (len(given) > 1 or xyz != (None, None, None)):
@@ -105,9 +102,9 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             where, problem = f"row {fields['row']}, column standard_deviation_mm", f"{deviation:g} is not positive"
             remedy = "Write the measuring device's standard deviation, or leave the column out to have it estimated"
             raise InputError(path, where, problem, remedy)
-        pose = tuple(fields[f"q{joint}_{unit}"] for joint, unit in enumerate(units, 1))
+        pose = tuple(fields[name] for name in joints)
         rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names))
-    _check_units(path, rows, units)
+    _check_units(path, rows, joints)
     if robot is not None:
         _check_scale(path, rows, robot)
     _check_contradictions(path, rows)
@@ -123,34 +120,24 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
     InputError
         naming file, row and column: a number missing or not finite, radians, or a value outside the joint limits
     """
-    path, units = Path(path), ["mm" if slides else "deg" for slides in robot.slides]
-    unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(units).items()}
-    joints = [f"q{joint}_{unit}" for joint, unit in enumerate(units, 1)]
-    table = read_csv(path, unread | dict.fromkeys(joints, _NUMBER))
+    path, joints = Path(path), joint_columns(robot)
+    unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(joints).items()}
+    table = read_csv(path, unread | columns_of(" ".join(joints)))
     rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
-    _check_units(path, rows, units)
+    _check_units(path, rows, joints)
     check_poses(rows, robot, path)
     return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
 
 
-def _units_in(path: Path) -> list[str]:
-    """Units of the joints that a header names; six angles if it names none."""
-    named = {int(found[1]): found[2] for name in read_header(path) if (found := JOINT_COLUMN.fullmatch(name))}
-    if max(named, default=0) > MAX_JOINTS:
-        column = f"q{max(named)}_{named[max(named)]}"
-        raise InputError(path, f"column {column}", f"er3a supports at most {MAX_JOINTS} joints", "Remove it")
-    return [named.get(joint, "deg") for joint in range(1, max(named, default=6) + 1)]
-
-
-def _check_units(path: Path, rows: list[Measurement], units: Sequence[str]) -> None:
+def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> None:
     whole = [row for row in rows if None not in row.xyz_mm]
     span = max((abs(value) for row in whole for value in row.xyz_mm if value is not None), default=0.0)
     if whole and span < MIN_SPAN_MM:
         problem = f"all points are within {span:g} mm of the frame's origin, which can only be metres"
         raise InputError(path, f"row {whole[0].row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
-    turning = np.array([unit == "deg" for unit in units])
-    poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(units))
-    refuse_radians(path, f"columns q1_deg to q{len(units)}_deg", poses[:, turning])
+    turning = np.array([name.endswith("_deg") for name in joints])
+    poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(joints))
+    refuse_radians(path, f"columns {joints[0]} to {joints[-1]}", poses[:, turning])
 
 
 def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
@@ -171,24 +158,20 @@ def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
 
 
 def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
+    """Reject points of the same joint values that are farther apart than their deviations explain."""
+    if any(row.deviation_mm is None for row in rows):
+        return
     by_pose: dict[tuple[Pose, str], list[Measurement]] = {}
     for row in rows:
-        if row.deviation_mm is None:
-            return
-        if row.touched:
-            continue
-        by_pose.setdefault((row.pose, row.point), []).append(row)
-    for same in (rows for rows in by_pose.values() if len(rows) > 1):
-        xyz = np.array([row.xyz_mm for row in same], dtype=float)  # None becomes NaN, which is never far from anything
-        deviation = np.array([row.deviation_mm for row in same], dtype=float)
-        for n, row in enumerate(same):
-            apart = np.abs(xyz[:n] - xyz[n])
-            far = np.argwhere(apart > APART_DEVIATIONS * np.hypot(deviation[:n], deviation[n])[:, None])
-            if len(far):
-                k, c = far[0]
+        if not row.touched:
+            by_pose.setdefault((row.pose, row.point), []).append(row)
+    for first, row in (pair for same in by_pose.values() for pair in combinations(same, 2)):
+        most = APART_DEVIATIONS * math.hypot(first.deviation_mm or 0.0, row.deviation_mm or 0.0)
+        for name, one, other in zip("xyz", first.xyz_mm, row.xyz_mm):
+            if one is not None and other is not None and abs(one - other) > most:
                 problem = (
-                    f"contradicts row {same[k].row}: same joints, {apart[k, c]:.3g} mm apart in {'xyz'[c]}, "
-                    f"far beyond the stated standard deviations"
+                    f"contradicts row {first.row}: same joints, {abs(one - other):.3g} mm apart in {name}, "
+                    "far beyond the stated standard deviations"
                 )
                 raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")
 

@@ -59,8 +59,25 @@ class CsvColumn:
     quantity: str = "length or angle"
 
 
+def columns_of(text: str, number: type = float) -> dict[str, CsvColumn]:
+    """The columns of a table, by name.
+
+    Parameters
+    ----------
+    text : names of columns of numbers; ``name:int`` holds whole numbers, ``name:word`` texts, ``name:a|b`` one of some
+        words. A field may be empty with ``?`` behind, and the column be missing with ``~``
+    number : type of numbers
+    """
+    found: dict[str, CsvColumn] = {}
+    for word in text.split():
+        name, _, kind = word.rstrip("?~").partition(":")
+        choices = tuple(kind.split("|")) if kind not in ("", "int", "word") else ()
+        found[name] = CsvColumn({"": number, "int": int}.get(kind, str), "?" in word, choices, "~" not in word)
+    return found
+
+
 UNITS_CHECKED = "units_checked"
-CHECKED_COLUMN = {UNITS_CHECKED: CsvColumn(str, optional=True, choices=("yes",), always=False)}
+CHECKED_COLUMN = columns_of(f"{UNITS_CHECKED}:yes?~")
 """The column that says yes where numbers which look like metres or radians are mm and degrees."""
 
 
@@ -83,7 +100,7 @@ def read_csv(path: str | Path, columns: Mapping[str, CsvColumn], lines: Lines | 
     check_widths(path, lines)
     rows = []
     for number, line in lines[1:]:
-        row = {name: _value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
+        row = {name: cell_value(path, number, name, text.strip(), columns[name]) for name, text in zip(header, line)}
         absent = dict.fromkeys(name for name in columns if name not in row)
         rows.append({"row": number, **row, **absent})
     return rows
@@ -137,23 +154,50 @@ def read_column(path: str | Path, column: str) -> list[str]:
     return [line[names.index(column)].strip() for _, line in rows] if column in names else []
 
 
-def read_lines(path: Path) -> Lines:
-    """Lines of a CSV file that aren't blank, with their numbers; the first is the header.
+def csv_text(path: Path) -> str:
+    """The text of a CSV file, in UTF-8 or UTF-16.
 
-    Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points. The head
-    of a table of motion that er3a has written is left out.
+    Raises
+    ------
+    InputError
+        if it is missing, too large or no text
     """
-    text = OWN_HEAD.sub("", text_of(path, given_bytes(path, MAX_BYTES, TOO_LARGE)))
-    header = text.lstrip().partition("\n")[0]
-    mark = next((each for each in ";\t" if each in header and "," not in header), ",")
-    reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark)
+    return text_of(path, given_bytes(path, MAX_BYTES, TOO_LARGE))
+
+
+def read_lines(path: Path) -> Lines:
+    """Lines of a CSV file that aren't blank; the head of a table of motion that er3a has written is left out."""
+    return lines_of(path, OWN_HEAD.sub("", csv_text(path)))
+
+
+def lines_of(path: Path, text: str, mixed: bool = False) -> Lines:
+    """Lines of a table that aren't blank, with their numbers; the first is the header.
+
+    Spreadsheets of some countries separate by semicolons and write decimal commas, which are read as points. Fields
+    may have blanks between them where a header has no other mark.
+
+    Parameters
+    ----------
+    path : named in errors
+    mixed : whether numbers may have points in one column and commas in another
+
+    Raises
+    ------
+    InputError
+        naming the line, if quotes are not closed, or numbers have commas and points
+    """
+    header = text.strip().partition("\n")[0].strip()
+    mark = next((each for each in ";\t" if each in header and "," not in header), "," if "," in header else " ")
+    if mark == " ":
+        text = re.sub(r"(?m)[ \t\r]+$", "", text)
+    reader = csv.reader(io.StringIO(text), strict=True, delimiter=mark, skipinitialspace=mark == " ")
     try:
         lines = [(reader.line_num, line) for line in reader if any(field.strip() for field in line)]
     except csv.Error as error:
         raise InputError(path, f"line {reader.line_num}", f"not valid CSV ({error})", "Correct this line") from None
     while lines and all(len(line) == len(lines[0][1]) > 1 and not line[-1].strip() for _, line in lines):
         lines = [(number, line[:-1]) for number, line in lines]  # columns that a spreadsheet leaves behind
-    return lines if mark == "," else _with_points(path, lines)
+    return lines if mark == "," else _with_points(path, lines, mixed)
 
 
 def check_widths(path: Path, lines: Lines) -> None:
@@ -175,13 +219,13 @@ def check_widths(path: Path, lines: Lines) -> None:
             raise InputError(path, f"row {number}", problem, "Correct the separators; quote texts that hold one")
 
 
-def _with_points(path: Path, lines: Lines) -> Lines:
+def _with_points(path: Path, lines: Lines, mixed: bool) -> Lines:
     """Lines with decimal points, of a table in which commas separate nothing."""
     comma = re.compile(r"\s*[-+−]?\d+,\d+(?:[eE][-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?\s*")
     fields = [field for _, line in lines[1:] for field in line]
     written = next((field.strip() for field in fields if comma.fullmatch(field)), "")
     pointed = next((field.strip() for field in fields if "." in field and comma.fullmatch(field.replace(".", ","))), "")
-    if written and pointed:
+    if written and pointed and not mixed:
         problem = f"decimal commas and points in one table ('{written}', '{pointed}')"
         raise InputError(path, None, problem, "Write all numbers with a point")
     return [
@@ -218,7 +262,19 @@ def _check_header(path: Path, number: int, header: list[str], columns: Mapping[s
         raise InputError(path, f"column {missing[0]}", "missing", needed)
 
 
-def _value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any:
+def cell_value(path: Path, row: int, name: str, text: str, column: CsvColumn) -> Any:
+    """The value of one cell; None for an empty one, where the column allows that.
+
+    Parameters
+    ----------
+    path, row, name : where it is, for errors
+    text : without blanks around it
+
+    Raises
+    ------
+    InputError
+        for a cell that is empty, no number, not finite, too large, or none of the column's words
+    """
     where = f"row {row}, column {name}"
     if not text:
         if column.optional:

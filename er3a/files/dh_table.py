@@ -23,8 +23,8 @@ from typing import Any, Literal
 import numpy as np
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_lines
-from er3a.files.printed_table import FIXED, MAX_BYTES, PrintedTable, check_size, printed_table, table_text
+from er3a.files.csv_file import columns_of, read_csv, read_lines
+from er3a.files.printed_table import FIXED, MAX_BYTES, PER_MM, PrintedTable, check_size, printed_table, table_text
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
@@ -33,30 +33,16 @@ from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, limit_in_degrees
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention, Grade
 
-_NUMBER, _OF_KIND = CsvColumn(float), CsvColumn(float, optional=True)
-NEEDED = {"joint": CsvColumn(int, optional=True), "a_mm": _NUMBER, "alpha_deg": _NUMBER, "d_mm": _NUMBER}
-OPTIONAL = {
-    "convention": CsvColumn(str, choices=CONVENTIONS),
-    "type": CsvColumn(str, choices=("revolute", "prismatic", "fixed", "tool")),
-    "theta_deg": _OF_KIND,
-    "beta_deg": CsvColumn(float),
-    "calibrated": CsvColumn(str, choices=("true", "false")),
-    "offset_deg": _OF_KIND,
-    "direction": CsvColumn(int, optional=True),
-    "lower_deg": _OF_KIND,
-    "upper_deg": _OF_KIND,
-    "lower_mm": _OF_KIND,
-    "upper_mm": _OF_KIND,
-    "speed_deg_s": _OF_KIND,
-    "speed_mm_s": _OF_KIND,
-}
+NEEDED = columns_of("joint:int? a_mm alpha_deg d_mm")
+OPTIONAL = columns_of(
+    f"convention:{'|'.join(CONVENTIONS)} type:revolute|prismatic|fixed|tool theta_deg? beta_deg calibrated:true|false "
+    "offset_deg? direction:int? lower_deg? upper_deg? lower_mm? upper_mm? speed_deg_s? speed_mm_s?"
+)
 ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "cm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
-MILLIMETRES: dict[LengthUnit, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-DEGREES: dict[AngleUnit, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
-OTHER_UNITS: dict[str, tuple[str, float]] = {unit: ("mm", scale) for unit, scale in MILLIMETRES.items() if unit != "mm"}
-OTHER_UNITS |= {"rad": ("deg", DEGREES["rad"])}
+PER_RAD = math.degrees(1.0)
+OTHER_UNITS = {unit: ("mm", scale) for unit, scale in PER_MM.items() if unit != "mm"} | {"rad": ("deg", PER_RAD)}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
 LONGEST_LINK_M = 2.5  # of robots; the same number of inches is a link of 64 mm, below those of most
 SHORTEST_LINK_MM = 80.0  # longest link of an arm in mm; the same number of cm is one, too
@@ -334,7 +320,7 @@ def _in_own_units(
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
-                scale = DEGREES["rad"] if column in turned else _scale_of(column, unit)
+                scale = PER_RAD if column in turned else _scale_of(column, unit)
                 row[column] = _converted(column, value, scale)
 
 
@@ -361,7 +347,7 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
 
 def _converted(column: str, value: float, scale: float) -> float:
     """A value in mm or degrees; one in radians as :func:`er3a.numerics.si_units.limit_in_degrees` if it is a limit."""
-    if scale == DEGREES["rad"] and column in ("lower_deg", "upper_deg"):
+    if scale == PER_RAD and column in ("lower_deg", "upper_deg"):
         return limit_in_degrees(value, 1 if column == "lower_deg" else -1)
     return value * scale
 
@@ -387,11 +373,11 @@ def headed_units(
     lines = _printed(path, columns, text).lines
     meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
     units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
-    return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*MILLIMETRES, *DEGREES)}
+    return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*PER_MM, "deg", "rad")}
 
 
 def _scale_of(column: str, length_unit: LengthUnit) -> float:
-    return MILLIMETRES[length_unit] if _unit_of(column) == "mm" else 1.0
+    return PER_MM[length_unit] if _unit_of(column) == "mm" else 1.0
 
 
 def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:

@@ -13,7 +13,6 @@ Rotation vectors (axis times angle, in rad) are used by OpenCV and by the pendan
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -24,19 +23,18 @@ from pydantic import Field, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CsvColumn, read_csv, read_header
-from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
+from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Text
 from er3a.files.units import (
-    JOINT_COLUMN,
     METRES_BELOW_MM,
     ROWS_TO_JUDGE_UNITS,
     WIDEST_IN_RADIANS,
     doubt,
+    joint_names,
     refuse_radians,
 )
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import in_si
@@ -45,30 +43,21 @@ from er3a.robots.robot import Robot
 from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, board_views
 from er3a.vision.calibration_set import CalibrationSet
 
-POSITION = ("x_mm", "y_mm", "z_mm")
 TOLERANCE = 1e-3  # quaternions are written with as few as four digits
 MIXED_UNITS = 200.0
 
 
-def poses_of(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
-    """Poses (N, 4, 4), m.
-
-    Raises
-    ------
-    InputError
-        naming the row: positions in metres among mm, quaternions without unit length, mirrored or skewed matrices,
-        angles in radians, rotation vectors in degrees
-    """
-    position = np.array([[row[f"{stream}_{name}"] for name in POSITION] for row in rows], dtype=float)
+def _poses(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
+    """Poses (N, 4, 4), m, of which the units are judged, too."""
+    prefix = f"{stream}_"
+    position, values = (
+        np.array([[row[prefix + name] for name in names] for row in rows], float) for names in (POSITION, FORMS[form])
+    )
     _check_millimetres(path, rows, stream, position)
-    values = np.array([[row[f"{stream}_{name}"] for name in FORMS[form]] for row in rows], dtype=float)
-    where = f"columns {stream}_{FORMS[form][0]} to {stream}_{FORMS[form][-1]}"
     if form in ("rpy_deg", "zyz_deg"):
+        where = f"columns {prefix}{FORMS[form][0]} to {prefix}{FORMS[form][-1]}"
         refuse_radians(path, where, values, WIDEST_IN_RADIANS / 2)
-    try:
-        return posed(rotations(form, values, TOLERANCE), position / 1000)
-    except NoRotationError as error:
-        raise InputError(path, f"row {rows[error.row]['row']}, {where}", error.problem, error.remedy) from None
+    return poses_of(path, rows, form, prefix, TOLERANCE)
 
 
 def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, position: Reals) -> None:
@@ -258,7 +247,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         flange, names = flange[kept], tuple(names[number] for number in kept)
         q = None if q is None else q[kept]
     else:
-        target = poses_of(table, rows, "target", _form(table, header, "target"))
+        target = _poses(table, rows, "target", _form(table, header, "target"))
     if covariance is not None:
         per_sample = np.broadcast_to(covariance.covariance(), (len(flange), 6, 6))
     samples = CalibrationSet(
@@ -291,7 +280,7 @@ def check_samples(table: Path) -> str:
     rows, header = sample_rows(table)
     for stream in ("flange", "target"):
         if form := form_in(table, header, f"{stream}_"):
-            poses_of(table, rows, stream, form)
+            _poses(table, rows, stream, form)
     return "samples of a hand-eye calibration"
 
 
@@ -319,7 +308,7 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
             columns[name] = CsvColumn(str, optional=name == "name")
     if "t_s" in header:  # of recordings; not used
         columns["t_s"] = CsvColumn(digits=EPOCH_DIGITS, quantity="time in s")
-    columns |= {name: CsvColumn() for name in _joint_columns(header)}
+    columns |= {name: CsvColumn() for name in joint_names(table, header)}
     for stream in ("flange", "target"):
         if form := form_in(table, header, f"{stream}_"):
             columns |= {f"{stream}_{name}": CsvColumn() for name in (*POSITION, *FORMS[form])}
@@ -331,12 +320,6 @@ def sample_rows(table: Path) -> tuple[list[dict[str, Any]], list[str]]:
     if not rows:
         raise InputError(table, None, "the table has a header but no samples", "Add a row for each sample")
     return rows, header
-
-
-def _joint_columns(header: list[str]) -> list[str]:
-    """The columns of joint values, of as many joints as a header numbers without a gap, those that slide in mm."""
-    named = {int(found[1]): name for name in header if (found := JOINT_COLUMN.fullmatch(name))}
-    return list(takewhile(bool, (named.get(joint + 1, "") for joint in range(len(named)))))
 
 
 def _form(table: Path, header: list[str], stream: str) -> str:
@@ -352,22 +335,17 @@ def _flange(
 ) -> tuple[Reals, Reals | None]:
     """T_world_flange (N, 4, 4), from joint values by the robot's table where they are given; else a controller gives it
     from the robot's own base."""
-    given = _joint_columns(header)
+    given = joint_names(table, header)
     if not given:
-        poses = poses_of(table, rows, "flange", _form(table, header, "flange"))
+        poses = _poses(table, rows, "flange", _form(table, header, "flange"))
         return poses if robot is None else robot.base @ poses, None
     if form_in(table, header, "flange_"):
         raise InputError(table, "header", "joint angles and flange poses both say where the arm was", "Keep one")
     if robot is None:
         raise InputError(table, "columns q1_deg ...", "joint angles need a robot's table", "Name the robot")
-    if len(given) != robot.joints:
-        problem = f"{len(given)} joint angles, and the robot {robot.name} has {robot.joints} joints"
-        raise InputError(table, "columns q1_deg ...", problem, "Give one column for each joint")
-    wanted = joint_columns(robot)
-    if wrong := [name for name, right in zip(given, wanted, strict=True) if name != right]:
-        kind = "slides" if wrong[0].endswith("_deg") else "turns"
-        problem = f"joint {wrong[0][1:].partition('_')[0]} of {robot.name} {kind}"
-        raise InputError(table, f"column {wrong[0]}", problem, f"Give {', '.join(wanted)}")
+    if given != (wanted := joint_columns(robot)):
+        problem = f"the joint columns are not those of {robot.name}"
+        raise InputError(table, f"columns {given[0]} to {given[-1]}", problem, f"Give {', '.join(wanted)}")
     values = np.array([[row[name] for name in given] for row in rows], dtype=float)
     refuse_radians(table, f"columns {given[0]} to {given[-1]}", values[:, ~robot.slides])
     q = meant(robot, values)

@@ -7,7 +7,7 @@ of Universal Robots.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ import numpy as np
 import scipy
 
 from er3a.errors import InputError
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, transform
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, posed, transform
 from er3a.numerics.arrays import Reals
 
+POSITION = ("x_mm", "y_mm", "z_mm")
 FORMS: dict[str, tuple[str, ...]] = {
     "rpy_deg": ("roll_deg", "pitch_deg", "yaw_deg"),
     "zyz_deg": ("z1_deg", "y_deg", "z2_deg"),
@@ -25,6 +26,13 @@ FORMS: dict[str, tuple[str, ...]] = {
     "matrix": tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)),
     "rotation_vector_rad": ("rx_rad", "ry_rad", "rz_rad"),
 }
+OF_THREE = ("abc", "rpy", "zyz", "xyz", "rotation_vector")  # forms of three angles without a unit
+BY_ROW: dict[str, tuple[str, ...]] = {
+    **{form: FORMS[form] for form in ("rpy_deg", "quaternion_wxyz")},
+    "rotation_vector_deg": ("rx_deg", "ry_deg", "rz_deg"),
+    "matrix_of_columns": ("nx", "ny", "nz", "ox", "oy", "oz", "ax", "ay", "az"),
+}
+"""Forms in which each row of a table may have its own: the matrix column by column, nx, ny, nz being the x axis."""
 LONGEST_VECTOR = 2 * np.pi * 1.01
 
 
@@ -66,7 +74,7 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
 
     Parameters
     ----------
-    form : one of ``FORMS``
+    form : one of ``FORMS`` or ``BY_ROW``
     values : (N, k), in the order of the form's columns: deg, rad for rotation vectors, else without unit
     tolerance : by which a quaternion's length, and R R^T of a matrix, may differ from 1
 
@@ -80,12 +88,8 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         a quaternion without unit length, a skewed or mirrored matrix, a rotation vector of more than a turn
     """
     values = np.asarray(values, float)
-    if form == "rpy_deg":
-        return _turned(values)
-    if form == "zyz_deg":
-        first, second, third = (np.zeros_like(values) for _ in range(3))
-        first[:, 2], second[:, 1], third[:, 2] = values.T
-        return np.asarray(_turned(first) @ _turned(second) @ _turned(third))
+    if form.endswith("_deg"):
+        return of_angles(form.removesuffix("_deg"), np.radians(values))
     if form == "rotation_vector_rad":
         length = np.hypot.reduce(values, axis=1)
         _refuse(length > LONGEST_VECTOR, "{:.4g} rad are more than a turn, and can only be degrees", length, "Convert")
@@ -96,6 +100,7 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
         _refuse(wrong, "the quaternion's length is {:.9g}, not 1", length, "Divide w, x, y and z by it")
         return np.asarray(scipy.spatial.transform.Rotation.from_quat(values, scalar_first=True).as_matrix())
     R = values.reshape(-1, 3, 3)
+    R = R.mT if form == "matrix_of_columns" else R
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(R @ R.mT - np.eye(3)).max(axis=(1, 2))
     remedy = f"Its rows must be orthonormal to {tolerance:g}; write more digits"
@@ -106,9 +111,62 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
     return np.asarray(U @ Vt)
 
 
-def _turned(rpy_deg: Reals) -> Reals:
-    turned: Reals = transform(np.zeros_like(rpy_deg), np.radians(rpy_deg))[:, :3, :3]
-    return turned
+def poses_of(
+    path: Path,
+    rows: Sequence[Mapping[str, Any]],
+    form: str,
+    prefix: str = "",
+    tolerance: float = ORTHONORMAL_TOLERANCE,
+) -> Reals:
+    """The poses that rows of a table give.
+
+    Parameters
+    ----------
+    rows : values by column, with the line as ``row``; positions in mm
+    form : of the orientation, one of ``FORMS``
+    prefix : before the names of the columns, such as ``flange_``
+    tolerance : as of :func:`rotations`
+
+    Returns
+    -------
+    T : (N, 4, 4), m
+
+    Raises
+    ------
+    InputError
+        naming the row whose numbers are no rotation
+    """
+    xyz, values = (
+        np.array([[row[prefix + name] for name in names] for row in rows], float) for names in (POSITION, FORMS[form])
+    )
+    try:
+        return posed(rotations(form, values, tolerance), xyz / 1000)
+    except NoRotationError as error:
+        columns = ", ".join(prefix + name for name in FORMS[form])
+        where = f"row {rows[error.row]['row']}, column {columns}"
+        raise InputError(path, where, error.problem, error.remedy) from None
+
+
+def of_angles(form: str, angles: Reals) -> Reals:
+    """Rotations of three angles.
+
+    Parameters
+    ----------
+    form : one of ``OF_THREE``: ``abc`` Rz(1) Ry(2) Rx(3), ``rpy`` Rz(3) Ry(2) Rx(1), ``zyz`` Rz(1) Ry(2) Rz(3), ``xyz``
+        Rx(1) Ry(2) Rz(3), or ``rotation_vector``
+    angles : (N, 3), rad, in the order of the columns
+
+    Returns
+    -------
+    R : (N, 3, 3)
+    """
+    if form == "rotation_vector":
+        return exp_rotation(angles)
+    if form == "zyz":
+        return np.asarray(of_angles("abc", angles * [1, 1, 0]) @ of_angles("rpy", angles * [0, 0, 1]))
+    rpy = {"abc": angles[:, ::-1], "xyz": -angles}.get(form, angles)
+    R = transform(np.zeros_like(rpy), rpy)[:, :3, :3]
+    return np.asarray(R.mT if form == "xyz" else R)
 
 
 def _refuse(wrong: Any, problem: str, values: Reals, remedy: str) -> None:

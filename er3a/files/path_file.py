@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -30,22 +30,21 @@ from pydantic import BeforeValidator, Field, model_validator
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
 from er3a.files.kept_files import given_file
-from er3a.files.orientations import FORMS, NoRotationError, form_in, rotations
+from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Name, Text
-from er3a.files.target_file import KNOWN_FORMS, POSITION, PoseEntry
+from er3a.files.target_file import KNOWN_FORMS, PoseEntry
 from er3a.files.units import (
-    JOINT_COLUMN,
     JointsDeg,
     PositionMm,
     Triple,
     check_degrees,
     check_millimetres,
     doubt_degrees,
+    joint_names,
     joint_rates,
     joint_values,
 )
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse, read_yaml
-from er3a.geometry.transforms import posed
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning import commands
@@ -108,7 +107,7 @@ def read_path_table(path: str | Path) -> PathTable:
     beside = header & of_pose if is_own(path) else set()  # where the joints put the tool
     header -= beside
     form = form_in(path, header)
-    own = _joint_columns(path, header)
+    own = joint_names(path, header)
     of_joints = bool(own)
     if of_joints and (form or header & set(POSITION)):
         raise InputError(path, "header", "the table has both joint angles and poses", "Keep one of the two")
@@ -129,7 +128,7 @@ def read_path_table(path: str | Path) -> PathTable:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
     else:
-        poses, joints = _poses(path, lines, rows, str(form)), None
+        poses, joints = _poses(path, rows, str(form)), None
         turn = scipy.spatial.transform.Rotation.from_matrix(
             np.swapaxes(poses[:-1, :3, :3], -1, -2) @ poses[1:, :3, :3]
         ).magnitude()
@@ -253,16 +252,6 @@ def _joint_order(path: Path, names: list[str]) -> list[int]:
     return sorted(range(len(names)), key=numbers.__getitem__)
 
 
-def _joint_columns(path: Path, header: set[str]) -> tuple[str, ...]:
-    """The columns of the joints, in order; :class:`InputError` if one is missing or repeated."""
-    found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
-    numbers = sorted(found.values())
-    if numbers != list(range(1, len(numbers) + 1)):
-        missing = next((k for k in range(1, max(numbers) + 1) if k not in numbers), numbers[0])
-        raise InputError(path, "header", f"joint {missing} has no column, or two", "Give q1_deg, q2_deg ... once each")
-    return tuple(sorted(found, key=found.__getitem__))
-
-
 def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) -> Reals:
     """Joint values (n, joints) in rad, or m of columns in mm."""
     turning = [name for name in names if name.endswith("_deg")]
@@ -289,15 +278,11 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
         raise InputError(path, places[-1], f"{times[-1]:g} s is too long", "Write seconds, not ms")
 
 
-def _poses(path: Path, lines: Integers, rows: list[dict[str, Any]], form: str) -> Reals:
-    position = _block(path, rows, POSITION, check_millimetres)
-    names = FORMS[form]
-    angles = form in ("rpy_deg", "zyz_deg")
-    values = _block(path, rows, names) if angles else np.array([[row[name] for name in names] for row in rows])
-    try:
-        return posed(rotations(form, values), position / 1000)
-    except NoRotationError as error:
-        raise InputError(path, _where(lines[error.row], names), error.problem, error.remedy) from None
+def _poses(path: Path, rows: list[dict[str, Any]], form: str) -> Reals:
+    _block(path, rows, POSITION, check_millimetres)
+    if form in ("rpy_deg", "zyz_deg"):
+        _block(path, rows, FORMS[form])
+    return poses_of(path, rows, form)
 
 
 def _block(
@@ -426,20 +411,13 @@ class JointPath(NamedPath):
         InputError
             if values or rates are not as many as the joints
         """
-        return commands.JointMoveCommand(
-            commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after),
-            joint_values(robot, self.end_deg, "end_deg"),
-            self.duration_s,
-            (
-                _rates(robot, self.start_velocity_deg_s, "start_velocity_deg_s"),
-                _rates(robot, self.end_velocity_deg_s, "end_velocity_deg_s"),
-            ),
-            (
-                _rates(robot, self.start_acceleration_deg_s2, "start_acceleration_deg_s2"),
-                _rates(robot, self.end_acceleration_deg_s2, "end_acceleration_deg_s2"),
-            ),
-            source=source,
+        velocities, accelerations = (
+            (_rates(robot, self, f"start_{key}"), _rates(robot, self, f"end_{key}"))
+            for key in ("velocity_deg_s", "acceleration_deg_s2")
         )
+        start = commands.Start(joints=_joints(robot, self.start_deg, "start_deg"), after=self.after)
+        end = joint_values(robot, self.end_deg, "end_deg")
+        return commands.JointMoveCommand(start, end, self.duration_s, velocities, accelerations, source=source)
 
 
 class JointSequencePath(Profiled):
@@ -512,28 +490,30 @@ class ToolStart(Profiled):
         return commands.Start(_joints(robot, self.start_deg, "start_deg"), pose, self.after, _branch(self.start_branch))
 
 
-class LineTo(StrictModel):
-    """A straight line to a pose; ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg."""
+class ToolMove(StrictModel):
+    """A straight line to a pose, or a circular arc through a point to it.
 
+    ``half_turn_axis`` chooses the sense of a rotation by exactly 180 deg.
+    """
+
+    kind: Literal["line", "arc"]
     end: PoseEntry
+    via_mm: PositionMm | None = None
     half_turn_axis: Triple | None = None
 
-    def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units: its end T_base_tool (4, 4), m."""
-        return commands.SegmentCommand(self.end.pose(), half_turn_axis=_axis(self.half_turn_axis))
+    @model_validator(mode="after")
+    def _an_arc_has_a_point(self) -> Self:
+        if (self.via_mm is None) == (self.kind == "arc"):
+            raise ValueError("via_mm: an arc passes a point, and a line none | Add or remove it, or change kind")
+        return self
+
+    def segment(self, blend: float = 0.0) -> commands.SegmentCommand:
+        """The segment in SI units: its end T_base_tool (4, 4), and the point (3,) that an arc passes, m."""
+        via = None if self.via_mm is None else np.array(self.via_mm) / 1000
+        return commands.SegmentCommand(self.end.pose(), via, _axis(self.half_turn_axis), blend)
 
 
-class ArcTo(LineTo):
-    """A circular arc through a point to a pose."""
-
-    via_mm: PositionMm
-
-    def segment(self) -> commands.SegmentCommand:
-        """The segment in SI units: its end T_base_tool (4, 4), and the point (3,) that it passes, m."""
-        return replace(super().segment(), via=np.array(self.via_mm) / 1000)
-
-
-class ToolMovePath(ToolStart, LineTo):
+class ToolMovePath(ToolStart, ToolMove):
     """One line or arc of the tool."""
 
     def command(self, source: commands.CommandSource, robot: Robot) -> commands.Command:
@@ -553,29 +533,9 @@ class ToolMovePath(ToolStart, LineTo):
         )
 
 
-class LinePath(ToolMovePath):
-    """A straight line of the tool."""
+class SequenceSegment(ToolMove):
+    """A line or arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
 
-    kind: Literal["line"]
-
-
-class ArcPath(ToolMovePath, ArcTo):
-    """A circular arc of the tool."""
-
-    kind: Literal["arc"]
-
-
-class LineSegment(LineTo):
-    """A line of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
-
-    kind: Literal["line"]
-    blend_mm: Blend = 0.0
-
-
-class ArcSegment(ArcTo):
-    """An arc of a sequence; ``blend_mm`` rounds the corner at its end over that length on either side."""
-
-    kind: Literal["arc"]
     blend_mm: Blend = 0.0
 
 
@@ -583,9 +543,7 @@ class SequencePath(ToolStart):
     """Lines and arcs one after another; the tool stops at each corner that is not rounded."""
 
     kind: Literal["sequence"]
-    segments: Annotated[
-        list[Annotated[LineSegment | ArcSegment, Field(discriminator="kind")]], Field(min_length=1, max_length=1000)
-    ]
+    segments: Annotated[list[SequenceSegment], Field(min_length=1, max_length=1000)]
 
     @model_validator(mode="after")
     def _no_corner_at_the_end(self) -> Self:
@@ -606,7 +564,7 @@ class SequencePath(ToolStart):
         -------
         command : segments and the blends at their ends in m, the duration of the whole in s
         """
-        segments = tuple(replace(part.segment(), blend=part.blend_mm / 1000) for part in self.segments)
+        segments = tuple(part.segment(part.blend_mm / 1000) for part in self.segments)
         return commands.ToolSequenceCommand(
             self.start_command(robot), segments, self.duration_s, self.ramp, source=source
         )
@@ -729,7 +687,7 @@ class ProgramPath(NamedPath):
     start_deg: JointsDeg | None = None
 
 
-PathEntry = PlanPath | JointPath | JointSequencePath | LinePath | ArcPath | SequencePath | TablePath
+PathEntry = PlanPath | JointPath | JointSequencePath | ToolMovePath | SequencePath | TablePath
 
 
 class PathFile(InputFile):
@@ -779,5 +737,6 @@ def _branch(words: str | None) -> str | None:
     return code if code in get_args(BranchLabel) else words
 
 
-def _rates(robot: Robot, values: list[float] | None, field: str) -> Reals | float:
+def _rates(robot: Robot, path: JointPath, field: str) -> Reals | float:
+    values = getattr(path, field)
     return 0.0 if values is None else joint_rates(robot, values, field)

@@ -11,7 +11,7 @@ import difflib
 import math
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -132,7 +132,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         found, from_code = _tables(text, columns)
     except InputError as error:
         raise InputError(path, error.field, error.problem, error.remedy) from None
-    tables = [table for n, table in enumerate(found[:9]) if [row for _, row in table] not in _rows_of(found[:n])]
+    tables = list({str([row for _, row in table]): table for table in reversed(found[:9])}.values())[::-1]
     if not tables:
         return None
     if len(tables) > 1:
@@ -168,33 +168,30 @@ def is_printed_table(header: Iterable[str]) -> bool:
     return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
 
 
-def _rows_of(grids: list[Grid]) -> list[list[list[str]]]:
-    return [[row for _, row in grid] for grid in grids]
-
-
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    bare = code_grids(text, headed=False) if columns else []
-    if tables := [table for grid in bare for table in _headed(grid, columns)]:
-        return tables, True
-    page = html_grids(text) or latex_grids(text)
-    if tables := [table for grid in page for table in _headed(grid, columns)]:
-        return tables, False
-    if tables := [table for grid in code_grids(text) for table in _headed(grid, columns)]:
-        return tables, True
-    for mark, grid in line_grids(text):
-        if tables := _headed(grid, columns):
-            return [_trimmed(table) for table in tables] if mark.isspace() and mark != "\t" else tables, False
-    if tables := [table for grid in _stacked(text) for table in _headed(grid, columns)]:
-        return tables, False
+    for grids, kind in _read(text, columns):
+        if tables := [table for grid in grids for table in _headed(grid, columns)]:
+            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
+
+
+def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
+    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
+    if columns:
+        yield code_grids(text, headed=False), "program"
+    yield html_grids(text) or latex_grids(text), "marks"
+    yield code_grids(text), "program"
+    for mark, grid in line_grids(text):
+        yield [grid], "blanks" if mark in ("  ", " ") else "marks"
+    yield _stacked(text), "marks"
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from er3a.errors import InputError, InputWarning
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, Written, read_csv
+from er3a.files.csv_file import UNITS_CHECKED, CsvColumn, Written, columns_of, read_csv
 from er3a.files.kept_files import names, own_or_shipped
-from er3a.files.orientations import NoRotationError, rotations
+from er3a.files.orientations import BY_ROW, NoRotationError, rotations
 from er3a.files.robot_file import NAME_PATTERN
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
@@ -39,39 +39,19 @@ Fields = dict[str, Any]
 Fault = tuple[str, str, str]
 """Column, problem and remedy."""
 
-_WORD, _NUMBER, _JOINT = CsvColumn(str), CsvColumn(Written), CsvColumn(int)
-_OPTIONAL, _OF_SLIDES = CsvColumn(Written, optional=True), CsvColumn(Written, optional=True, always=False)
 STATED_AS = "stated_as"
 STANDARD_DEVIATION = "standard_deviation"
 UNCERTAINTIES = ("uncertainty_mm", "uncertainty_deg", "uncertainty_deg_s", "uncertainty_mm_s")
-_SOURCE = {
-    "source": _WORD,
-    "grade": CsvColumn(str, choices=tuple(GRADES)),
-    "origin": _WORD,
-    STATED_AS: CsvColumn(str, optional=True, choices=("half_width", STANDARD_DEVIATION), always=False),
-    **CHECKED_COLUMN,
-}
-_POINT = CsvColumn(str, choices=("flange", "wrist_centre"))
+_SOURCE = columns_of(
+    f"source:word grade:{'|'.join(GRADES)} origin:word {STATED_AS}:half_width|{STANDARD_DEVIATION}?~ "
+    f"{UNITS_CHECKED}:yes?~"
+)
 _XYZ = ("x_mm", "y_mm", "z_mm")
 _DIRECTION = ("direction_x", "direction_y", "direction_z")
-_RPY = ("roll_deg", "pitch_deg", "yaw_deg")
-_QUATERNION = ("qw", "qx", "qy", "qz")
-_ROTATION_VECTOR = ("rx_deg", "ry_deg", "rz_deg")
-_MATRIX = ("nx", "ny", "nz", "ox", "oy", "oz", "ax", "ay", "az")
-ORIENTATIONS: dict[str, tuple[str, ...]] = {
-    "roll, pitch and yaw": _RPY,
-    "quaternion": _QUATERNION,
-    "rotation vector": _ROTATION_VECTOR,
-    "matrix": _MATRIX,
-}
-"""Columns of the flange's orientation, by how it is written: rpy as in URDF, the matrix column by column: nx, ny, nz is
-the flange's x axis in the base frame."""
-_FORM_OF = dict(zip(ORIENTATIONS.values(), ("rpy_deg", "quaternion_wxyz", "rotation_vector_rad", "matrix")))
-ORIENTATION_COLUMNS = tuple(column for columns in ORIENTATIONS.values() for column in columns)
+ORIENTATION_COLUMNS = tuple(column for columns in BY_ROW.values() for column in columns)
 NOT_RIGID = 2e-3
 _POSE = tuple(f"q{joint}_deg" for joint in range(1, len(ZERO_POSE) + 1))
 _FURTHER = tuple(f"q{joint}_deg" for joint in range(len(ZERO_POSE) + 1, MAX_JOINTS + 1))
-_POSE_COLUMNS = dict.fromkeys(_POSE, _NUMBER) | dict.fromkeys(_FURTHER, CsvColumn(Written, always=False))
 
 
 @dataclass(frozen=True)
@@ -81,22 +61,17 @@ class Format:
     Attributes
     ----------
     columns : without source, grade, origin and uncertainty, which every table has
-    digits, sliding_digits : if a line gives no uncertainty, it is half the last digit of these columns; the latter for
-        prismatic joints
     gather : converts a line's fields to those of the row
     faults : errors of a line
     coarse : the default uncertainty of tables without digits
-    mixed_lengths, mixed_limits : whether single lines in metres, or limits in radians, beside others are refused
+    mixed : whether single lines in metres or radians among others are refused
     """
 
     columns: Mapping[str, CsvColumn]
-    digits: tuple[str, ...] = ()
-    sliding_digits: tuple[str, ...] = ()
     gather: Callable[[Fields], Fields] = dict
     faults: Callable[[Fields], Iterator[Fault]] = lambda fields: iter(())
     coarse: float | None = None
-    mixed_lengths: bool = False
-    mixed_limits: bool = False
+    mixed: bool = False
 
     @property
     def all_columns(self) -> dict[str, CsvColumn]:
@@ -116,7 +91,9 @@ class Format:
         digits : the columns whose last printed digits fill it in
         """
         uncertainties = [name for name in self.columns if name in UNCERTAINTIES]
-        return (uncertainties[-1], self.sliding_digits) if _slides(fields) else (uncertainties[0], self.digits)
+        column = uncertainties[-1 if _slides(fields) else 0]
+        ending = column.removeprefix("uncertainty")
+        return column, tuple(name for name in self.columns if name.endswith(ending) and name[0] not in "uq")
 
 
 def _axis_fields(fields: Fields) -> Fields:
@@ -145,51 +122,28 @@ def _position_fields(fields: Fields) -> Fields:
     return fields
 
 
-def _written_as(fields: Fields) -> list[tuple[str, ...]]:
-    """The columns of each way of writing an orientation that a row uses."""
-    return [columns for columns in ORIENTATIONS.values() if any(fields[name] is not None for name in columns)]
+def _written_as(fields: Fields) -> list[str]:
+    """The forms of ``BY_ROW`` that a row uses."""
+    return [form for form, columns in BY_ROW.items() if any(fields[name] is not None for name in columns)]
+
+
+def _rotation(form: str, fields: Fields, tolerance: float = math.inf) -> Reals:
+    """The rotation (3, 3) nearest to what a row states in a form; :class:`NoRotationError` if it is off by more."""
+    return rotations(form, [[fields[name] for name in BY_ROW[form]]], tolerance)[0]
 
 
 def _orientation(fields: Fields) -> Rotation3 | None:
     """Rows of the rotation matrix that a row states; None if it states no orientation."""
     written = _written_as(fields)
-    if not written:
-        return None
-    values = np.array([fields[name] for name in written[0]])
-    R = rotation_of(written[0], values)
-    return tuple(tuple(row) for row in R.tolist())  # type: ignore[return-value]
-
-
-def rotation_of(columns: tuple[str, ...], values: Reals, tolerance: float = math.inf) -> Reals:
-    """The rotation matrix nearest to an orientation as a document writes it.
-
-    Parameters
-    ----------
-    columns : one of the forms of ``ORIENTATIONS``
-    values : in their order: deg, the four numbers of a quaternion (w first), or a matrix by columns n, o, a
-    tolerance : by which a quaternion or matrix may be off a rotation
-
-    Returns
-    -------
-    R : (3, 3), see :func:`er3a.files.orientations.rotations`
-
-    Raises
-    ------
-    NoRotationError
-        for a quaternion or matrix that is off by more than that, or mirrored
-    """
-    if columns == _ROTATION_VECTOR:
-        values = np.radians(values)
-    if columns == _MATRIX:
-        values = values.reshape(3, 3).T.ravel()
-    return rotations(_FORM_OF[columns], values[None], tolerance)[0]
+    return tuple(map(tuple, _rotation(written[0], fields).tolist())) if written else None  # type: ignore[return-value]
 
 
 def _position_faults(fields: Fields) -> Iterator[Fault]:
     written = _written_as(fields)
     if len(written) > 1:
-        yield written[1][0], "the orientation is written in two ways", "Keep one of the two"
-    for columns in written[:1]:
+        yield BY_ROW[written[1]][0], "the orientation is written in two ways", "Keep one of the two"
+    for form in written[:1]:
+        columns = BY_ROW[form]
         missing = [name for name in columns if fields[name] is None]
         if missing:
             yield missing[0], "empty, but the row gives other parts of the orientation", f"Give {', '.join(columns)}"
@@ -197,7 +151,7 @@ def _position_faults(fields: Fields) -> Iterator[Fault]:
             yield "point", f"an orientation of the {fields['point']}", "Write flange: its orientation alone is checked"
         else:
             try:
-                rotation_of(columns, np.array([fields[name] for name in columns]), NOT_RIGID)
+                _rotation(form, fields, NOT_RIGID)
             except NoRotationError as error:
                 yield columns[0], error.problem, error.remedy
 
@@ -269,117 +223,56 @@ def _mixed_units(fields: Fields) -> Iterator[Fault]:
             yield column, "given beside millimetres", "Leave it empty of a joint that slides"
 
 
+_JOINTS = " ".join([*_POSE, *(f"{name}~" for name in _FURTHER)])
+_TURN = " ".join(f"{name}?~" for name in ORIENTATION_COLUMNS)
+_POINT = "point:flange|wrist_centre"
+
+
+def _format(columns: str, **more: Any) -> Format:
+    return Format(columns_of(columns, Written), **more)
+
+
 FORMATS: dict[str, Format] = {
-    "axes": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(_DIRECTION, _NUMBER),
-            **dict.fromkeys(_XYZ, _OPTIONAL),
-            "signed": CsvColumn(str, choices=("yes", "no")),
-            "uncertainty_mm": _NUMBER,
-            "uncertainty_deg": _NUMBER,
-        },
+    "axes": _format(
+        "joint:int direction_x direction_y direction_z x_mm? y_mm? z_mm? signed:yes|no uncertainty_mm uncertainty_deg",
         gather=_axis_fields,
         faults=_axis_faults,
     ),
-    "positions": Format(
-        {
-            "name": _WORD,
-            "point": _POINT,
-            **_POSE_COLUMNS,
-            **dict.fromkeys(_XYZ, _OPTIONAL),
-            "uncertainty_mm": _OPTIONAL,
-            **dict.fromkeys((*ORIENTATION_COLUMNS, "uncertainty_deg"), CsvColumn(Written, optional=True, always=False)),
-        },
-        digits=_XYZ,
+    "positions": _format(
+        f"name:word {_POINT} {_JOINTS} x_mm? y_mm? z_mm? uncertainty_mm? {_TURN} uncertainty_deg?~",
         gather=_position_fields,
         faults=_position_faults,
-        mixed_lengths=True,
+        mixed=True,
     ),
-    "directions": Format(
-        {
-            "segment": CsvColumn(str, choices=("upper_arm", "forearm")),
-            "angle_from_vertical_deg": _NUMBER,
-            "uncertainty_deg": _OPTIONAL,
-        },
-        digits=("angle_from_vertical_deg",),
-    ),
-    "envelope": Format(
-        {
-            "quantity": CsvColumn(str, choices=(*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS)),
-            "q2_deg": _OPTIONAL,
-            "q3_deg": _OPTIONAL,
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
-        digits=("value_mm",),
+    "directions": _format("segment:upper_arm|forearm angle_from_vertical_deg uncertainty_deg?"),
+    "envelope": _format(
+        f"quantity:{'|'.join((*ENVELOPE_CORNERS, *ENVELOPE_EXTENTS))} q2_deg? q3_deg? value_mm uncertainty_mm?",
         gather=_envelope_fields,
         faults=_envelope_faults,
     ),
-    "reach": Format(
-        {
-            "point": _POINT,
-            "from_axis": CsvColumn(int),
-            "extreme": CsvColumn(str, choices=("greatest", "least")),
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
-        digits=("value_mm",),
+    "reach": _format(
+        f"{_POINT} from_axis:int extreme:greatest|least value_mm uncertainty_mm?",
         faults=_reach_faults,
-        mixed_lengths=True,
+        mixed=True,
     ),
-    "limits": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(("lower_deg", "upper_deg", "uncertainty_deg"), _OPTIONAL),
-            **dict.fromkeys(("lower_mm", "upper_mm", "uncertainty_mm"), _OF_SLIDES),
-        },
-        digits=("lower_deg", "upper_deg"),
-        sliding_digits=("lower_mm", "upper_mm"),
+    "limits": _format(
+        "joint:int lower_deg? upper_deg? uncertainty_deg? lower_mm?~ upper_mm?~ uncertainty_mm?~",
         gather=_in_one_unit,
         faults=_limit_faults,
-        mixed_limits=True,
+        mixed=True,
     ),
-    "speeds": Format(
-        {
-            "joint": _JOINT,
-            **dict.fromkeys(("speed_deg_s", "uncertainty_deg_s"), _OPTIONAL),
-            **dict.fromkeys(("speed_mm_s", "uncertainty_mm_s"), _OF_SLIDES),
-        },
-        digits=("speed_deg_s",),
-        sliding_digits=("speed_mm_s",),
+    "speeds": _format(
+        "joint:int speed_deg_s? uncertainty_deg_s? speed_mm_s?~ uncertainty_mm_s?~",
         gather=_in_one_unit,
         faults=_speed_faults,
     ),
-    "observations": Format(
-        {
-            **_POSE_COLUMNS,
-            "joint": _JOINT,
-            "point": _POINT,
-            "seen": CsvColumn(str, choices=SEEN),
-            "uncertainty_deg": _OPTIONAL,
-        },
+    "observations": _format(
+        f"{_JOINTS} joint:int {_POINT} seen:{'|'.join(SEEN)} uncertainty_deg?",
         gather=_observation_fields,
         coarse=COARSE_DEG,
     ),
-    "lengths": Format(
-        {
-            "joint": _JOINT,
-            "length": CsvColumn(str, choices=("a", "d")),
-            "value_mm": _NUMBER,
-            "uncertainty_mm": _OPTIONAL,
-        },
-        digits=("value_mm",),
-    ),
-    "angles": Format(
-        {
-            "joint": _JOINT,
-            "angle": CsvColumn(str, choices=("alpha", "offset")),
-            "value_deg": _NUMBER,
-            "uncertainty_deg": _OPTIONAL,
-        },
-        digits=("value_deg",),
-    ),
+    "lengths": _format("joint:int length:a|d value_mm uncertainty_mm?"),
+    "angles": _format("joint:int angle:alpha|offset value_deg uncertainty_deg?"),
 }
 
 
@@ -406,8 +299,7 @@ check_complete("kinds of reference tables", KINDS, FORMATS)
 
 
 FILE = "documents.csv"
-_TEXT = CsvColumn(str)
-COLUMNS = {"name": _TEXT, "title": _TEXT, "publisher": _TEXT, "derived_from": CsvColumn(str, optional=True)}
+COLUMNS = columns_of("name:word title:word publisher:word derived_from:word?")
 
 
 def load_documents(path: str | Path) -> Documents:
@@ -486,28 +378,37 @@ def _known(names: Iterable[str]) -> str:
     return f"Write one of: {', '.join(names) or 'none yet'}; or declare it in {FILE}"
 
 
-SHORTEST_BESIDE_LONG_MM, LONG_MM = 2.0, 100.0
-WIDE_DEG = 30.0
 HALF_DEG, COMMANDED_DEG = 0.5, 2.5
 LEAST_COMMANDED = 4  # values of a row; rounded to whole degrees they would all be commanded ones once in 600 rows
-LENGTHS = ("x_mm", "y_mm", "z_mm", "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
-_COORDINATES = LENGTHS[:3]
 LONGEST_ARM = 4.0  # times the farther of both points from the base
-ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
 
 
 @dataclass(frozen=True)
 class Mistaken:
-    """A unit that values were written in by mistake."""
+    """A unit that values were written in by mistake.
+
+    Attributes
+    ----------
+    columns : which are looked at
+    least : values are in the other unit if all are smaller; small, large : or one row's among larger ones
+    """
 
     unit: str
     other: str
     remedy: str
+    columns: tuple[str, ...]
+    least: float
+    small: float
+    large: float
 
 
 AS_WRITTEN = f"if the values are meant as they are written, add a column {UNITS_CHECKED} that says yes"
-METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}")
-RADIANS = Mistaken("deg", "radians", f"Convert to degrees; {AS_WRITTEN}")
+LENGTHS = (*_XYZ, "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
+ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
+METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}", LENGTHS, MIN_SPAN_MM, 2.0, 100.0)
+RADIANS = Mistaken(
+    "deg", "radians", f"Convert to degrees; {AS_WRITTEN}", ANGLES, WIDEST_IN_RADIANS, WIDEST_IN_RADIANS, 30.0
+)
 
 
 def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> ReferenceSet:
@@ -622,15 +523,12 @@ def _documents_beside(path: Path) -> Documents | None:
 
 def _fill_uncertainty(format: Format, fields: Fields) -> None:
     """Half the last digit that the source prints, where the row gives no uncertainty; then plain numbers."""
-    if format.digits:
-        column, digits = format.filled(fields)
-        if fields[column] is None:
-            decimals = [fields[name].decimals for name in digits if fields[name] is not None]
-            fields[column] = 0.5 * 10.0 ** -max(decimals, default=0)
+    column, digits = format.filled(fields)
+    if fields[column] is None:
+        decimals = [fields[name].decimals for name in digits if fields[name] is not None]
+        fields[column] = format.coarse or 0.5 * 10.0 ** -max(decimals, default=0)
     if ORIENTATION_COLUMNS[0] in fields:
         _fill_orientation_uncertainty(fields)
-    if format.coarse and fields["uncertainty_deg"] is None:
-        fields["uncertainty_deg"] = format.coarse
     for name, value in fields.items():
         fields[name] = float(value) if isinstance(value, Written) else value
 
@@ -672,13 +570,12 @@ def _fill_orientation_uncertainty(fields: Fields) -> None:
     if not written:
         fields["uncertainty_deg"] = 0.0
     elif fields["uncertainty_deg"] is None and not any(_position_faults(fields)):
-        values = np.array([fields[name] for name in written[0]])
-        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in written[0])
-        if written[0] in (_QUATERNION, _MATRIX):
+        form, values = written[0], np.array([fields[name] for name in BY_ROW[written[0]]])
+        half = 0.5 * 10.0 ** -max(fields[name].decimals for name in BY_ROW[form])
+        if not form.endswith("_deg"):
             half = min(half, NOT_RIGID)  # 0 and 1 alone are no rounded numbers, which would not be rigid to this
-        R = rotation_of(written[0], values)
-        turned = [rotation_of(written[0], values + step) @ R.T for step in half * np.eye(len(values))]
-        fields["uncertainty_deg"] = float(np.abs(rotation_vectors_deg(np.array(turned))).sum(axis=0).max())
+        turned = rotations(form, values + half * np.eye(len(values)), math.inf) @ _rotation(form, fields).T
+        fields["uncertainty_deg"] = float(np.abs(rotation_vectors_deg(turned)).sum(axis=0).max())
 
 
 def _check_row(path: Path, format: Format, fields: Fields) -> None:
@@ -699,36 +596,26 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
     """Reject values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
-    _check_span(path, table, LENGTHS, MIN_SPAN_MM, METRES)
-    if format.mixed_lengths:
-        _check_mixed(path, table, LENGTHS, SHORTEST_BESIDE_LONG_MM, LONG_MM, METRES)
-    if format.mixed_limits:
-        _check_mixed(path, table, ANGLES, WIDEST_IN_RADIANS, WIDE_DEG, RADIANS)
+    for mistaken in (METRES, RADIANS):
+        _check_sizes(path, table, mistaken, format.mixed)
     if _POSE[0] in format.columns:
         _check_angles(path, table)
-    _check_span(path, table, ANGLES, WIDEST_IN_RADIANS, RADIANS)
 
 
-def _check_span(path: Path, table: list[Fields], columns: tuple[str, ...], least: float, mistaken: Mistaken) -> None:
-    """Reject a table whose values are all too small."""
-    present = [column for column in columns if column in table[0]]
-    largest = max(_sizes(table, present))
-    if "length" not in table[0] and 0 < largest < least:
-        problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
-        raise InputError(path, f"columns {', '.join(present)}", problem, mistaken.remedy)
-
-
-def _check_mixed(
-    path: Path, table: list[Fields], columns: tuple[str, ...], least: float, most: float, mistaken: Mistaken
-) -> None:
-    """Reject a row of small values beside rows of large ones."""
-    present = [column for column in columns if column in table[0]]
+def _check_sizes(path: Path, table: list[Fields], mistaken: Mistaken, mixed: bool) -> None:
+    """Reject a table whose values are all too small, and a row of small values among large ones."""
+    present = [column for column in mistaken.columns if column in table[0]]
+    columns = f"columns {', '.join(present)}"
     sizes = _sizes(table, present)
+    largest = max(sizes)
+    if "length" not in table[0] and 0 < largest < mistaken.least:
+        problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
+        raise InputError(path, columns, problem, mistaken.remedy)
     for fields, size in zip(table, sizes):
-        if 0 < size < least and max(sizes) > most:
-            beside = f"{size:g} {mistaken.unit} at most beside up to {max(sizes):g} {mistaken.unit} in other rows"
-            where = f"row {fields['row']}, columns {', '.join(present)}"
-            raise InputError(path, where, f"{beside} looks like {mistaken.other}", mistaken.remedy)
+        if mixed and 0 < size < mistaken.small and largest > mistaken.large:
+            problem = f"{size:g} {mistaken.unit} at most, with up to {largest:g} {mistaken.unit} in other rows,"
+            where = f"row {fields['row']}, {columns}"
+            raise InputError(path, where, f"{problem} looks like {mistaken.other}", mistaken.remedy)
 
 
 def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
@@ -739,7 +626,7 @@ def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
 def _check_angles(path: Path, table: list[Fields]) -> None:
     """Reject poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
     all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
-    if all_small and _COORDINATES[0] in table[0]:
+    if all_small and _XYZ[0] in table[0]:
         _check_arcs(path, table)
     for fields in table:
         for column in (*_POSE, *(each for each in _FURTHER if fields[each] is not None)):
@@ -755,10 +642,10 @@ def _check_angles(path: Path, table: list[Fields]) -> None:
 def _check_arcs(path: Path, table: list[Fields]) -> None:
     """Reject points that move by more than joints that turn so little can move them."""
     first: dict[tuple[str, str], Fields] = {}
-    whole = [row for row in table if all(row[column] is not None for column in _COORDINATES)]
+    whole = [row for row in table if all(row[column] is not None for column in _XYZ)]
     for row in whole:
         start = first.setdefault((row.get("point", "point"), row["source"]), row)
-        point, other = (np.array([each[column] for column in _COORDINATES]) for each in (start, row))
+        point, other = (np.array([each[column] for column in _XYZ]) for each in (start, row))
         turned = sum(abs((row[column] or 0.0) - (start[column] or 0.0)) for column in (*_POSE, *_FURTHER))
         moved, longest = np.linalg.norm(other - point), LONGEST_ARM * max(map(np.linalg.norm, (point, other)))
         if turned and moved > longest * math.radians(turned):

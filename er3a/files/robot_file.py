@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import fields
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
@@ -221,22 +220,29 @@ class Weight(Sourced):
     kg: Positive
 
 
-TURNING = ("armature_kg_m2", "coulomb_n_m", "viscous_n_m_s_rad", "rated_n_m", "peak_n_m")
-SLIDING = ("armature_kg", "coulomb_n", "viscous_n_s_m", "rated_n", "peak_n")
+DRIVE_UNITS = {
+    "armature": ("kg_m2", "kg"),
+    "coulomb": ("n_m", "n"),
+    "viscous": ("n_m_s_rad", "n_s_m"),
+    "rated": ("n_m", "n"),
+    "peak": ("n_m", "n"),
+    "gear_ratio": ("", ""),
+}
+"""Fields of :class:`er3a.robots.masses.Drives` with their units in a file, of joints that turn and that slide."""
 
 
-def drive_field(key: str) -> str:
-    """The field of :class:`er3a.robots.masses.Drives` that a key of a drive's row gives.
+def drive_keys(slides: bool) -> dict[str, str]:
+    """Keys of a drive's row by the field of :class:`er3a.robots.masses.Drives`.
 
     Parameters
     ----------
-    key : with its unit, such as ``coulomb_n_m`` or, of a joint that slides, ``coulomb_n``
+    slides : whether the joint slides
 
     Returns
     -------
-    field : the name without unit, such as ``coulomb``
+    keys : with their unit, such as ``coulomb_n_m`` or, of a joint that slides, ``coulomb_n``
     """
-    return next(field.name for field in fields(Drives) if key.startswith(field.name))
+    return {name: f"{name}_{units[slides]}".rstrip("_") for name, units in DRIVE_UNITS.items()}
 
 
 def check_masses(drives: DriveGroup | None, wrist: WristLoadGroup | None, slides: Sequence[bool]) -> None:
@@ -265,11 +271,12 @@ def check_masses(drives: DriveGroup | None, wrist: WristLoadGroup | None, slides
                 f"wrist_load.rows[{i}]: joint {about.joint} is prismatic | Give moments about revolute joints only"
             )
     for i, row in enumerate(drives.rows if drives else []):
-        wrong = [key for key in (TURNING if slides[row.joint - 1] else SLIDING) if getattr(row, key) is not None]
-        if wrong:
-            kind = "slides" if slides[row.joint - 1] else "turns"
-            remedy = f"Write {(SLIDING if slides[row.joint - 1] else TURNING)[0]} and the like"
-            raise ValueError(f"drives.rows[{i}].{wrong[0]}: joint {row.joint} {kind} | {remedy}")
+        sliding = slides[row.joint - 1]
+        own = drive_keys(sliding)
+        wrong = {*drive_keys(not sliding).values()} - {*own.values()}
+        if given := [key for key in wrong if getattr(row, key) is not None]:
+            problem = f"drives.rows[{i}].{min(given)}: joint {row.joint} {'slides' if sliding else 'turns'}"
+            raise ValueError(f"{problem} | Write {own['armature']} and the like")
         peak, rated = row.peak_n_m or row.peak_n, row.rated_n_m or row.rated_n
         if peak and rated and peak < rated:
             raise ValueError(f"drives.rows[{i}]: the peak {peak:g} is below the rated {rated:g} | Swap them")
@@ -342,11 +349,11 @@ def _at_zero(robot: Robot, links: np.ndarray) -> np.ndarray:
 
 
 def _drives(robot: Robot, group: DriveGroup) -> Drives:
-    columns = {field.name: np.full(robot.joints, np.nan) for field in fields(Drives)}
+    columns = {name: np.full(robot.joints, np.nan) for name in DRIVE_UNITS}
     for row in group.rows:
-        for key in (*(SLIDING if robot.slides[row.joint - 1] else TURNING), "gear_ratio"):
+        for name, key in drive_keys(bool(robot.slides[row.joint - 1])).items():
             own = getattr(row, key)
-            columns[drive_field(key)][row.joint - 1] = np.nan if own is None else own
+            columns[name][row.joint - 1] = np.nan if own is None else own
     return Drives(**columns)
 
 
@@ -751,6 +758,27 @@ class RobotFile(InputFile):
         return self
 
     @model_validator(mode="after")
+    def _coupling_complete(self):
+        if self.coupling is None:
+            return self
+        joints, coupled = len(self.limits.rows), [row.row for row in self.coupling.rows]
+        if len(set(coupled)) != len(coupled):
+            raise ValueError("coupling.rows: a row is named twice | Write one line for each row of the table")
+        for i, row in enumerate(self.coupling.rows):
+            _check_listed(f"coupling.rows[{i}]", row.joints, joints)
+            if row.row > len(self.dh.rows):
+                raise ValueError(f"coupling.rows[{i}].row: the table has no row {row.row} | Name one of dh.rows")
+        if missing := [row for row in range(joints + 1, len(self.dh.rows) + 1) if row not in coupled]:
+            raise ValueError(f"coupling.rows: no joint moves row {missing[0]} of the table | Add a line for it")
+        matrix = coupling_matrix(self.coupling, len(self.dh.rows), joints)
+        if np.linalg.matrix_rank(matrix) < joints:
+            problem = "coupling.rows: joints move nothing by themselves"
+            raise ValueError(
+                f"{problem} | Let each of the {joints} joints move the rows in a way that the others can't"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _types_agree(self):
         for i, (row, zero) in enumerate(zip(self.dh.rows, self.zero.rows)):
             wanted = row.type == "revolute"
@@ -778,39 +806,14 @@ class RobotFile(InputFile):
             raise ValueError("inertia.origins: not one for each joint | Write the origin of each joint of the table")
         return self
 
-    @model_validator(mode="after")
-    def _coupling_complete(self):
-        if self.coupling is None:
-            return self
-        joints, coupled = len(self.limits.rows), [row.row for row in self.coupling.rows]
-        if len(set(coupled)) != len(coupled):
-            raise ValueError("coupling.rows: a row is named twice | Write one line for each row of the table")
-        for i, row in enumerate(self.coupling.rows):
-            _check_listed(f"coupling.rows[{i}]", row.joints, joints)
-            if row.row > len(self.dh.rows):
-                raise ValueError(f"coupling.rows[{i}].row: the table has no row {row.row} | Name one of dh.rows")
-        if missing := [row for row in range(joints + 1, len(self.dh.rows) + 1) if row not in coupled]:
-            raise ValueError(f"coupling.rows: no joint moves row {missing[0]} of the table | Add a line for it")
-        matrix = coupling_matrix(self.coupling, len(self.dh.rows), joints)
-        if np.linalg.matrix_rank(matrix) < joints:
-            problem = "coupling.rows: joints move nothing by themselves"
-            raise ValueError(
-                f"{problem} | Let each of the {joints} joints move the rows in a way that the others can't"
-            )
-        return self
-
     @property
     def slides(self) -> list[bool]:
         """Whether each joint is a distance; see :attr:`er3a.robots.robot.Robot.slides`."""
-        prismatic = {row.joint for row in self.dh.rows if row.type == "prismatic"}
-        moved_by = {row.joint: {row.joint} for row in self.dh.rows}
-        for row in self.coupling.rows if self.coupling else ():
-            moved_by[row.row] = {joint for joint, factor in zip(row.joints, row.factors) if factor}
-        found = []
-        for joint in range(1, len(self.limits.rows) + 1):
-            rows = {joint} if joint in moved_by.get(joint, ()) else {row for row, by in moved_by.items() if joint in by}
-            found.append(bool(rows & prismatic))
-        return found
+        sliding = np.array([row.type == "prismatic" for row in self.dh.rows])
+        joints = len(self.limits.rows)
+        moves = coupling_matrix(self.coupling, len(sliding), joints) if self.coupling else np.eye(len(sliding), joints)
+        moved = (moves[sliding] != 0).any(axis=0)
+        return [bool(each) for each in np.where(moves.diagonal() != 0, sliding[:joints], moved)]
 
     @model_validator(mode="after")
     def _check_links(self):

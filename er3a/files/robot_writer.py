@@ -18,11 +18,9 @@ from er3a.files.robot_file import (
     MIN_LONGEST_MM,
     RESIDUE_MM,
     SHORTEST_PLAIN_LENGTH_MM,
-    SLIDING,
-    TURNING,
     BodyFields,
     RobotFile,
-    drive_field,
+    drive_keys,
     link_visual,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
@@ -71,9 +69,8 @@ def _link(link: int, body: MassBody) -> dict[str, Any]:
 def _drive(robot: Robot, k: int) -> dict[str, float]:
     drives = robot.masses.drives
     assert drives is not None
-    keys = SLIDING if robot.slides[k] else TURNING
-    named = {key: getattr(drives, drive_field(key)) for key in (*keys, "gear_ratio")}
-    return {key: float(column[k]) for key, column in named.items() if np.isfinite(column[k])}
+    named = {key: getattr(drives, name)[k] for name, key in drive_keys(bool(robot.slides[k])).items()}
+    return {key: float(value) for key, value in named.items() if np.isfinite(value)}
 
 
 _UNKNOWN = Source("not stated", "inferred")
@@ -92,26 +89,15 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         source = robot.sources.get(group, _UNKNOWN)
         return {"source": source.source, "grade": source.grade, "origin": source.origin or None}
 
-    def rows(group: str, **columns: np.ndarray) -> list[dict]:
-        return [
-            {
-                "joint": k + 1,
-                **{key: _tidy(values[k]) for key, values in columns.items()},
-                **_origins(robot, group, k + 1),
-            }
-            for k in range(len(next(iter(columns.values()))))
-        ]
-
-    a_mm, d_mm = robot.a * 1000, robot.d * 1000
-    lengths = np.abs(np.concatenate([a_mm, d_mm]))
-    zero_rows = rows("zero", offset_deg=np.degrees(robot.offset))
-    for row, direction, sliding in zip(zero_rows, robot.direction, robot.sliding):
-        row["direction"] = int(direction)
-        row["offset_deg"] = None if sliding else row["offset_deg"]
-    dh_rows = rows("dh", a_mm=a_mm, alpha_deg=np.degrees(robot.alpha), d_mm=d_mm)
-    for row, beta, sliding, offset in zip(dh_rows, robot.beta, robot.sliding, robot.offset):
-        row["beta_deg"] = _tidy(np.degrees(beta)) or None
-        row |= {"type": "prismatic", "theta_deg": _tidy(np.degrees(offset))} if sliding else {}
+    zero_rows, dh_rows = list[dict[str, Any]](), list[dict[str, Any]]()
+    for k, sliding in enumerate(robot.sliding):
+        angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
+        zero = {"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]}
+        zero_rows.append({"joint": k + 1, **zero, **_origins(robot, "zero", k + 1)})
+        row = {"a_mm": _tidy(robot.a[k] * 1000), "alpha_deg": angles["alpha"], "d_mm": _tidy(robot.d[k] * 1000)}
+        row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
+        dh_rows.append({"joint": k + 1, **row, "beta_deg": angles["beta"] or None, **_origins(robot, "dh", k + 1)})
+    lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
     content = {
         "kind": "robot",
         "name": robot.name,
@@ -177,22 +163,21 @@ def _speed_rows(robot: Robot) -> list[dict]:
 
 def _limit_rows(robot: Robot) -> list[dict]:
     found = []
-    ends = zip(shown(robot, robot.lower), shown(robot, robot.upper), robot.slides, robot.continuous)
-    for k, (lower, upper, sliding, continuous) in enumerate(ends):
-        unit = "mm" if sliding else "deg"
-        limits = {"continuous": True} if continuous else {f"lower_{unit}": _tidy(lower), f"upper_{unit}": _tidy(upper)}
+    for k, (lower, upper) in enumerate(zip(robot.lower, robot.upper)):
+        limits = {"continuous": True} if robot.continuous[k] else _ends(lower, upper, robot.slides[k])
         found.append({"joint": k + 1, **limits, **_origins(robot, "limits", k + 1)})
     return found
 
 
+def _ends(lower: float, upper: float, slides: bool) -> dict[str, Any]:
+    """Limits (m or rad) in the units of a file."""
+    unit, scale = ("mm", 1000.0) if slides else ("deg", np.degrees(1.0))
+    return {f"lower_{unit}": _tidy(scale * lower), f"upper_{unit}": _tidy(scale * upper)}
+
+
 def _combined_row(robot: Robot, limit: CombinedLimit) -> dict:
-    joints = np.flatnonzero(limit.factors)
-    sliding = robot.slides[joints].all()
-    unit, scale = ("mm", 1000.0) if sliding else ("deg", np.degrees(1.0))
-    return _weighted(np.array(limit.factors)) | {
-        f"lower_{unit}": _tidy(scale * limit.lower),
-        f"upper_{unit}": _tidy(scale * limit.upper),
-    }
+    slides = bool(robot.slides[np.flatnonzero(limit.factors)].all())
+    return _weighted(np.array(limit.factors)) | _ends(limit.lower, limit.upper, slides)
 
 
 def _coupling_rows(coupling: np.ndarray) -> list[dict]:

@@ -122,12 +122,7 @@ def latex_grids(text: str) -> list[Grid]:
 
 
 def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
-    """A text's lines cut into cells, by each separator that is in it.
-
-    Yields
-    ------
-    mark, grid : a separator, and the lines cut by it; lines without it have one cell
-    """
+    """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
     text = plain(text)
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
     lines = [
@@ -140,13 +135,13 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
             yield mark, _delimited(text, mark)
         elif mark.isspace():
             yield mark, [(number, _spaced(without_latex(line), mark)) for number, line in lines]
-        elif mark in text:
+        else:
             yield mark, [(number, _edged(line, mark)) for number, line in lines]
 
 
 def _edged(line: str, mark: str) -> list[str]:
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
-    return cells[not cells[0] : len(cells) - (not cells[-1])] if len(cells) > 1 else cells
+    return cells[not cells[0] : len(cells) - (not cells[-1])]
 
 
 def _delimited(text: str, mark: str) -> Grid:

@@ -444,16 +444,16 @@ def _lists(code: Code) -> dict[str, list[str]]:
 
 def _vectors(code: Code) -> list[Grid]:
     """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
-    named: dict[str, tuple[str, list[str]]] = {}
+    named: dict[str, list[str]] = {}
     for name, cells in _lists(code).items():
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         if heading and len(cells) > 1:
-            named[heading.quantity if heading.quantity not in named else name] = (name, cells)
+            named.setdefault(heading.quantity, cells)
     if not {"a", "alpha", "d"} <= {*named}:
         return []
-    length = len(named["alpha"][1])
-    columns = {quantity: cells for quantity, (_, cells) in named.items() if len(cells) == length}
-    if not {"a", "alpha", "d"} <= {*columns} or len(named["d"][1]) != len(named["a"][1]):
+    length = len(named["alpha"])
+    columns = {quantity: cells for quantity, cells in named.items() if len(cells) == length}
+    if not {"a", "alpha", "d"} <= {*columns}:
         return []
     if any(re.sub(r"[0.,()\s]", "", cell) and not re.search(r"[^\W\d]", cell) for cell in columns.pop("theta", [])):
         problem = "the list theta may hold zeros of the joints, or a pose"

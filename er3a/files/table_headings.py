@@ -6,56 +6,21 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from er3a.files.arithmetic import UNITS, plain
+from er3a.files.arithmetic import UNITS, plain, words_of
 
-QUANTITIES = ("joint", "theta", "d", "a", "alpha", "offset", "beta", "type")
-_JOINT = {"joint", "joints", "link", "links", "axis", "i", "j", "n", "no", "no.", "#", "frame", "gelenk", "achse"}
-_JOINT |= {"jointi", "linki", "jointno", "jointno.", "linkno", "linkno.", "linknumber", "jointnumber", "kinematics"}
-_JOINT |= {
-    "关节",
-    "连杆",
-    "轴",
-    "序号",
-    "关节序号",
-    "关节号",
-    "连杆序号",
-    "关节i",
-    "连杆i",
-    "杆件",
-    "joint#",
-    "link#",
-    "articulation",
-}
-_NAMES = {"a": "a", "r": "a", "l": "a", "d": "d", "q": "theta", "th": "theta", "t": "", "offset": "offset"}
-_NAMES |= {"type": "type", "jointtype": "type", "sigma": "type", "σ": "type", "类型": "type", "theta0": "offset"}
-_NAMES |= {"θ0": "offset", "offsets": "offset", "relativeoffset": "offset"}
-_WORDS = (
-    ("angleoffset", "offset"),
-    ("thetaoffset", "offset"),
-    ("offsettheta", "offset"),
-    ("θoffset", "offset"),
-    ("θ,offset", "offset"),
-    ("theta,offset", "offset"),
-    ("linklength", "a"),
-    ("连杆长", "a"),
-    ("杆长", "a"),
-    ("linkoffset", "d"),
-    ("jointoffset", "d"),
-    ("jointdistance", "d"),
-    ("偏距", "d"),
-    ("偏移", "d"),
-    ("偏置", "d"),
-    ("α", "alpha"),
-    ("alpha", "alpha"),
-    ("twist", "alpha"),
-    ("扭", "alpha"),
-    ("θ", "theta"),
-    ("theta", "theta"),
-    ("jointangle", "theta"),
-    ("关节角", "theta"),
-    ("转角", "theta"),
-    ("β", "beta"),
-    ("beta", "beta"),
+_JOINT = words_of(
+    "joint joints joint# jointi jointno jointno. jointnumber link links link# linki linkno linkno. linknumber axis "
+    "i j n no no. # frame kinematics gelenk achse articulation "
+    "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
+)
+_NAMES = words_of(
+    "a=a r=a l=a d=d q=theta th=theta t= offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset "
+    "type=type jointtype=type sigma=type σ=type 类型=type"
+)
+_WORDS = words_of(
+    "angleoffset=offset thetaoffset=offset offsettheta=offset θoffset=offset θ,offset=offset theta,offset=offset "
+    "linklength=a 连杆长=a 杆长=a linkoffset=d jointoffset=d jointdistance=d 偏距=d 偏移=d 偏置=d α=alpha alpha=alpha "
+    "twist=alpha 扭=alpha θ=theta theta=theta jointangle=theta 关节角=theta 转角=theta β=beta beta=beta"
 )
 """Each marks a heading that holds it; the first that is found counts."""
 _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
@@ -66,8 +31,9 @@ _BEFORE = re.compile(r"[ijn]-1")
 
 @dataclass(frozen=True)
 class Heading:
-    """``quantity``: one of QUANTITIES; ``unit``: "" where none is printed; ``before``: whether it belongs to the link
-    before the joint, as in Craig's tables; ``sign``: the letter that was printed for a length."""
+    """``quantity``: joint, theta, d, a, alpha, offset, beta or type; ``unit``: "" where none is printed; ``before``:
+    whether it belongs to the link before the joint, as in Craig's tables; ``sign``: the letter that was printed for a
+    length."""
 
     quantity: str
     unit: str
@@ -101,6 +67,6 @@ def heading_of(text: str) -> Heading | None:
     name = re.sub(r"_?[ijn]-1$|(?<=.)_?[ijn]$|\*$|_k$|:$", "", name).replace("_", "")
     if name in _JOINT:
         return Heading("joint", "", False)
-    marked = _NAMES.get(name) or next((quantity for mark, quantity in _WORDS if mark in name), None)
+    marked = _NAMES.get(name) or next((quantity for mark, quantity in _WORDS.items() if mark in name), None)
     marked = marked or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None

@@ -19,7 +19,7 @@ from pydantic import Field, field_validator, model_validator
 
 from er3a.errors import InputError
 from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, read_csv, read_header
-from er3a.files.orientations import FORMS, form_in, rotations
+from er3a.files.orientations import FORMS, POSITION, form_in, rotations
 from er3a.files.robot_file import Name
 from er3a.files.units import JointsDeg, PositionMm, RpyDeg, Triple, joint_values
 from er3a.files.yaml_file import InputFile, StrictModel, check_own_names, load, parse
@@ -28,7 +28,6 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.solutions import Target, TargetOutcome
 from er3a.robots.robot import MAX_JOINTS, Robot
 
-POSITION = ("x_mm", "y_mm", "z_mm")
 KNOWN_FORMS = "; or ".join(", ".join(names[:4]) + (" ..." if len(names) > 4 else "") for names in FORMS.values())
 TEXTS = ("note", "expect")
 REFERENCE = tuple(f"q{joint}_ref_deg" for joint in range(1, MAX_JOINTS + 1))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +24,8 @@ from er3a.numerics.si_units import NEAR_QUARTER, RADIANS_BELOW_DEG, may_be_radia
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import MAX_JOINTS, Robot
 
+IN_SI = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "deg": math.pi / 180, "rad": 1.0}
+"""Metres or radians of a unit, by the names that :data:`er3a.files.arithmetic.UNITS` has."""
 JOINT_COLUMN = re.compile(r"q([1-9]\d?)_(deg|mm)")
 METRES_BELOW_MM = 5.0
 MAX_DISTANCE_MM = 100_000.0
@@ -36,6 +38,30 @@ ROWS_TO_JUDGE_UNITS = 3
 RESIDUE_MM = 1e-3
 SHORTEST_PLAIN_LENGTH_MM = 2.0
 """Lengths between both, of which none is longer, look like metres."""
+
+
+def joint_names(path: Path, header: Iterable[str]) -> tuple[str, ...]:
+    """The columns of joint values in a table.
+
+    Parameters
+    ----------
+    header : names of all columns
+
+    Returns
+    -------
+    names : in the order of the joints; empty without any
+
+    Raises
+    ------
+    InputError
+        if one is missing, or there are two for one joint
+    """
+    found = {name: int(match[1]) for name in header if (match := JOINT_COLUMN.fullmatch(name))}
+    numbers = sorted(found.values())
+    if numbers != list(range(1, len(numbers) + 1)):
+        missing = next((k for k in range(1, max(numbers) + 1) if k not in numbers), numbers[0])
+        raise InputError(path, "header", f"joint {missing} has no column, or two", "Give q1_deg, q2_deg ... once each")
+    return tuple(sorted(found, key=found.__getitem__))
 
 
 def check_millimetres(values: Sequence[float]) -> None:

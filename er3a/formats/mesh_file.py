@@ -40,9 +40,14 @@ def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
         for a file that is not such a mesh, is too large, is not closed, or can only be in the other unit
     """
     path = Path(path)
-    mesh = _closed(path, _loaded(path), 1.0 if unit == "m" else 1e-3)
-    _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
-    return mesh
+    vertices, faces, closed = _surface(_loaded(path), 1.0 if unit == "m" else 1e-3)
+    if not closed:
+        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        loose = int((np.unique(edges, axis=0, return_counts=True)[1] != 2).sum())
+        problem = f"is not closed: {loose} edges don't have two triangles"
+        raise InputError(path, None, problem, "Close its holes, for example in a mesh editor")
+    _check_size(path, float(np.ptp(vertices, axis=0).max()), unit)
+    return ClosedMesh(vertices, faces)
 
 
 def read_link_mesh(path: Path, scale: Reals) -> tuple[Reals, Integers, bool]:
@@ -57,12 +62,7 @@ def read_link_mesh(path: Path, scale: Reals) -> tuple[Reals, Integers, bool]:
         for a file that is not a mesh, is too large, or has a size that no link has
     """
     loaded = _loaded(path)
-    loaded.merge_vertices()
-    loaded.vertices = loaded.vertices * _link_scale(path, loaded, scale)
-    closed = bool(loaded.is_watertight)
-    if closed:
-        loaded.fix_normals()
-    return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
+    return _surface(loaded, _link_scale(path, loaded, scale))
 
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
@@ -120,16 +120,14 @@ def read_stl(path: Path, link: int, checksum: str) -> LinkMesh:
     return link_mesh(link, np.frombuffer(content, STL_TRIANGLE, offset=84)["corners"].astype(float) / 1000)
 
 
-def _closed(path: Path, loaded: Any, scale: float) -> ClosedMesh:
-    """A mesh that must be closed, in metres."""
+def _surface(loaded: Any, scale: Reals | float) -> tuple[Reals, Integers, bool]:
+    """Vertices (V, 3) times ``scale``, and faces (F, 3), outwards if the mesh is closed; and whether it is."""
     loaded.merge_vertices()
-    if not loaded.is_watertight:
-        edges = np.unique(loaded.edges_sorted, axis=0, return_counts=True)[1]
-        problem = f"is not closed: {int((edges != 2).sum())} edges don't have two triangles"
-        raise InputError(path, None, problem, "Close its holes, for example in a mesh editor")
     loaded.vertices = loaded.vertices * scale
-    loaded.fix_normals()
-    return ClosedMesh(np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64))
+    closed = bool(loaded.is_watertight)
+    if closed:
+        loaded.fix_normals()
+    return np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64), closed
 
 
 def _link_scale(path: Path, loaded: Any, scale: Reals) -> Reals:

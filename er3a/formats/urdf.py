@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -33,7 +33,7 @@ from er3a.formats.mesh_file import link_mesh
 from er3a.formats.placeholders import without_placeholders
 from er3a.geometry.transforms import rot_z, rpy_of
 from er3a.kinematics.chain import constant_links
-from er3a.kinematics.forward import forward, frames
+from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import MAX_JOINTS, ConvexPiece, Envelope, LinkMesh, Robot, Source, robot_name
 
@@ -239,12 +239,8 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     """
     above = {joint.child: joint for joint in found.all.values()}
     place = {found.joints[0].parent: (np.eye(4), 0)}
-    for joint in found.joints:
-        T, number = place[joint.parent]
-        T = T @ joint.T_parent_joint
-        if joint.moves:
-            T, number = T @ _motion(joint, shift[number : number + 1])[0], number + 1
-        place[joint.child] = T, number
+    for joint, _, T in _along(found.joints, shift[None]):
+        place[joint.child] = T[0], place[joint.parent][1] + joint.moves
 
     def placed(name: str, carried: bool = False) -> tuple[Reals, int] | None:
         behind, fixed = np.eye(4), True
@@ -275,21 +271,16 @@ def link_shapes(
     notes : what was left out or changed, in words
     lost : links of which a shape could not be read
     """
-    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     shapes, notes, lost = list[urdf_tree.Shape](), list[str](), list[str]()
-    for link in root.findall("link"):
-        collisions, place = link.findall("collision"), placed(link.get("name", "?"))
+    for name, collisions, place in urdf_tree.in_links(root, robot, placed, "collision"):
         if place is None:
-            if collisions:
-                notes.append(f"link {link.get('name')} does not move with the arm's chain; its shape is left out")
+            notes.append(f"link {name} does not move with the arm's chain; its shape is left out")
             continue
-        T, number = place
         made = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
         for collision in collisions:
-            frame, name = np.linalg.inv(zero[number]) @ T, link.get("name", "?")
             found = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
             try:
-                found = urdf_tree.collision_shapes(path, name, collision, (frame, number), notes)
+                found = urdf_tree.collision_shapes(path, name, collision, place, notes)
             except InputError as error:
                 notes.append(f"link {name} has a shape that is left out ({error})")
             made += found
@@ -323,28 +314,21 @@ def link_visuals(
     surfaces : one for each link that has any, m, simplified to ``DRAWN_TRIANGLES`` in all
     notes : one at most, about geometry that could not be read
     """
-    zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
     missing = dict[str, Er3aError]()
-    for link in root.findall("link"):
-        visuals, place = link.findall("visual"), placed(link.get("name", "?"))
-        if place is None:
-            continue
-        T, number = place
-        T = np.linalg.inv(zero[number]) @ T
-        for visual in visuals:
+    for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
+        T, number = place or (np.eye(4), 0)
+        for visual in visuals if place else ():
             try:
-                points, faces = urdf_tree.visual_surface(path, link.get("name", "?"), visual)
+                points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
-                missing.setdefault(link.get("name", "?"), error)
+                missing.setdefault(name, error)
                 continue
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
     found = []
     for number, meshes in sorted(parts.items()):
-        starts = np.cumsum([0, *(len(points) for points, _ in meshes)])
-        faces = np.concatenate([faces + start for (_, faces), start in zip(meshes, starts)])
-        points = np.concatenate([points for points, _ in meshes])
-        points, faces = simplified(points, faces, DRAWN_TRIANGLES // len(parts))
+        whole = link_mesh(number, np.concatenate([points[faces] for points, faces in meshes]))
+        points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
         used, corners = np.unique(faces, return_inverse=True)
         found.append(LinkMesh(number, points[used], corners.reshape(-1, 3)))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
@@ -378,14 +362,20 @@ def _coupling(
 
 def _axes_at_zero(joints: Sequence[urdf_tree.UrdfJoint], shift: Reals) -> tuple[Reals, Reals, Reals]:
     """Directions and points (m, 3) of the moving axes and the flange (4, 4) with all independent joints at 0."""
-    directions, points, T = [], [], np.eye(4)
+    walk = list(_along(joints, shift[None]))
+    moving = [(joint, before[0]) for joint, before, _ in walk if joint.moves]
+    directions = np.array([T[:3, :3] @ joint.axis for joint, T in moving])
+    return directions, np.array([T[:3, 3] for _, T in moving]), walk[-1][2][0]
+
+
+def _along(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Iterator[tuple[urdf_tree.UrdfJoint, Reals, Reals]]:
+    """Each joint with its frame (N, 4, 4) in the base before and after it moves, for values (N, m) of moving joints."""
+    T, moved = np.tile(np.eye(4), (len(values), 1, 1)), 0
     for joint in joints:
-        T = T @ joint.T_parent_joint
+        before = T = T @ joint.T_parent_joint
         if joint.moves:
-            directions.append(T[:3, :3] @ joint.axis)
-            points.append(T[:3, 3])
-            T = T @ _motion(joint, shift[len(points) - 1 : len(points)])[0]
-    return np.array(directions), np.array(points), T
+            T, moved = before @ _motion(joint, values[:, moved]), moved + 1
+        yield joint, before, T
 
 
 def _motion(joint: urdf_tree.UrdfJoint, values: Reals) -> Reals:
@@ -403,26 +393,23 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
     in degrees."""
     rows, notes, assumed = [], [], []
     for joint in sources:
-        lower, upper = joint.lower, joint.upper
+        lower, upper, turns = joint.lower, joint.upper, joint.type == "revolute"
+        widest = max(abs(lower), abs(upper))
+        none = "no limits" if math.isnan(lower) else "the limits 0 and 0" if lower == upper == 0 else ""
+        none = none or ("limits beyond ten turns (in radians)" if turns and widest > urdf_tree.MAX_TURNED else "")
         if joint.type == "continuous":
             notes.append(f"joint {joint.name} is continuous: one turn is sampled")
             lower, upper = -math.pi, math.pi
-        elif lower == upper == 0 or (math.isnan(lower) and math.isnan(upper)):
-            has = "no limits" if math.isnan(lower) else "the limits 0 and 0"
-            turns = joint.type == "revolute"
+        elif none:
             half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
-            notes.append(f"joint {joint.name} has {has}: +-{shown} were assumed")
+            notes.append(f"joint {joint.name} has {none}: +-{shown} were assumed")
             assumed.append(joint.name)
             lower, upper = -half, half
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > urdf_tree.MAX_TURNED:
-            notes.append(f"joint {joint.name} has limits beyond ten turns (in radians): +-180 deg were assumed")
-            assumed.append(joint.name)
-            lower, upper = -NO_RANGE, NO_RANGE
-        elif joint.type == "revolute" and max(abs(lower), abs(upper)) > MANY_TURNS:
+        elif turns and widest > MANY_TURNS:
             shown = f"{lower:g} to {upper:g} rad"
             notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
             assumed.append(joint.name)
-        elif joint.type == "prismatic" and max(abs(lower), abs(upper)) > MAX_SLID_M:
+        elif not turns and widest > MAX_SLID_M:
             notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
             lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)
         rows.append((lower, upper))
@@ -530,12 +517,7 @@ def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: El
 
 def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Reals:
     """The flange (N, 4, 4) by the URDF's own transforms, for values (N, m) of the moving joints in rad or m."""
-    T, moved = np.eye(4), 0
-    for joint in joints:
-        T = T @ joint.T_parent_joint
-        if joint.moves:
-            T, moved = T @ _motion(joint, values[:, moved]), moved + 1
-    return T
+    return [T for _, _, T in _along(joints, values)][-1]
 
 
 def _unrounded(

@@ -546,25 +546,21 @@ def _within_soft_limits(
     """Limits of a joint, NaN where it has none, held within those of its safety controller, as MoveIt plans."""
     soft, where = joint.find("safety_controller"), f"joint {joint.get('name', '?')}"
     keys = ("soft_lower_limit", "soft_upper_limit")
-    if soft is None or not any(key in soft.attrib for key in keys) or kind not in MOVING:
+    if soft is None or not any(key in soft.attrib for key in keys) or kind not in ("revolute", "prismatic"):
         return limits
-    least, most = (_numbers(path, where, soft, key, (0.0,))[0] for key in keys)
-    said = f"{where} has soft limits {least:g} to {most:g} (safety_controller)"
-    if kind == "continuous":
-        notes.append(f"{said}, but is continuous: they are not kept")
+    least, most = (float(_numbers(path, where, soft, key, (0.0,))[0]) for key in keys)
+    given = (math.nan, math.nan) if limits == (0, 0) else limits
+    lower, upper = float(np.fmax(given[0], least)), float(np.fmin(given[1], most))
+    if (lower, upper) == limits:
         return limits
-    none_given = limits == (0, 0)
-    lower, upper = (least, most) if none_given else (float(np.fmax(limits[0], least)), float(np.fmin(limits[1], most)))
-    if lower >= upper:
-        notes.append(f"{said}, which leave nothing of its limits: they are not kept")
-        return limits
-    if (lower, upper) != limits:
-        notes.append(f"{said}: its limits are held to {lower:g} to {upper:g}")
-    return lower, upper
+    held = f"its limits are held to {lower:g} to {upper:g}"
+    kept = held if lower < upper else "they leave nothing of its limits and are not kept"
+    notes.append(f"{where} has soft limits {least:g} to {most:g} (safety_controller): {kept}")
+    return (lower, upper) if lower < upper else limits
 
 
 def _numbers(
-    path: Path, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
+    path: Path | None, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
 ) -> Reals:
     """Finite numbers of an attribute, as many as its default has; one where it has none and has to be there."""
     text = element.get(key) if element is not None else None
@@ -583,7 +579,7 @@ def _numbers(
     return values
 
 
-def _origin(path: Path, where: str, origin: ElementTree.Element | None) -> tuple[Reals, Reals]:
+def _origin(path: Path | None, where: str, origin: ElementTree.Element | None) -> tuple[Reals, Reals]:
     xyz, rpy = (_numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
     return xyz, rpy
 
@@ -601,6 +597,29 @@ class LinkPlaces(Protocol):
     """Places of links, from :func:`er3a.formats.urdf.link_places`."""
 
     def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
+
+
+def in_links(
+    root: ElementTree.Element, robot: Robot, places: LinkPlaces, tag: str, carried: bool = False
+) -> Iterator[tuple[str, list[ElementTree.Element], tuple[Reals, int] | None]]:
+    """What links of a URDF hold under a tag.
+
+    Parameters
+    ----------
+    robot : the arm with the table derived from the same URDF
+    carried : whether what moves by itself on a link counts as fixed to it
+
+    Yields
+    ------
+    name, elements, place : of each link with such elements; its frame (4, 4) in that of the robot's link, and that
+        link's number; None for a link that does not move with the chain
+    """
+    at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))])
+    for link in root.findall("link"):
+        if elements := link.findall(tag):
+            name = link.get("name", "?")
+            place = places(name, carried)
+            yield name, elements, place and (np.linalg.inv(at_zero[place[1]]) @ place[0], place[1])
 
 
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
@@ -624,31 +643,25 @@ def masses_from_urdf(
     masses, notes : notes name links and what was assumed of them
     changed : links that have another inertia than the file says
     """
-    at_zero = np.concatenate([robot.base[None], frames(robot, np.zeros(robot.joints))[:-1]])
     found: dict[int, list[MassBody]] = {}
     notes: list[str] = []
     changed: list[str] = []
-    for link in root.findall("link"):
-        inertial = link.find("inertial")
-        if inertial is None:
-            continue
-        name = link.get("name", "?")
-        place = places(name, True)
+    for name, inertials, place in in_links(root, robot, places, "inertial", carried=True):
         if place is None:
             notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
             continue
-        body, T = _body(inertial)
-        problem = no_body(body)
-        if problem in ("not_finite", "negative_mass"):
-            notes.append(f"link {name} has {_unusable(inertial)}; its mass was left out")
+        try:
+            body, T = _body(name, inertials[0])
+        except InputError as error:
+            notes.append(f"{error.field}: {error.problem}; its mass was left out")
             continue
-        if problem:
+        if problem := no_body(body):
             given, body = body, nearest_body(body)
             notes.append(_changed(name, problem, given, body))
             changed.append(name)
         if body.mass > 0 or any(body.inertia):
             placed, number = place
-            found.setdefault(number, []).append(moved(body, np.linalg.inv(at_zero[number]) @ placed @ T))
+            found.setdefault(number, []).append(moved(body, placed @ T))
     missing = [name for k, name in enumerate(moving) if k + 1 not in found]
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
@@ -705,26 +718,16 @@ def write_friction(robot: Robot, joint: int, element: ElementTree.Element) -> No
         ElementTree.SubElement(element, "dynamics", written)
 
 
-def _body(inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
+def _body(name: str, inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
     """Mass and inertia about the centre, and the frame of the centre (4, 4) in the link's."""
+    where = f"inertial of link {name}"
     origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
-    moments = [_number(inertia, key) for key in ENTRIES]
-    xyz, rpy = (_triple(origin, key) for key in ("xyz", "rpy"))
-    xx, yy, zz, xy, xz, yz = moments
-    body = MassBody(_number(mass, "value"), (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz))
-    if not np.isfinite([*xyz, *rpy]).all():
-        return MassBody(math.nan), np.eye(4)
-    return body, transform(xyz, rpy)
-
-
-def _unusable(inertial: ElementTree.Element) -> str:
-    """What of an ``<inertial>`` is not a finite number, or that its mass is below 0."""
-    for element in inertial:
-        for key, text in element.items():
-            values = np.array([_float(word) for word in text.split()])
-            if not np.isfinite(values).all() or len(values) != (3 if key in ("xyz", "rpy") else 1):
-                return f"'{text[:60]}' for {key} of its {element.tag}"
-    return f"a mass of {_number(inertial.find('mass'), 'value'):g} kg, which is below 0"
+    xyz, rpy = _origin(None, where, origin)
+    kg = float(_numbers(None, where, mass, "value", (0.0,))[0])
+    if kg < 0:
+        raise InputError(None, where, f"a mass of {kg:g} kg is below 0", "Write it in kg")
+    xx, yy, zz, xy, xz, yz = (float(_numbers(None, where, inertia, key, (0.0,))[0]) for key in ENTRIES)
+    return MassBody(kg, (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz)), transform(xyz, rpy)
 
 
 def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> str:
@@ -752,7 +755,7 @@ def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     """
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
-        np.array([_number(joints[name].find(tag), key, math.nan) for name in names])
+        np.array([_number(joints[name].find(tag), key) for name in names])
         for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
     )
     effort[~(effort > 0)] = np.nan
@@ -763,22 +766,12 @@ def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
 
 
-def _number(element: ElementTree.Element | None, key: str, default: float = 0.0) -> float:
-    text = element.get(key) if element is not None else None
-    return default if text is None else _float(text)
-
-
-def _float(text: str) -> float:
+def _number(element: ElementTree.Element | None, key: str) -> float:
+    """A number that may be missing or none: NaN then."""
     try:
-        return float(text)
+        return float((element.get(key) or "nan") if element is not None else "nan")
     except ValueError:
         return math.nan
-
-
-def _triple(origin: ElementTree.Element | None, key: str) -> Reals:
-    words = (origin.get(key) or "0 0 0").split() if origin is not None else ["0"] * 3
-    values = np.array([_float(word) for word in words])
-    return values if values.shape == (3,) else np.full(3, np.nan)
 
 
 PRISM_SIDES = 24

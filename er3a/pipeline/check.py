@@ -35,7 +35,7 @@ from er3a.files.reference_sets import (
 from er3a.files.robot_file import RobotFile
 from er3a.files.robot_library import URDF, holds_table, load_of, load_robot
 from er3a.files.scene_file import SceneFile, load_scene
-from er3a.files.target_file import POSITION, TargetFile, load_targets, read_targets
+from er3a.files.target_file import TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
 from er3a.pipeline.stages.registry import STAGES
@@ -209,10 +209,10 @@ def _check_table(path: Path) -> str:
     if path.stem not in FORMATS and table_in(path):
         read_dh_table(path, "arm")
         return "a D-H table"
-    if {"name", *POSITION} <= set(header):
+    if {"name", "x_mm"} <= set(header):
         read_targets(path)
         return _WORDS["targets"]
-    if {"q1_deg", "q1_mm", *POSITION} & set(header):
+    if {"q1_deg", "q1_mm", "x_mm"} & set(header):
         read_path_table(path)
         return "a path"
     if path.stem not in FORMATS:

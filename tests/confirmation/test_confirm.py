@@ -14,8 +14,9 @@ from er3a.confirmation.document import controller_set
 from er3a.confirmation.fit import Fitter
 from er3a.confirmation.layers import search
 from er3a.confirmation.pairs import Pairs
-from er3a.confirmation.poses import of_angles, read_pairs
+from er3a.confirmation.poses import read_pairs
 from er3a.errors import Er3aError, InputError
+from er3a.files.orientations import of_angles
 from er3a.files.robot_writer import write_robot
 from er3a.references.predict import state_of
 from er3a.references.reference import quantities_of
@@ -192,8 +193,8 @@ def test_rapid_and_a_recording_are_read(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "field"),
-    [("", "None"), ("a,b\n1,2\n", "header"), ("J1,J2,J3,J4,J5,J6,X,Y,Z\n1,2,3,4,5,6,7,8,x\n", "line 2"),
-     ("J1,J2,J3,J4,J5,J6\n1,2,3,4,5,6\n", "header"), ("J1,J2,J3,J4,J5,J6,X,Y,Z\n1,2\n", "line 2")],
+    [("", "None"), ("a,b\n1,2\n", "header"), ("J1,J2,J3,J4,J5,J6,X,Y,Z\n1,2,3,4,5,6,7,8,x\n", "row 2"),
+     ("J1,J2,J3,J4,J5,J6\n1,2,3,4,5,6\n", "header"), ("J1,J2,J3,J4,J5,J6,X,Y,Z\n1,2\n", "row 2")],
 )  # fmt: skip
 def test_what_cannot_be_read_is_named(text, field, tmp_path):
     path = tmp_path / "bad.csv"

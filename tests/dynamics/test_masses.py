@@ -19,7 +19,7 @@ from er3a.dynamics import arm_model
 from er3a.dynamics.arm_model import capsule_body, estimated_links, filled
 from er3a.dynamics.plausibility import mass_findings
 from er3a.errors import InputError
-from er3a.files.robot_file import SLIDING, TURNING, DriveRow, drive_field
+from er3a.files.robot_file import DriveRow, drive_keys
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.files.robot_writer import write_robot
 from er3a.finding import fact, is_one
@@ -244,9 +244,8 @@ def test_each_field_of_each_drive_reads_back_from_its_key(tmp_path):
     for name, expected in zip(names, values, strict=True):
         np.testing.assert_array_equal(getattr(back, name), expected, err_msg=name)
     keys = {key for key in DriveRow.model_fields if key != "joint"}
-    assert keys == {*TURNING, *SLIDING, "gear_ratio"}
-    for kind in (TURNING, SLIDING):
-        assert sorted(map(drive_field, (*kind, "gear_ratio"))) == sorted(names)
+    assert keys == {*drive_keys(False).values(), *drive_keys(True).values()}
+    assert sorted(drive_keys(False)) == sorted(names)
 
 
 def test_without_pinocchio_the_error_names_the_package(monkeypatch):

@@ -51,7 +51,7 @@ def with_heights(monkeypatch):
     columns = {"height_mm": CsvColumn(Written), "uncertainty_mm": CsvColumn(Written, optional=True)}
     monkeypatch.setitem(GROUPS, "heights", 8)
     monkeypatch.setitem(KINDS, "heights", HeightRow)
-    monkeypatch.setitem(FORMATS, "heights", Format(columns, digits=("height_mm",)))
+    monkeypatch.setitem(FORMATS, "heights", Format(columns))
 
 
 @pytest.mark.usefixtures("with_heights")

@@ -361,9 +361,9 @@ def test_an_inertia_that_no_body_has_leaves_mass_and_centre(tmp_path, random, ma
 @pytest.mark.parametrize(
     ("mass", "xx", "told"),
     [
-        ("-1", "0.02", "link l3 has a mass of -1 kg, which is below 0"),
-        ("heavy", "0.02", "link l3 has 'heavy' for value of its mass"),
-        ("1", "nan", "link l3 has 'nan' for ixx of its inertia"),
+        ("-1", "0.02", "inertial of link l3: a mass of -1 kg is below 0"),
+        ("heavy", "0.02", "inertial of link l3, value: 'heavy' is not a finite number"),
+        ("1", "nan", "inertial of link l3, ixx: 'nan' is not a finite number"),
     ],
 )
 def test_what_is_no_mass_is_left_out_with_a_note(tmp_path, mass, xx, told):

@@ -211,9 +211,7 @@ def _(found: Finding) -> str:
 def _(found: Finding) -> str:
     what = [say(each) for each in found.joints]
     what += [sentence(f"confirm.place_alike#{place}") for place in found.places]
-    for name in found.entries:
-        zero = name.startswith("offset")
-        what.append(sentence("confirm.zero_alike", joint=name.removeprefix("offset")) if zero else name)
+    what += [*(sentence("confirm.zero_alike", joint=joint) for joint in found.zeros), *found.entries]
     return sentence("explains_too", what=tuple(what or [sentence("confirm.nothing")]))
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.files.kept_files import write_text
+from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
@@ -219,17 +220,13 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
         return [(tr("Validate the table."), address)]
-    finding, evidence = results.summary.verdict.finding, results.summary.evidence
+    evidence = results.summary.evidence
+    entries = evidence.entries if evidence else ()
+    unsettled = [each for each in entries if each.status in ("open", "weak", "consistent")]
     steps = []
-    open_ = (
-        [each.entry for each in evidence.entries if each.status in ("open", "weak", "consistent")] if evidence else []
-    )
-    unsettled = [*open_, *getattr(finding, "unbounded", ())] if isinstance(finding, LeftOpen) else open_
-    if any(name.startswith("direction") for name in unsettled):
+    if any(column_of(each.entry) == "direction" for each in unsettled):
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#table-entries"))
-    left = [
-        each for each in dict.fromkeys(unsettled) if each.rstrip("0123456789") in ("a", "alpha", "d", "beta", "offset")
-    ]
+    left = [each.entry for each in unsettled if column_of(each.entry) in (*CONTINUOUS, "beta")]
     if left:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
