@@ -26,7 +26,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.trajectory import KEY_FIGURES, advice, path_text, repair_text, strategy_word
+from er3a.pipeline.messages.trajectory import KEY_FIGURES, path_text, repair_text, strategy_word
 from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import AbsentResults, Stored, Summary, Verdict, read_results, write_results
 from er3a.pipeline.settings import TrajectorySettings
@@ -58,6 +58,7 @@ from er3a.programs.languages import read_program
 from testing.arms import scara
 from testing.on_demand import OnDemand
 from testing.readme import README, answer
+from tests.stages.test_trajectory_faults import advice
 
 ROBOTS = ("er3a_c60", pytest.param("er3_600", marks=pytest.mark.long))
 
@@ -222,7 +223,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
             shown = f"{each.motion.clearance_mm:.0f} ({say(each.motion.clearance_between)})".replace("-", "−")
             assert told[strategy_word(each.name) + (" ←" if each.name == path.strategy else "")] == shown
         assert told["as programmed"].endswith(f"({say(path.clearance.between)})")
-        assert f"{int(10 * path.chosen.motion.clearance_mm) / 10:.1f} mm clear" in advice(path)
+        assert f"{int(10 * path.chosen.motion.clearance_mm) / 10:.1f} mm clear" in repair_text(path)
         stop = tried(path, "stop")
         assert not stop.usable
         assert 0 < stop.motion.done_ratio < 1
@@ -242,7 +243,7 @@ def test_strategies_are_listed_with_their_costs(results, name):
     mended = paths["line_wrist"]
     assert mended.chosen.motion.max_joint_speed_ratio <= mended.max_joint_speed_ratio * (1 + 1e-6)
     assert mended.chosen.motion.max_joint_acceleration_ratio <= mended.max_joint_acceleration_ratio * (1 + 1e-6)
-    assert advice(paths["line_clean"]) is None
+    assert not paths["line_clean"].avoidance
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -355,7 +356,7 @@ def test_page_and_recording_are_written(study, stored, tmp_path):
     assert "line_wrist" in page
     for path in found.results.summary.paths:
         assert (f'"name": "{path.name}, repaired"' in page) == (path.chosen is not None)
-    assert page.count('<img src="data:image/svg+xml') == len(found.results.summary.paths) + 1
+    assert page.count('<img src="data:image/svg+xml') == len(found.results.summary.paths)
     assert (tmp_path / "trajectory.rrd").stat().st_size > 100_000
 
 

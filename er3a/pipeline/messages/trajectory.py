@@ -16,7 +16,7 @@ from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RateCause, rate_ratio
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import StrategyName
 
 KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
@@ -59,8 +59,6 @@ FACTS: dict[FactName, str] = {
     "end": N_("where it may end"),
 }
 """What is said of a motion to be run instead, beside what it is."""
-OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
-"""Of paths that may be safe all the same, if nothing that is undecided is against it."""
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
@@ -389,25 +387,6 @@ class Slowed(NamedTuple):
     part: float
 
 
-def advice(
-    path: model.PathSummary,
-    limits: model.LimitsUsed | None = None,
-    *,
-    shapes: Finding | None = None,
-    slowed: Slowed | None = None,
-) -> str | None:
-    """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
-    named; ``shapes``: that clearance is that of assumed ones; ``slowed``: where a motion that repairs it is slower."""
-    if not path.avoidance:
-        return None
-    if path.chosen:
-        return joined([repair_text(path, limits, shapes=shapes, slowed=slowed), whole_pace(path)], ". ")
-    only = path.avoidance[0] if len(path.avoidance) == 1 else None
-    if only and only.name != "planned":
-        return no_repair(path)
-    return joined([no_repair(path), _until(path), _of_end(path, shapes)], ". ")
-
-
 def no_repair(path: model.PathSummary) -> str:
     """Why no strategy repairs a path."""
     if len(path.avoidance) == 1:
@@ -423,14 +402,6 @@ def no_repair(path: model.PathSummary) -> str:
         causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))
     return _within_reach(path) or sentence("advice.none", why=why)
-
-
-def _of_end(path: model.PathSummary, shapes: Finding | None) -> str:
-    """That the clearance up to where a path may be run is that of assumed shapes; empty where none is named."""
-    end, last = path.sound_end, path.clear_until
-    if end is None or last is None or end.t_s < last.t_s or path.unreachable:
-        return ""
-    return _of_assumed(last.margin_mm, shapes)
 
 
 def _of_assumed(clearance_mm: float, shapes: Finding | None) -> str:
@@ -498,16 +469,10 @@ def reasons(tried: model.TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def repair_text(
-    path: model.PathSummary,
-    limits: model.LimitsUsed | None = None,
-    *,
-    shapes: Finding | None = None,
-    slowed: Slowed | None = None,
-) -> str:
-    """All that is said of the strategy that was chosen; arguments as of :func:`advice`."""
-    facts = repair_facts(path, limits, shapes)
-    return joined([repair_lead(path, slowed), *(text for _, text in facts)], ". ")
+def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str:
+    """All that is said of the strategy that was chosen; ``limits``: of the joints, whose assumed ones are named."""
+    facts = repair_facts(path, limits, None)
+    return joined([repair_lead(path), *(text for _, text in facts), whole_pace(path)], ". ")
 
 
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:

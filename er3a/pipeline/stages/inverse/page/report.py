@@ -22,10 +22,9 @@ from er3a.pipeline.messages.inverse import (
     SHAPES,
     limits_in_short,
 )
-from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
-from er3a.pipeline.messages.numbers import fixed, no_noise, number
-from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import pair_words
+from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
@@ -143,7 +142,6 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
-    rules = list(dict.fromkeys(results.rankings.rule))
     names = results.solutions.target
 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
@@ -157,17 +155,14 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         _answer(summary, chosen),
         nearest_rule=tr(NEAREST_RULE),
         overview=[overview_row(robot, target, of_target(target)) for target in chosen],
-        sections=[_section(robot, target, results, rules, contradicted) for target in chosen],
+        sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
         chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
-        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules), tr("Clearance between")],
         trips=trips,
-        rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
-        mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
         stops=_stops(summary.sequence, {target.name for target in chosen}),
         move=_move_rule(robot, summary.sequence),
     )
@@ -206,11 +201,9 @@ def _row(target: model.TargetResult) -> ListRow:
 def _section(
     robot: Robot,
     target: model.TargetResult,
-    results: model.InverseResults,
-    rules: list[str],
+    rows: model.SolutionRows,
     contradicted: bool,
 ) -> dict[str, Any]:
-    rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
     own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return dict(
@@ -226,7 +219,6 @@ def _section(
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
-        rules=rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
@@ -238,38 +230,6 @@ def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
     return best.take(np.argsort(best.branch, kind="stable"))
 
 
-def _rule(rule: str) -> str:
-    return word("rule", RULE_NAMES, rule)
-
-
-def _rule_heading(robot: Robot, rule: str) -> str:
-    unit = next((own.unit_of(robot) for name, own in RULES.items() if name == rule), "1")
-    return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
-
-
-def _measure(rule: str, value: float) -> str:
-    """What a rule ranks by, in the decimals that matter in its unit."""
-    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
-    decimals = 3 if rule == "manipulability" else 2 if unit in ("1", "s") else 1
-    return "∞" if np.isinf(value) else fixed(no_noise(value), decimals)
-
-
-def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
-    """One row for each branch: the measure of each rule, with its place, and the pair that has the clearance; a dash
-    for a rule that this target lacks."""
-    rows, collides = [], tr("collides")
-    for branch in np.unique(ranked.branch):
-        own = ranked.take(ranked.branch == branch)
-        cells = {
-            rule: f"{_measure(rule, measure)}{NO_BREAK_SPACE}({place or collides})"
-            for rule, measure, place in zip(own.rule, own.measure, own.place)
-        }
-        pair = next((label for label in own.between if label), "")
-        cells_shown = (cells.get(rule, "–") for rule in rules)
-        rows.append([_on_one_line(own.label[0], int(branch)), *cells_shown, pair_words(pair) if pair else "–"])
-    return rows
-
-
 def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
     texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
@@ -279,42 +239,15 @@ def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[
 
 
 def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
-    text = _curve(robot, family)
-    if family.dimension > 1:
-        return tr(
-            "{text}; this is one curve of a surface of solutions, on which the arm can move in {count} ways at once "
-            "and stay on the target",
-            text=text,
-            count=family.dimension,
-        )
-    return text
-
-
-def _curve(robot: Robot, family: model.SelfMotion) -> str:
-    of_slide = f"{NO_BREAK_SPACE}mm/°"
-    moving = [
-        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}{of_slide if robot.slides[j] else ''}"
-        for j, rate in enumerate(family.direction)
-        if abs(rate) > 1e-9
-    ]
-    low, high = family.range_deg
-    parts = {
-        "where": word("self_motion", FREE_AT, family.kind),
-        "joints": with_unit(f"({_listed(family.q0_deg)})", _units(robot), NO_BREAK_SPACE),
-        "rates": joined(moving, ", "),
-    }
-    if not family.within_limits:
-        return tr(
-            "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, but "
-            "every member leaves the limits",
-            **parts,
-        )
+    low, high = (fixed(end, 1) for end in family.range_deg)
     return tr(
-        "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, for {low} "
-        "to {high} deg",
-        low=fixed(low, 1),
-        high=fixed(high, 1),
-        **parts,
+        "{where}: the arm can move about ({joints}) {units} with the tool at rest, {room}",
+        where=word("self_motion", FREE_AT, family.kind),
+        joints=_listed(family.q0_deg),
+        units=_units(robot),
+        room=tr("for {low} to {high} deg", low=low, high=high)
+        if family.within_limits
+        else tr("but every member leaves the limits"),
     )
 
 
@@ -351,8 +284,7 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
 
 
 def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
-    """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
-    unreached = target.obstacle if not target.solutions else None
+    """The cells of a target with its ``rows``: name, place, branches, what is chosen, and its clearance."""
     near = target.clearance
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
@@ -360,7 +292,6 @@ def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionR
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
         tr("none") if target.chosen_deg is None else _chosen(robot, target, rows),
         tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
-        say(unreached or target.reason),
     ]
 
 

@@ -19,11 +19,9 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label, clearance_panels, svg_data_uri
-from er3a.pipeline.viewing.page import Picture
+from er3a.pipeline.viewing.figures import axis_label, svg_data_uri
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -249,39 +247,3 @@ def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
             )
     handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
     return handles
-
-
-Measured = tuple[model.PathSummary, model.MinClearance]
-
-
-def clearance_picture(results: model.TrajectoryResults, most: int) -> Picture | None:
-    """Clearance over time of at most so many paths, those with the smallest; None if no path can be reached."""
-    paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
-    if not paths:
-        return None
-    colliding = [path.name for path, _ in paths if path.collisions]
-    if colliding:
-        names = joined(colliding, ", ")
-        caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
-    else:
-        caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
-    if any(path.unreachable for path, _ in paths):
-        caption = joined([caption, tr("Grey: not reachable.")], " ")
-    drawn = sorted(paths, key=lambda measured: measured[1].least_mm)[:most] if len(paths) > most else paths
-    if len(paths) > most:
-        caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
-    alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    return Picture(_curves(drawn, results.clearance), alt, caption)
-
-
-def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
-    figure, panels = clearance_panels(rows, [path.name for path, _ in paths])
-    for (ax, _), (path, smallest) in zip(panels, paths):
-        colour = palette.VERDICTS["fail"] if smallest.least_mm <= 0 else palette.INK
-        ax.plot(smallest.t_s, smallest.least_mm, "o", color=colour, markersize=4)
-        for gap in path.unreachable:
-            ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
-        ax.set_xlim(0, path.duration_s)
-    low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
-    panels[0][0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
-    return figure

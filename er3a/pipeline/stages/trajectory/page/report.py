@@ -11,7 +11,6 @@ import numpy as np
 
 from er3a.collision.pairs import Pair
 from er3a.pipeline.language import N_, tr, using, with_unit
-from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
@@ -20,8 +19,6 @@ from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.trajectory import (
     adjoined,
     cause_text,
-    event_distance,
-    event_word,
     kind_word,
     limits_assumed,
     path_text,
@@ -34,7 +31,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
+from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     kinds,
@@ -89,8 +86,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         compared_with_tray=compared_with_tray,
         faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
-        clearance=clearance_picture(results, count),
-        solids=solid_rows(scene),
         assumed=assumed,
         assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
@@ -239,12 +234,10 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         expected=as_expected(path),
-        text=joined([path_text(path), say(near) if near else ""]),
         distance=_clear_of(path, assumed),
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
-        events=[_event_row(path, event) for event in path.singularities],
         faults=_faults(path),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
@@ -393,11 +386,3 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
     unit = " mm/s" if joint + 1 in path.sliding else ""
     return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
-
-
-def _event_row(path: model.PathSummary, event: model.Singularity) -> list[str]:
-    until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
-    when = moment(path.name, event.t_s, fixed(event.t_s, 3) + until)
-    if event.crossing:
-        return [event_word(event), when, tr("meets it"), "0"]
-    return [event_word(event), when, tr("passes by"), event_distance(event)]

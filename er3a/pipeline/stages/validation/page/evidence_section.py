@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import asdict, dataclass
 from itertools import combinations, product
 from math import pi
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 
 from er3a.finding import is_one
 from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.identifiability.entries import column_of
-from er3a.identifiability.entry_evidence import EntryEvidence, OtherReading, Status
+from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
@@ -38,19 +37,6 @@ MARKS: Mapping[Status, str] = {
 }
 CONFIRMED = ("settled", "settled_up_to_signs")
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
-VERDICTS: Mapping[str, Mapping[Status, str]] = {  # in the three words that a reader of the index needs
-    N_("confirmed"): {
-        "settled": "",
-        "settled_up_to_signs": N_("as long as the open entries are right"),
-    },
-    N_("nothing to confirm"): {"gauge": N_("only the sum counts")},
-    N_("not confirmed"): {
-        "weak": N_("too loosely"),
-        "consistent": N_("the only document that gives the value agrees with it, but confirms none of its own values"),
-        "open": N_("no document tells it from another value"),
-    },
-    N_("contradicted"): {"contradicted": N_("→ what the evidence gives")},
-}
 COLUMNS = {
     "a": "a (mm)",
     "alpha": "α (°)",
@@ -62,27 +48,17 @@ COLUMNS = {
     "upper": N_("to (°)"),
     "speed": N_("speed (°/s)"),
 }
-SHOWN_READINGS = 3
-DETAIL_COLUMNS = (
+OPEN_COLUMNS = (
     N_("Entry"),
     N_("Value>"),
     N_("Status"),
     N_("Evidence leaves open"),
-    N_("Tool off by"),
     N_("Documents"),
-    N_("Other readings"),
+    N_("Tool off by"),
+    N_("Fits as well"),
     N_("What would settle it"),
 )
-
-
-OFF_COLUMNS = (
-    N_("Entry"),
-    N_("Stated>"),
-    N_("Supported>"),
-    N_("Difference>"),
-    N_("Tool off by"),
-    N_("Documents"),
-)
+SETTLED_COLUMNS = OPEN_COLUMNS[:5]
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
@@ -140,18 +116,14 @@ def evidence_section(
         rows=[
             (joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, unconfirmed) for kind in kinds]) for joint in joints
         ],
-        verdicts=verdict_legend(present),
-        allowed=_allowed(evidence),
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
             if status in present
         ],
-        off_columns=[tr(column) for column in OFF_COLUMNS],
-        off_rows=[_off_row(each) for each in numbers if each.status == "contradicted"],
-        open_columns=[tr(column) for column in DETAIL_COLUMNS],
-        settled_columns=[tr(column) for column in DETAIL_COLUMNS[:-1]],
-        open_rows=[[*_row(each), proposals.get(each.entry, "–")] for each in left],
+        open_columns=[tr(column) for column in OPEN_COLUMNS],
+        settled_columns=[tr(column) for column in SETTLED_COLUMNS],
+        open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each, each.entry in of_one) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
         other=_other(evidence) if evidence.other else None,
@@ -161,19 +133,6 @@ def evidence_section(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
-
-
-def verdict_legend(statuses: Iterable[Status]) -> list[tuple[str, list[tuple[Status, str, str]]]]:
-    """What the marks of these statuses mean: each verdict with its statuses, in mark and word, and what they add."""
-    present = set(statuses)
-    return [
-        (
-            tr(verdict),
-            [(status, _marked(status), text and tr(text)) for status, text in each.items() if status in present],
-        )
-        for verdict, each in VERDICTS.items()
-        if not present.isdisjoint(each)
-    ]
 
 
 @dataclass(frozen=True)
@@ -289,17 +248,6 @@ def _alone(each: EntryEvidence) -> str:
     return next((_plain(value[each.entry]) for value in values if value.keys() == {each.entry}), "")
 
 
-def _allowed(evidence: TableEvidence) -> str:
-    """The entries of another table that fits every document, as it has them; empty where there is none."""
-    if evidence.other is None or evidence.other.code != "allowed":
-        return ""
-    given = [(each, _gives(each, evidence)) for each in evidence.entries]
-    texts = [
-        tr("{entry} = {value} (here {own})", entry=each.entry, value=v, own=_value(each)) for each, v in given if v
-    ]
-    return joined(texts, ", ")
-
-
 def _limit(each: EntryEvidence) -> float:
     """A limit that documents exclude, as they have it; any other as it is given."""
     if each.status == "contradicted" and each.interval is not None:
@@ -411,32 +359,8 @@ def _row(each: EntryEvidence, of_one: bool = False) -> list[str]:
         with_unit(_value(each), each.unit),
         _also_of_one(_marked(each.status), of_one),
         _interval(each) if each.interval and each.status != "gauge" else "–",
-        _tool_off(each),
         joined(each.by, ", ") or "–",
-        joined([_reading(reading) for reading in each.alternatives[:SHOWN_READINGS]]) or "–",
     ]
-
-
-def _off_row(each: EntryEvidence) -> list[str]:
-    """A contradicted entry: what is stated, the middle of what evidence leaves open with half its width, and how far
-    apart they are."""
-    link = Markup('<a href="#entry-{0}">{0}</a>').format(each.entry)
-    last_cells = [_tool_off(each), joined(each.by, ", ") or "–"]
-    if each.value is None or each.interval is None:
-        return [link, _value(each), "–", "–", *last_cells]
-    if column_of(each.entry) == "direction":
-        return [link, _signed(each.value, 0), _signed(each.interval[0], 0), tr("turns the other way"), *last_cells]
-    stated = with_unit(_value(each), each.unit)
-    if each.at_least:
-        return [link, stated, _interval(each), "–", *last_cells]
-    low, high = each.interval
-    middle, half = (low + high) / 2, (high - low) / 2
-    supported = with_unit(f"{fixed(middle, 2)} ± {fixed(half, 2)}", each.unit)
-    return [link, stated, supported, with_unit(_signed(each.value - middle, 2), each.unit), *last_cells]
-
-
-def _signed(value: float, decimals: int) -> str:
-    return ("+" if value > 0 else "") + fixed(value, decimals)
 
 
 def _tool_off(each: EntryEvidence) -> str:
@@ -465,14 +389,8 @@ def _off(mm: float, deg: float) -> str:
     return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 
-def _reading(reading: OtherReading) -> str:
-    changes = joined([f"{name} = {_plain(value)}" for name, value in reading.entries], ", ")
-    if not reading.off.moves:
-        return tr("{changes}: the same robot", changes=changes)
-    if reading.excluded_by:
-        return tr(
-            "{changes}: excluded only by {documents}, not independent",
-            changes=changes,
-            documents=", ".join(reading.excluded_by),
-        )
-    return tr("{changes}: allowed", changes=changes)
+def _fits(each: EntryEvidence) -> str:
+    """Other values that independent documents allow, and that make another robot."""
+    others = [reading for reading in each.alternatives if reading.off.moves and not reading.excluded_by]
+    named = (joined([f"{name} = {_plain(value)}" for name, value in reading.entries], ", ") for reading in others)
+    return joined(named) or "–"
