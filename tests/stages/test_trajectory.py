@@ -302,16 +302,6 @@ def test_speeds_are_judged_where_they_are_known(results):
     assert paths["line_clean"].max_joint_speed_ratio < 1
 
 
-@pytest.mark.long
-def test_equal_speeds_are_the_first_joint_s(results):
-    """A rounding tie once made J6 the fastest on the ER3-600's line past the shoulder, where J1 is."""
-    path = by_name(results["er3_600"])["line_shoulder"]
-    assert path.fastest_joint == 0
-    least = replace(path, max_joint_speed_deg_s=(90.0, 1.0, 1.0, 1.0, 1.0, 90.0 * (1 + 1e-12)))
-    assert least.fastest_joint == 0
-    assert replace(path, max_joint_speed_deg_s=(90.0, 1.0, 1.0, 1.0, 1.0, 91.0)).fastest_joint == 5
-
-
 @pytest.mark.parametrize("name", ROBOTS)
 def test_tiles_beside_each_other_tell_of_one_path_and_of_different_counts(results, name):
     """Speed and share are of one joint on one path; paths that collide are counted whatever else is wrong, and the
@@ -655,13 +645,6 @@ def test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_th
         assert "override" not in repair_text(path, known)
         advised += named > 0.99
     assert advised
-
-
-def test_the_shortest_time_of_a_path_that_is_too_fast_is_told_with_what_it_means(results):
-    path = by_name(results["er3a_c60"])["line_shoulder"]
-    assert path.fastest_s < path.duration_s
-    said = f"at its fastest it takes {path.fastest_s:.2f} s, of {path.duration_s:.2f} s programmed"
-    assert said in path_text(path)
 
 
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):

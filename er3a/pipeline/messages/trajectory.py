@@ -85,11 +85,7 @@ TEXTS = texts(
         "path.shown": "the figure shows the straight joint move",
         "path.harmless": "passes singular poses, which joint moves may: {places}",
         "path.no_fault": "no fault",
-        "path.pace": "at its fastest it takes {fastest:.2f} s, of {programmed:.2f} s programmed",
-        "path.speeds": (
-            "[{bounded:?}a controller may stop there or change configuration][{bounded:!}no finite joint speed "
-            "follows the path there]"
-        ),
+        "path.from": "{t:.4g} s: {text}",
         "path.passed": "{type} within {distance} at t = {when} s",
         "path.stretch": "from t = {start:.4g} to {end:.4g} s",
         "path.worst": "{cause} at t = {t} s",
@@ -171,55 +167,16 @@ def strategy_word(name: StrategyName) -> str:
 
 
 def path_text(path: model.PathSummary) -> str:
-    """Where a path is singular or has faults, or that it has none."""
-    if not path.collisions:
-        return _apart_from_collisions(path)
-    collisions = joined(map(say, path.collisions))
-    if path.verdict == "collides":
-        other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
-        return joined([collisions, _apart_from_collisions(path) if other else ""])
-    starts = [part.t0_s for part in path.unreachable]
-    starts += [*(part.t0_s for part in path.out_of_limits), *(part.t0_s for part in path.too_fast)]
-    first = min(starts, default=0.0)
-    both = _apart_from_collisions(path), collisions
-    return joined(both[::-1] if path.collisions[0].t0_s < first else both)
-
-
-def _apart_from_collisions(path: model.PathSummary) -> str:
+    """What is wrong with a path, each fault after its time; or which singular poses it passes, or that it has no
+    fault."""
     if path.not_planned:
-        shown = sentence("path.shown")
-        return joined([say(path.not_planned), shown])
-    if path.unreachable:
-        return joined(map(say, path.unreachable))
-    if faults := path.out_of_limits or _first_and_worst(path.too_fast):
-        return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
-    if path.undecided:
-        return joined([*map(say, adjoined(path.undecided)), *map(say, path.singularities)])
-    met = [say(event) for event in path.singularities if event.crossing]
-    if path.in_joint_space and met:
-        return sentence("path.harmless", places=joined(met))
-    if not path.in_joint_space and (met or path.jumps):
-        speeds = sentence("path.speeds", bounded=path.joint_speed_bounded)
-        return joined([*met, *map(say, path.jumps), speeds])
+        return joined([say(path.not_planned), sentence("path.shown")])
+    if found := first_faults(path):
+        return joined(sentence("path.from", t=each.t_s, text=each.text) for each in found)
     if not path.in_joint_space and path.singularities:
         return joined(map(say, path.singularities))
-    return sentence("path.no_fault")
-
-
-def _first_and_worst(stretches: tuple[model.Stretch[RateCause], ...]) -> list[model.Stretch[RateCause]]:
-    """Of each kind of limit the stretch that exceeds it first and, if it is another, the one that exceeds it most."""
-    found: list[model.Stretch[RateCause]] = []
-    for kind in dict.fromkeys((part.cause.code, part.cause.basis) for part in stretches):
-        alike = [part for part in stretches if (part.cause.code, part.cause.basis) == kind]
-        found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: rate_ratio(part.cause))]
-    return sorted(dict.fromkeys(found), key=lambda part: part.t0_s)
-
-
-def _at_another_pace(path: model.PathSummary) -> str:
-    """What the shortest time of a path that is too fast means; empty where its pace is not its only fault."""
-    if path.fastest_s is None or not _only_too_fast(path):
-        return ""
-    return sentence("path.pace", fastest=path.fastest_s, programmed=path.duration_s)
+    met = [say(event) for event in path.singularities if event.crossing]
+    return sentence("path.harmless", places=joined(met)) if met else sentence("path.no_fault")
 
 
 def _only_too_fast(path: model.PathSummary) -> bool:
@@ -244,11 +201,6 @@ def _kind(event: model.Singularity) -> str:
 @say.register
 def _(jump: model.Jump) -> str:
     return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
-
-
-@say.register
-def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
-    return sentence("path.cause", event=_when(stretch), pose=_with_worst(stretch, say(stretch.cause)))
 
 
 def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]

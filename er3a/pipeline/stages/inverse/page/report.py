@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
@@ -29,101 +29,48 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
-from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
-from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
+from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.pipeline.viewing.palette import shape_of
+from er3a.pipeline.viewing.side_view import Kind, SeenArm, side_view
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
 
-NAMED = 12  # targets that a cell names
 
-
-TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
-
-
-def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Picture:
-    """All arm shapes that solve a target, from the side and from above.
+def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Markup:
+    """All arm shapes that solve a target, from the side, along its direction; the one taken over the others.
 
     Parameters
     ----------
     branches : the best row of each branch
     """
-    figure, axes = row_of_panels(2, 8.5, 5.75, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
-    handles = _draw_arms(axes[0], axes[1], robot, target, branches)
-    figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=9)
-    alt = tr(
-        "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
-    )
-    return Picture(figure, alt, _conclude(target))
-
-
-def _conclude(target: model.TargetResult) -> str:
-    if target.chosen_deg is not None:
-        return tr("Bold: the chosen solution. Flip and no-flip look the same here.")
-    if target.collide:
-        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
-    if target.solutions:
-        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit.")
-    return tr("The arm, drawn at the reference, can't reach the target.")
-
-
-def _draw_arms(
-    side: Axes, top: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows
-) -> list[Line2D]:
     from_world = np.linalg.inv(robot.base)
 
-    def in_base(points_m: np.ndarray) -> np.ndarray:
-        return (np.asarray(points_m) @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
+    def seen(points_m: Reals) -> Reals:
+        points: Reals = (points_m @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
+        return np.stack([points[..., :2] @ level, points[..., 2]], axis=-1)
 
-    goal = in_base(np.array(target.xyz_mm) / 1000)
-    level = goal[:2] / np.hypot(*goal[:2]) if np.hypot(*goal[:2]) > 1 else np.array([1.0, 0.0])
+    def arm(q: Reals, title: str, note: str, kind: Kind) -> SeenArm:
+        return SeenArm(title, note, kind, seen(skeleton(robot, meant(robot, q))))
 
-    def draw(points: np.ndarray, **style) -> None:
-        side.plot(points[:, :2] @ level, points[:, 2], solid_joinstyle="round", marker="o", **style)
-        top.plot(points[:, 0], points[:, 1], solid_joinstyle="round", marker="o", **style)
-
-    handles = []
+    level = np.array([1.0, 0.0])
+    goal = from_world[:2] @ [*np.array(target.xyz_mm) / 1000, 1.0]
+    level = goal / np.hypot(*goal) if np.hypot(*goal) > AT_AXIS else level
+    arms = []
     shapes = np.array([shape_of(int(branch), label) for branch, label in zip(branches.branch, branches.label)])
-    for shape in np.unique(shapes):
-        rows = branches.take(shapes == shape)
-        allowed, chosen = bool((rows.rank > 0).any()), bool((rows.rank == 1).any())
-        style: dict[str, Any] = {"color": colour_of(int(shape)), "linewidth": 2, "markersize": 4, "zorder": 4}
-        if chosen:
-            style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
-        if not allowed:
-            style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
-        draw(in_base(skeleton(robot, meant(robot, rows.q_deg[0]))), **style)
-        if allowed:
-            label = _shape_word(rows.label[0], int(rows.branch[0]))
-            label = tr("{shape} (chosen)", shape=label) if chosen else label
-            handles.append(Line2D([], [], label=label, **style))
-    if not len(branches):
-        style = {"color": MUTED, "linewidth": 3, "markersize": 5}
-        draw(in_base(skeleton(robot, meant(robot, np.array(target.q_ref_deg)))), **style)
-        handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
-    elif not (branches.rank > 0).all():
-        style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
-        words = tr("outside the limits or colliding") if target.collide else tr("outside the limits")
-        handles.append(Line2D([], [], label=words, **style))
-    cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
-    handles.append(_mark(side, top, goal, level, tr("target"), **cross))
-    near = target.neighbours
-    if near and near.shifted_to_mm:
-        ring = {"marker": "o", "markersize": 9, "color": "none", "markeredgecolor": HIGHLIGHT, "linestyle": "none"}
-        point = in_base(np.array(near.shifted_to_mm) / 1000)
-        handles.append(_mark(side, top, point, level, tr("nearest position with a solution"), **ring))
-    side.set_title(tr("Side, in the target's direction"), **TITLE)
-    top.set_title(tr("From above"), **TITLE)
-    equal_scale(side, tr("distance from axis 1 (mm)"), "z (mm)")
-    equal_scale(top, "x (mm)", "y (mm)")
-    return handles
-
-
-def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: str, **style) -> Line2D:
-    side.plot([point[:2] @ level], [point[2]], zorder=8, **style)
-    top.plot([point[0]], [point[1]], zorder=8, **style)
-    return Line2D([], [], label=label, **style)
+    for rows in (branches.take(shapes == shape) for shape in np.unique(shapes)):
+        refused, taken = not (rows.rank > 0).any(), (rows.rank == 1).any()
+        kind: Kind = "right" if taken else "wrong" if refused else "other"
+        note = tr("chosen") if taken else tr("outside the limits or colliding") if refused else ""
+        arms.append(arm(rows.q_deg[0], _shape_word(rows.label[0], int(rows.branch[0])), note, kind))
+    if not arms:
+        arms = [arm(np.array(target.q_ref_deg), tr("arm at the reference"), "", "other")]
+    arms.sort(key=lambda each: ("wrong", "other", "right").index(each.kind))
+    places = [(tr("target"), target.xyz_mm)]
+    if target.neighbours and target.neighbours.shifted_to_mm:
+        places.append((tr("nearest position with a solution"), target.neighbours.shifted_to_mm))
+    named = [(f"◂ {word}", seen(np.array(place) / 1000)) for word, place in places]
+    return side_view([*arms[:-1], replace(arms[-1], holes=named)])
 
 
 def _shape_word(label: str, branch: int) -> str:
@@ -133,6 +80,7 @@ def _shape_word(label: str, branch: int) -> str:
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
+AT_AXIS = 1e-3  # m, nearer to axis 1 a target has no direction
 
 
 MAX_SELF_MOTIONS = 6
@@ -208,7 +156,7 @@ def _section(
     own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return dict(
         target=target,
-        picture=overlay(robot, target, branches),
+        picture=solutions_seen(robot, target, branches),
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),

@@ -133,10 +133,10 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
 def _faults(path: model.PathSummary) -> list[FaultText] | list[FaultMoment]:
     """What is wrong with a path that is not safe, and when (s): first, and what weighs more later."""
     found = [] if path.not_planned else first_faults(path)
-    if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
-        times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
-        return [FaultText(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
-    return found
+    if found or not path.singularities or path.not_planned:
+        return found or [FaultMoment(path_text(path))]
+    first = min(event.t_s for event in path.singularities)
+    return [FaultText(first, path_text(path), first)]
 
 
 def _in_program(path: model.PathSummary) -> list[FaultMoment]:

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
-from dataclasses import asdict, dataclass
-from itertools import combinations, product
+from collections.abc import Mapping
+from dataclasses import asdict
 from math import pi
 from typing import Any
 
-import numpy as np
-
-from er3a.finding import is_one
-from er3a.geometry.transforms import rpy_of
-from er3a.geometry.vectors import wrap_to_pi
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
-from er3a.kinematics.forward import forward
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
-from er3a.pipeline.messages.validation import not_confirmed, shortened
+from er3a.pipeline.messages.validation import not_confirmed
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -35,7 +28,6 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-CONFIRMED = ("settled", "settled_up_to_signs")
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -62,10 +54,6 @@ SETTLED_COLUMNS = OPEN_COLUMNS[:5]
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
-BENT, BENT_BY = 5, pi / 6  # a joint (from 1) that is not at 0 where two tables are told apart, and its angle
-MAX_DIFFERENT = 3  # entries in which two tables may differ to be told apart at one pose
-READ_WITHIN = 0.5  # deg, of an angle that a pendant shows
-STEEP = 85.0  # deg, from which pitch on roll and yaw are not unique enough to compare
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 OTHER_TITLES = {
     "described": N_("The table that independent documents describe"),
@@ -82,40 +70,22 @@ OTHER_TEXTS = {
 }
 
 
-def evidence_section(
-    robot: Robot, evidence: TableEvidence | None, to_use: TableEvidence | None = None
-) -> dict[str, Any] | None:
+def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
-    legend, and the entries in words; rows of entries begin with the name, which is the address on the page.
-
-    ``to_use``: the evidence of the table to use instead. What only its own source gives is marked so in both: that
-    document alone settles an entry of another table, which stays settled, but confirms nothing beside its own table.
-    """
+    legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
     if evidence is None:
         return None
-    unconfirmed = {each.entry for each in to_use.entries if each.status == "consistent"} if to_use else set()
-    of_one = [each.entry for each in evidence.entries if each.status in CONFIRMED and each.entry in unconfirmed]
     by_name = {each.entry: each for each in evidence.entries}
     joints = sorted({int(name[len(kind) :]) for name in by_name if (kind := name.rstrip("0123456789")) in COLUMNS})
     kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
-    read = _read_pose(robot, evidence)
-    by_pose = tr("{measurement}; or read a pose on the pendant (“What would settle it”)")
-    proposals = {
-        proposal.entry: by_pose.format(measurement=say(proposal))
-        if read and is_one(proposal, "measure_angle")
-        else say(proposal)
-        for proposal in evidence.proposals
-    }
-    alone: list[Status] = ["consistent"] if of_one else []
-    present = dict.fromkeys([*(each.status for each in numbers), *alone])
+    proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
+    present = {each.status for each in numbers}
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[
-            (joint, [_cell(by_name.get(f"{kind}{joint}"), evidence, unconfirmed) for kind in kinds]) for joint in joints
-        ],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -124,77 +94,12 @@ def evidence_section(
         open_columns=[tr(column) for column in OPEN_COLUMNS],
         settled_columns=[tr(column) for column in SETTLED_COLUMNS],
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
-        settled_rows=[_row(each, each.entry in of_one) for each in numbers if each.status in SETTLED],
+        settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
         other=_other(evidence) if evidence.other else None,
-        readings=read,
-        of_one=shortened(of_one),
         tolerance=tr(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
-    )
-
-
-@dataclass(frozen=True)
-class PoseReadings:
-    """What a pendant shows at a pose, by what a table of an arm can be: reading and the entries that differ there.
-
-    ``first``: directions of joints, as words, that are to be checked before; ``within``: how far off a reading
-    may be, deg.
-    """
-
-    pose: str
-    first: str
-    rows: tuple[tuple[str, str], ...]
-    within: float = READ_WITHIN
-
-
-def _read_pose(robot: Robot, evidence: TableEvidence) -> PoseReadings | None:
-    """What a pendant shows at a pose, which distinguishes the table from another that fits all documents, and from what
-    lies between the two: each of the entries in which they differ by itself, and the bent joint's direction.
-
-    None where there is no other, or its orientation is the same or has no unique angles there.
-    """
-    other = other_robot(robot, evidence)
-    if other is None or evidence.other is None or evidence.other.code != "allowed" or robot.joints < BENT:
-        return None
-    q, bent = np.zeros(robot.joints), BENT - 1
-    q[bent] = BENT_BY if robot.upper[bent] >= BENT_BY else -BENT_BY
-    differs = [
-        (kind, k)
-        for kind in ("alpha", "offset")
-        for k in np.flatnonzero(np.abs(getattr(other, kind) - getattr(robot, kind)) > DIFFERS).tolist()
-    ]
-    if len(differs) > MAX_DIFFERENT:
-        return None
-    read: dict[tuple[float, ...], list[str]] = {}
-    for turned, *changed in product((False, True), *([(False, True)] * len(differs))):
-        values = {kind: getattr(robot, kind).copy() for kind in ("alpha", "offset", "direction")}
-        values["direction"][bent] *= -1 if turned else 1
-        named = []
-        for (kind, k), change in zip(differs, changed):
-            if change:
-                values[kind][k] = getattr(other, kind)[k]
-                named.append(f"{kind}{k + 1} = {_plain(np.degrees(values[kind][k]))}")
-        if turned:
-            named.append(f"direction{BENT} = {_plain(values['direction'][bent])}")
-        angles = np.degrees(rpy_of(forward(robot.replace(**values), q)))
-        if abs(angles[1]) > STEEP:
-            return None
-        seen = tuple((np.where(angles.round(1) == -180, 180.0, angles.round(1)) + 0.0).tolist())
-        read.setdefault(seen, []).append(joined(named, ", ") or tr("the table of this page"))
-    apart = [np.abs(wrap_to_pi(np.radians(np.subtract(a, b)))).max() for a, b in combinations(read, 2)]
-    if not apart or np.degrees(min(apart)) < 2 * READ_WITHIN:
-        return None
-    joints = [
-        each.entry[len("direction") :]
-        for each in evidence.entries
-        if column_of(each.entry) == "direction" and each.status not in SETTLED
-    ]
-    return PoseReadings(
-        pose=tr("J{joint} at {angle} deg, all others at 0", joint=BENT, angle=fixed(np.degrees(q[bent]), 0)),
-        first=", ".join(joints),
-        rows=tuple((", ".join(fixed(angle, 1) for angle in seen), joined(named)) for seen, named in read.items()),
     )
 
 
@@ -314,17 +219,14 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None, evidence: TableEvidence, unconfirmed: Set[str]) -> dict[str, Any] | None:
+def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
     if each is None or each.value is None:
         return None
-    of_one = each.status in CONFIRMED and each.entry in unconfirmed
-    title = tr("{entry}: {status}", entry=each.entry, status=_also_of_one(_status(each.status), of_one))
-    mark = joined([_mark(each.status), tr("one source, agrees") if of_one else ""], " ")
-    shown = dict(entry=each.entry, value=_value(each), status=each.status, mark=mark, title=title)
+    title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     gives = _gives(each, evidence) or _alone(each)
-    alone = gives and each.status == "contradicted" and each.entry in unconfirmed
-    shown |= dict(plain=gives, gives=f"{gives} {_mark('consistent')}" if alone else gives)
-    return shown | dict(status="consistent") if of_one else shown  # not in the colour of what is confirmed
+    return dict(
+        entry=each.entry, value=_value(each), status=each.status, mark=_mark(each.status), title=title, gives=gives
+    )
 
 
 def _mark(status: Status) -> str:
@@ -348,16 +250,11 @@ def _plain(value: float) -> str:
     return fixed(value, 3).rstrip("0").rstrip(".")
 
 
-def _also_of_one(status: str, of_one: bool) -> str:
-    """A status, and that only the source of the table to use gives the value."""
-    return joined([status, _mark("consistent") if of_one else ""], ", ")
-
-
-def _row(each: EntryEvidence, of_one: bool = False) -> list[str]:
+def _row(each: EntryEvidence) -> list[str]:
     return [
         each.entry,
         with_unit(_value(each), each.unit),
-        _also_of_one(_marked(each.status), of_one),
+        _marked(each.status),
         _interval(each) if each.interval and each.status != "gauge" else "–",
         joined(each.by, ", ") or "–",
     ]

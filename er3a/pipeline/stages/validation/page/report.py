@@ -17,14 +17,13 @@ from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
 from er3a.pipeline.messages.pages import GRADE_NAMES
-from er3a.pipeline.messages.say import bracketed, joined, say, word
+from er3a.pipeline.messages.say import bracketed, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS, unconfirmed
 from er3a.pipeline.results import Stored, read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import validation_figures
 from er3a.pipeline.stages.validation.page.evidence_section import (
-    OTHER_TITLES,
     SETTLED,
     evidence_section,
     other_robot,
@@ -33,7 +32,6 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
-    Picture,
     alternative_table,
     render_stage,
     text_address,
@@ -127,19 +125,18 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
     unsettled, known = _known(stored, instead) if instead else ("", None)
-    evidence = evidence_section(robot, summary.evidence, known)
+    evidence = evidence_section(robot, summary.evidence)
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, instead, evidence is not None),
+        _answer(summary, instead),
         arms=_both_arms(robot, study.robot(instead) if instead else other_robot(robot, summary.evidence)),
         at_side=evidence is not None,
         head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
         table_evidence=evidence,
-        frames=_frames_picture(robot, summary),
         diagnoses=validation_figures.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
@@ -165,7 +162,7 @@ def _both_arms(robot: Robot, other: Robot | None) -> Markup:
     return side_view(arms, least_wide=UPRIGHT)
 
 
-def _answer(summary: model.ValidationSummary, instead: str | None, has_entries: bool) -> Answer:
+def _answer(summary: model.ValidationSummary, instead: str | None) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
@@ -217,16 +214,3 @@ def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, mo
     summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
     parts = summary.evidence.parts if summary.evidence else ()
     return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ())), summary.evidence
-
-
-def _frames_picture(robot: Robot, summary: model.ValidationSummary) -> Picture:
-    other = other_robot(robot, summary.evidence)
-    code = summary.evidence.other.code if summary.evidence and summary.evidence.other else ""
-    label = word(code, OTHER_TITLES, code) if code == "described" else ""
-    caption = tr(
-        "All joints at 0. Frame 0 is the base, frame k the one that row k of the table leads to, frame 6 the flange."
-    )
-    if code == "described":
-        caption = joined([caption, tr("Dashed: the arm that independent documents describe.")], " ")
-    alt = tr("The arm in its zero pose, seen from a corner, with its link frames.")
-    return Picture(validation_figures.link_frames(robot, other if label else None, label), alt, caption)
