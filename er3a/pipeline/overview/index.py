@@ -233,7 +233,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     if left:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
-        steps.append((text, f"{address}#table-described"))
+        steps.append((text, f"{address}#table-entries"))
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
     if any(part.settled + part.up_to_signs < part.entries for part in limits):
         steps.append((tr("Enter limits and speeds from the controller."), f"{address}#table-entries"))

@@ -31,7 +31,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.pipeline.viewing.palette import shape_of
-from er3a.pipeline.viewing.side_view import Kind, SeenArm, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, SeenArm, side_view
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -61,7 +61,7 @@ def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.Sol
     for rows in (branches.take(shapes == shape) for shape in np.unique(shapes)):
         refused, taken = not (rows.rank > 0).any(), (rows.rank == 1).any()
         kind: Kind = "right" if taken else "wrong" if refused else "other"
-        note = tr("chosen") if taken else tr("outside the limits or colliding") if refused else ""
+        note = tr("chosen") if taken else tr("refused") if refused else ""
         arms.append(arm(rows.q_deg[0], _shape_word(rows.label[0], int(rows.branch[0])), note, kind))
     if not arms:
         arms = [arm(np.array(target.q_ref_deg), tr("arm at the reference"), "", "other")]
@@ -70,7 +70,7 @@ def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.Sol
     if target.neighbours and target.neighbours.shifted_to_mm:
         places.append((tr("nearest position with a solution"), target.neighbours.shifted_to_mm))
     named = [(f"◂ {word}", seen(np.array(place) / 1000)) for word, place in places]
-    return side_view([*arms[:-1], replace(arms[-1], holes=named)])
+    return side_view([*arms[:-1], replace(arms[-1], holes=named)], least_wide=UPRIGHT)
 
 
 def _shape_word(label: str, branch: int) -> str:

@@ -9,11 +9,10 @@ from typing import Any
 
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
-from er3a.pipeline.language import N_, own_title, tr, with_unit
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
-from er3a.pipeline.messages.validation import not_confirmed
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -55,19 +54,6 @@ OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
-OTHER_TITLES = {
-    "described": N_("The table that independent documents describe"),
-    "allowed": N_("Another table that fits every document"),
-}
-OTHER_TEXTS = {
-    "described": N_(
-        "Of all tables that meet the independent documents this is the nearest that was found; what differs is marked. "
-        "Values are one choice within what the documents leave open, with as few decimals as that allows."
-    ),
-    "allowed": N_(
-        "The documents fit this table just as well: they can't tell which of the two is right. Differences are marked."
-    ),
-}
 
 
 def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
@@ -96,34 +82,11 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,
-        other=_other(evidence) if evidence.other else None,
+        allowed=evidence.other is not None and evidence.other.code == "allowed",
         tolerance=tr(
             "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
         ),
     )
-
-
-def _other(evidence: TableEvidence) -> dict[str, Any] | None:
-    found = evidence.other
-    if found is None:
-        return None
-    by_name = {each.entry: each for each in evidence.entries}
-    kinds = [kind for kind in OTHER_COLUMNS if f"{kind}1" in by_name]
-    if found.code == "described":
-        kinds += [kind for kind in LIMITS if f"{kind}1" in by_name]
-    rows = []
-    for joint in range(1, len(found.table.a) + 1):
-        cells = []
-        for kind in kinds:
-            each = by_name.get(f"{kind}{joint}")
-            if each is None:  # a limit of a joint that turns on and on
-                cells.append(("–", False, "", ""))
-                continue
-            value = _other_value(found, each)
-            cells.append((_plain(value), abs(value - (each.value or 0.0)) > DIFFERS, "", ""))
-        rows.append((joint, cells))
-    title, text = (word(found.code, words, found.code) for words in (OTHER_TITLES, OTHER_TEXTS))
-    return dict(title=title, text=text, page="", columns=[tr(COLUMNS[kind]) for kind in kinds], rows=rows)
 
 
 def _other_value(found: OtherTableFound, each: EntryEvidence) -> float:
@@ -168,50 +131,6 @@ def rounded_within(value: float, each: EntryEvidence) -> float:
     if each.status == "gauge":  # a sum alone is known: its parts are not rounded one by one
         return round(value, 3)
     return next((rounded for k in range(3) if low <= (rounded := round(value, k)) <= high), round(value, 3))
-
-
-def table_to_use(robot: Robot, other: Robot, unconfirmed: str, evidence: TableEvidence | None) -> dict[str, Any]:
-    """The whole table of another robot of the study, limits included, as its file gives it: by joint its values,
-    whether they differ, which is marked where both tables are of one convention, and what an open one may be as well.
-    ``unconfirmed``: what of it nothing settles; ``evidence``: of its entries, of which those that are not settled are
-    marked."""
-    known = {each.entry: each for each in evidence.entries} if evidence else {}
-    kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or other.beta.any()]
-    comparable = robot.convention == other.convention and robot.rows == other.rows and robot.joints == other.joints
-    rows = []
-    for k in range(other.rows):
-        cells = []
-        for kind in (*kinds, *LIMITS):
-            if kind in LIMITS and k >= other.joints:
-                cells.append(("–", False, "", ""))
-                continue
-            unit = MM if kind in LIMITS and other.slides[k] else IN_UNIT[kind]
-            value = round(float(getattr(other, kind)[k]) * unit, 3)
-            differs = comparable and abs(value - float(getattr(robot, kind)[k]) * unit) > DIFFERS
-            each = known.get(f"{kind}{k + 1}")
-            mark = "" if each is None or each.status in SETTLED else _mark(each.status)
-            cells.append((_plain(value), differs, _alone(each) if each else "", mark))
-        rows.append((k + 1, cells))
-    source = other.sources.get("dh")
-    parts = [tr("Source: {source}.", source=own_title(source.source))] if source else []
-    if comparable:
-        parts.append(tr("What differs is marked."))
-    if unconfirmed:
-        parts.append(not_confirmed(unconfirmed))
-        parts.append(
-            tr(
-                "“One source”: only the source of {robot} gives it, which may contradict another table but confirms "
-                "none of its own values; ? and ~ no document settles it. Check all of these on the arm.",
-                robot=other.name,
-            )
-        )
-    return dict(
-        title=tr("The table to use: {robot}", robot=other.name),
-        text=joined(parts, " "),
-        page=f"../{other.name}/validation.html",
-        columns=[tr(COLUMNS[kind]) for kind in (*kinds, *LIMITS)],
-        rows=rows,
-    )
 
 
 def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:

@@ -18,16 +18,14 @@ from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
 from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import bracketed, say, word
-from er3a.pipeline.messages.validation import GRADES, GROUPS, unconfirmed
-from er3a.pipeline.results import Stored, read_stage
-from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.messages.validation import GRADES, GROUPS
+from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import validation_figures
 from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
     evidence_section,
     other_robot,
-    table_to_use,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
@@ -124,7 +122,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
-    unsettled, known = _known(stored, instead) if instead else ("", None)
     evidence = evidence_section(robot, summary.evidence)
     render_stage(
         study,
@@ -135,7 +132,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         at_side=evidence is not None,
         head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
-        to_use=table_to_use(robot, study.robot(instead), unsettled, known) if instead else None,
         table_evidence=evidence,
         diagnoses=validation_figures.diagnosis_stories(summary),
         corrected=text,
@@ -182,7 +178,7 @@ def _answer(summary: model.ValidationSummary, instead: str | None) -> Answer:
         else []
     )
     if instead:
-        fix = Fix(tr("use the table of {robot}.", robot=instead), "#table-to-use")
+        fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
     elif isinstance(found, model.LeftOpen) and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
     else:
@@ -205,12 +201,3 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
     if unsure:
         return tr("Nothing contradicts this table."), tr("Entries unconfirmed: {count}.", count=unsure)
     return tr("This table is right."), tr("Documents confirm every entry.")
-
-
-def _known(stored: Stored[model.ValidationResults], other: str) -> tuple[str, model.TableEvidence | None]:
-    """What nothing settles of the table of another robot of the study, and the evidence of its entries."""
-    if stored.folder is None:
-        return "", None
-    summary = read_stage(stored.folder.parents[1] / other / "validation", STAGES["validation"]).results.summary
-    parts = summary.evidence.parts if summary.evidence else ()
-    return unconfirmed(parts, getattr(summary.verdict.finding, "unbounded", ())), summary.evidence
