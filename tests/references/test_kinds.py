@@ -66,7 +66,7 @@ def test_a_new_kind_is_read_and_predicted(tmp_path):
 def test_a_kind_without_columns_or_words_raises_at_once(monkeypatch):
     monkeypatch.setitem(KINDS, "heights", HeightRow)
     monkeypatch.setitem(GROUPS, "heights", 8)
-    for registry in (FORMATS, words.GROUP_WORDS, words.MISSING_WORDS):
+    for registry in (FORMATS, words.GROUP_WORDS):
         with pytest.raises(LookupError, match="heights"):
             check_complete("heights", KINDS if registry is FORMATS else GROUPS, registry)
 

@@ -12,7 +12,6 @@ from er3a.collision.scene import Plane, Scene
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
-from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Verdict, read_results
 from er3a.pipeline.stages.collision.compute import compute as collision
@@ -99,7 +98,6 @@ def test_the_page_of_paths_says_once_that_shapes_are_assumed(small_results, tmp_
         report(study, replace(stored, results=replace(stored.results, summary=found)), tmp_path / "page.html")
         page = (tmp_path / "page.html").read_text(encoding="utf-8")
         assert ("Link shapes are assumed" in page) == of_assumed
-        assert ("Paths with a collision, of those meant to be safe, with assumed shapes" in page) == of_assumed
 
 
 def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
@@ -107,18 +105,6 @@ def test_a_program_of_a_path_near_assumed_shapes_says_so_in_its_head():
     (near,) = near_assumed_shapes(robot, "a", least, 0.02)
     assert head_line(near).startswith("NOT SETTLED: the path a is clear by 11.2 mm of assumed shapes only")
     assert near_assumed_shapes(robot, "a", least, 0.01) == near_assumed_shapes(documented(), "a", least, 0.02) == ()
-
-
-def test_the_pages_say_where_what_stands_around_the_arm_is():
-    rows = solid_rows(load_study("config/small.yaml").scene("er3a_c60", "trajectory"))
-    assert ["table", "box 500 × 800 × 40", "(500, 0, 80)"] in rows
-    assert ["post", "cylinder ⌀ 80 × 900", "(200, 420, 450)"] in rows
-    assert ["floor", "all below a plane", "all points with z up to −5"] in rows
-    slanted = Plane("ramp", np.array([0.6, 0, 0.8]), 0.1), Plane("roof", np.array([0.0, 0, -1]), -2.0)
-    assert [row[2] for row in solid_rows(Scene("two", slanted))] == [
-        "up to 100 from the origin along (0.6, 0, 0.8)",
-        "up to −2000 from the origin along (0, 0, −1)",
-    ]
 
 
 @pytest.mark.long

@@ -235,7 +235,7 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
     left = {each.reason: each.names for each in summary.assumed}
     if group == "drives":
         assert len(left["peak_torques"]) == len(left["rated_torques"]) == 6
-        assert "rests on guesses: the drives' limits" in dynamics.payload_text(summary, full[0].robot("er3a_c60"))[0]
+        assert "rests on guesses: the drives' limits" in dynamics.payload_text(summary, full[0].robot("er3a_c60"))
     else:
         assert left["wrist_limits"] == ()
 
@@ -523,12 +523,12 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
     study, found = full
     summary, robot = found.results.summary, study.robot("er3a_c60")
     least = min((path for path in summary.paths if path.counts), key=lambda path: path.payload.value)
-    lead, rest = dynamics.payload_text(summary, robot)
+    lead = dynamics.payload_text(summary, robot)
     down = np.floor(100 * least.payload.value) / 100
     by = {"rms": "RMS", "peak": "peak"}[least.payload.by]
     limit = f"At most {down:.2f} kg, limited by torques: J{least.payload.joint} ({by}), {least.name}."
     assert lead.startswith(limit)
-    assert ("not known" in lead) == bool(summary.unknown) == bool(rest)
+    assert ("not known" in lead) == bool(summary.unknown)
     unknown = replace(
         summary,
         paths=(),
@@ -537,10 +537,9 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
             fact("dynamics.unknown", what="peak", numbers=()),
         ),
     )
-    lead, rest = dynamics.payload_text(unknown, robot)
+    lead = dynamics.payload_text(unknown, robot)
     assert lead.startswith("Quantities not known: 2. Mount nothing until the manufacturer gives the rated payload.")
-    assert rest == "Ask for: mass, centre of mass and inertia of the links (link 6); peak torques of the drives."
-    assert dynamics.payload_text(None, robot)[0].startswith("Not examined. Mount nothing")
+    assert dynamics.payload_text(None, robot).startswith("Not examined. Mount nothing")
 
 
 @pytest.mark.parametrize("grade", ["official", "claim"])
@@ -549,7 +548,7 @@ def test_a_rated_payload_counts_as_its_source_does(grade):
     nothing."""
     robot = er3a.load_robot("er3_600")
     source = replace(robot.sources["wrist_load"], grade=grade)
-    said, _ = dynamics.payload_text(None, robot.replace(sources={**robot.sources, "wrist_load": source}))
+    said = dynamics.payload_text(None, robot.replace(sources={**robot.sources, "wrist_load": source}))
     official = "Rated payload: 3 kg (Quick manual (EC2-S cabinet), table 2-2); wrist moments and inertias unknown"
     assert (official in said) == (grade == "official")
     assert ("Mount nothing" in said and "nothing confirms" in said) == (grade == "claim")

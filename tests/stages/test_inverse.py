@@ -24,7 +24,6 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.scope import pair_words
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.inverse.compute import compute
@@ -36,7 +35,7 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
     shown_targets,
 )
-from er3a.pipeline.stages.inverse.page.report import of_a_joint, overview_row, rule_rows
+from er3a.pipeline.stages.inverse.page.report import of_a_joint, overview_row
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant
 from er3a.selection.select import RULES
@@ -238,7 +237,6 @@ def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(com
         if target.reason.code == "moves_less":
             others = rows.greatest_move_deg[rows.rank == 2]
             assert target.reason.less.value == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
-            assert f"needs {target.reason.less.value:.3g} deg more" in cells[5]
 
 
 def test_values_of_one_joint_have_its_unit():
@@ -249,7 +247,7 @@ def test_values_of_one_joint_have_its_unit():
     assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 29.0, 1) == "29.0 deg"
 
 
-def test_each_branch_tells_what_its_clearance_is_of(computed):
+def test_each_branch_has_what_its_clearance_is_of(computed):
     name, results = computed
     ranked, robot = results.rankings.take(results.rankings.rule == "clearance"), load_robot(name)
     assert len(ranked) or name == "er3a_c60_article"
@@ -262,10 +260,6 @@ def test_each_branch_tells_what_its_clearance_is_of(computed):
         assert ranked.measure[k] == pytest.approx(1000 * found.distance[0])
         assert ranked.between[k] == label_of(found.pair[0])
     assert set(results.rankings.between[results.rankings.rule != "clearance"]) == {""}
-    for target in set(ranked.target):
-        told = [row[-1] for row in rule_rows(results.rankings.take(results.rankings.target == target), ["clearance"])]
-        own = ranked.take(ranked.target == target)
-        assert told == [pair_words(label) for label in own.between[np.argsort(own.branch)]]
 
 
 def test_round_trips_lose_nothing(computed):
@@ -413,7 +407,7 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     targets = read_results(folders[name], RESULTS).results.summary.targets
     for target in targets:
         assert f'<h2 id="{target.name}">' in page
-    assert page.count("data:image/svg+xml") == len(targets)
+    assert page.count('<svg class="arms"') == len(targets)
     assert "nan" not in page.split("<main")[1].split("data:image")[0]
     run.show("record", "inverse", make_study(), name, folders[name], tmp_path / "inverse.rrd")
     rerun = Path(sys.executable).with_name("rerun")

@@ -48,7 +48,7 @@ from er3a.pipeline.stages.validation.model import (
     ValidationSummary,
     WholeGroup,
 )
-from er3a.pipeline.stages.validation.page.evidence_section import evidence_section, table_to_use
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.page.report import report
 from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.references.circle_points import circle_points, fit_circle
@@ -65,7 +65,6 @@ from er3a.references.subjects import (
     Reach,
     SegmentInclination,
 )
-from testing import plain_oracle as oracle
 from testing.on_demand import OnDemand
 from testing.readme import answer
 from tests.robots.test_conventions import random_arm
@@ -276,7 +275,6 @@ def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
     assert summary.round_trips is None
     assert SelfCheck("closed_form") in with_status(stored.results, "no_reference")
     assert PointAtPose("zero pose", "flange", "z") in with_status(stored.results, "fail")
-    assert "miss a common point" in page_of(edited, stored, tmp_path)
 
 
 @pytest.mark.long
@@ -340,7 +338,7 @@ def test_a_reference_that_a_value_at_random_would_meet_as_often_as_not_is_no_pas
         found = checks_of_set(references, np.array([value + off]), bases, size=1000)[0][0]
         assert found.status == status
         if status == "no_reference":
-            assert f"from {bound} on a value taken at random would pass as often as not" in say(found.note)
+            assert found.note == fact("too_uncertain", uncertainty=uncertainty, undecided_from=bound)
 
 
 @pytest.mark.parametrize(
@@ -384,15 +382,10 @@ def test_round_trips_find_the_joints_again(robot):
 def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
     text = page_of(study, stored["er3a_c60_article"], tmp_path)
     for words in (
-        "Statements of its own source: er3a_c60_article",
-        "the upper arm stands 90° from the vertical where 0° is stated",
         "offset 2 is 0 deg, −90 deg fits. Residual: 1433 mm, corrected 0.0 mm.",
         "source&#39;s statements alone, which are no evidence about a real robot: don&#39;t use the corrected",
-        "turns the other way</td><td>no bound",
         "of one fault or two explains the data",
         "It is another arm, has more faults, or a reference is wrong",
-        "Against er3a_c60: another arm",
-        "What has no reference",
     ):
         assert words in text
 
@@ -400,7 +393,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_views_are_written_for_each_robot(study, stored, tmp_path, name):
     page = page_of(study, stored[name], tmp_path)
-    assert page.count("<img ") == 2
+    assert page.count('<svg class="arms"') == 1
     assert not re.search(r"\bnan\b", page)
 
 
@@ -477,47 +470,8 @@ def test_the_table_stands_beside_the_one_that_documents_describe_or_do_not_tell_
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
-def test_each_reading_of_the_pendant_is_that_of_the_table_it_names(stored, name):
-    """By plain matrices, and other functions for the angles."""
-    found = evidence_section(load_robot(name), stored[name].results.summary.evidence)["readings"]
-    q = np.radians([[0, 0, 0, 0, 30, 0]])
-    assert (found.pose, found.first) == ("J5 at 30 deg, all others at 0", "1, 2, 3, 4, 5, 6")
-    assert len(found.rows) == len({reading for reading, _ in found.rows}) == 8
-    for reading, named in found.rows:
-        entries = {
-            entry: float(value) for entry, value in re.findall(r"(\w+\d) = (\S+?)(?:,|$)", named.replace("−", "-"))
-        }
-        assert bool(entries) != (named == "the table of this page")
-        R = oracle.frames(oracle.changed(oracle.table_of(name), **entries), q)[0, 0, -1, :3, :3]
-        shown = [float(angle) for angle in reading.replace("−", "-").split(", ")]
-        np.testing.assert_allclose(Rotation.from_euler("xyz", shown, degrees=True).as_matrix(), R, atol=1e-3)
-
-
-@pytest.mark.long
-def test_an_entry_that_only_the_source_of_the_table_to_use_gives_has_one_mark(summaries):
-    article, real = (summaries[name].evidence for name in ("er3a_c60_article", "er3a_c60"))
-
-    def marks(section) -> dict[str, str]:
-        return {cell["entry"]: cell["mark"] for _, cells in section["rows"] for cell in cells if cell}
-
-    alone, beside = (evidence_section(load_robot("er3a_c60_article"), article, *to_use) for to_use in ((), (real,)))
-    changed = {entry for entry, mark in marks(alone).items() if mark != marks(beside)[entry]}
-    assert changed == {f"direction{joint}" for joint in (1, 4, 6)}
-    own = marks(evidence_section(load_robot("er3a_c60"), real))
-    assert {own[entry] for entry in changed} == {"one source"}
-    assert {marks(beside)[entry] for entry in changed} == {"✓ one source, agrees", "(✓) one source, agrees"}
-    assert (alone["of_one"], beside["of_one"]) == ("", "direction 1, 4, 6")
-    settled = {row[0]: row[2] for row in beside["settled_rows"]}  # as the results have them
-    for each in (each for each in article.entries if each.entry in changed):
-        words = {"settled": "✓ settled, one source", "settled_up_to_signs": "(✓) settled but for signs, one source"}
-        assert settled[each.entry] == words[each.status]
-
-
-@pytest.mark.long
 def test_an_open_entry_has_both_its_values_in_every_table(summaries):
     """alpha 6 and offset 6 of the article's table, which no document tells from half a turn, as those of the others."""
-    real, article = load_robot("er3a_c60"), load_robot("er3a_c60_article")
     for name in ("er3a_c60", "er3a_c60_article", "er3_600"):
         evidence = summaries[name].evidence
         shown = {
@@ -529,51 +483,31 @@ def test_an_open_entry_has_both_its_values_in_every_table(summaries):
         assert {each.entry for each in evidence.entries if each.status == "open"} == shown.keys()
         assert all(gives for _, gives in shown.values())
         assert shown["alpha6"] == shown["offset6"] == ("0", "180")
-    *_, last = table_to_use(article, real, "", summaries["er3a_c60"].evidence)["rows"]
-    assert [cells for cells in last[1] if cells[2]] == [("0", False, "180", "?")] * 2
 
 
-def test_the_page_says_how_far_each_contradicted_entry_is_off(study, stored, summaries, tmp_path):
-    """Stated and supported values, against the tables that people wrote of the article and of the real arm."""
-    files = [yaml.safe_load((ROBOTS / f"{name}.yaml").read_text()) for name in ("er3a_c60_article", "er3a_c60")]
-    stated, real = (
-        {f"{key[:-3]}{row['joint']}": row[key] for row in each["dh"]["rows"] for key in ("a_mm", "d_mm")}
-        for each in files
-    )
-    page = page_of(study, stored["er3a_c60_article"], tmp_path)
-    found = re.search(r"How far the contradicted entries are off(.*?)</table>", page, re.DOTALL).group(1)
-    rows = {}
-    for row in re.findall(r"<tr><td><a href=\"#entry-(\w+)\">.*?</tr>", found, re.DOTALL):
-        line = re.search(rf'#entry-{row}">(.*?)</tr>', found, re.DOTALL).group(1)
-        cells = re.sub(r"<[^>]*>", "|", line).replace("−", "-").replace("\u202f", "")
-        rows[row] = [float(number) for number in re.findall(r"[-+]?\d+(?:\.\d+)?(?= (?:mm|±))", cells)][:4]
-    lengths = {name for name in stated if stated[name] != real[name]}
-    assert (
-        lengths
-        == {name for name in rows if name[0] in "ad" and name[:2] != "di"}
-        == {"a1", "a2", "a3", "d1", "d4", "d6"}
-    )
-    for name in lengths:
-        given, supported, half, difference = rows[name]
-        assert given == stated[name]
-        assert abs(supported - real[name]) <= half <= 0.16
-        assert difference == pytest.approx(given - supported, abs=0.011)
-    contradicted = {
-        each.entry for each in summaries["er3a_c60_article"].evidence.entries if each.status == "contradicted"
-    }
-    assert set(rows) == contradicted
+def test_what_evidence_leaves_open_of_a_contradicted_length_is_that_of_the_real_arm(summaries):
+    """Against the table that people wrote of the real arm."""
+    rows = yaml.safe_load((ROBOTS / "er3a_c60.yaml").read_text())["dh"]["rows"]
+    real = {f"{key}{row['joint']}": row[f"{key}_mm"] for row in rows for key in "ad"}
+    evidence = summaries["er3a_c60_article"].evidence
+    shown = {row[0]: row for row in evidence_section(load_robot("er3a_c60_article"), evidence)["open_rows"]}
+    contradicted = {each.entry for each in evidence.entries if each.status == "contradicted"}
+    assert contradicted & real.keys() == {"a1", "a2", "a3", "d1", "d4", "d6"}
+    for name in contradicted & real.keys():
+        low, high = (float(end) for end in shown[name][3].removesuffix(" mm").replace("−", "-").split(" to "))
+        assert low <= real[name] <= high <= low + 0.32
 
 
 def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_holds(study, folders, stored, tmp_path):
     found = stored["er3a_c60_article"]
 
-    def advised(folder: Path) -> tuple[bool, int]:
-        """Whether the page advises that table, and how often it has it."""
+    def advised(folder: Path) -> bool:
+        """Whether the page advises that table."""
         page = page_of(study, replace(found, folder=folder / "validation"), tmp_path)
         fix = re.search(r'<p class="fix">(.*?)</p>', page)
-        return bool(fix and "er3a_c60" in fix[1] and 'href="#table-to-use"' in fix[1]), page.count('id="table-to-use"')
+        return bool(fix and 'href="../er3a_c60/validation.html"' in fix[1])
 
-    assert advised(tmp_path / "x") == (False, 0)
+    assert not advised(tmp_path / "x")
     other = tmp_path / "er3a_c60" / "validation"
     shutil.copytree(folders["er3a_c60"], other)
     made = json.loads((other / "summary.json").read_text())
@@ -581,7 +515,7 @@ def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_ho
         made["verdict"]["status"] = status
         (other / "summary.json").write_text(json.dumps(made))
         write_checksums(other)
-        assert advised(tmp_path / "er3a_c60_article") == ((True, 1) if status == "caution" else (False, 0))
+        assert advised(tmp_path / "er3a_c60_article") == (status == "caution")
 
 
 @pytest.mark.long
@@ -635,7 +569,7 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     assert found.diagnosis.faults == (MISSING_OFFSET,)
     assert "offset 2 is 0 deg, −90 deg fits" in say(found)
     page = page_of(wrong, stored, tmp_path)
-    assert "the named fault corrected: it meets the stated axes" in page
+    assert 'id="corrected"' in page
     assert page.index("<h2>Diagnosis") < page.index("<h2>Checks")
 
 
@@ -718,7 +652,8 @@ def test_each_stated_axis_stands_beside_the_nearest_point_of_the_models():
     np.testing.assert_allclose(np.sum(across * T[:, :3, 2], axis=1), 0, atol=1e-6)
     np.testing.assert_allclose(found.distance_mm, np.linalg.norm(across, axis=1), atol=1e-9)
     assert len(found) == 12
-    assert not found.is_off.any()
+    assert (found.distance_mm <= found.uncertainty_mm).all()
+    assert (found.angle_deg <= found.uncertainty_deg).all()
 
 
 def test_a_circle_is_found_in_noisy_points(random):

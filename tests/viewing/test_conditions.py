@@ -24,8 +24,6 @@ from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
-from er3a.pipeline.stages.inverse.model import RankingRows
-from er3a.pipeline.stages.inverse.page.report import rule_rows
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, TrajectoryResults
 from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
@@ -102,11 +100,6 @@ def test_a_verdict_says_what_it_is_not_to_be_taken_for():
     torque = fact("dynamics.no_limits", torques=(), missing_links=(), doubts=0, grade=None)
     assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
     assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
-
-
-def test_an_arm_that_nothing_can_meet_has_infinite_clearance():
-    one = (["t"], [0], ["found_arm"], ["clearance"], [np.inf], [1], [""])
-    assert rule_rows(RankingRows(*map(np.array, one)), ["clearance"])[0][1].startswith("∞")
 
 
 def test_of_a_table_that_nothing_settles_each_page_says_so_first(tmp_path):

@@ -6,17 +6,15 @@ import json
 import re
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-import er3a
 from er3a.identifiability.entry_evidence import EntryEvidence
 from er3a.pipeline.messages.pages import Caveat
 from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.overview.search import TextOfPage
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.page.evidence_section import rounded_within, table_to_use
+from er3a.pipeline.stages.validation.page.evidence_section import rounded_within
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.page import Head, Numbering, _tray_edges, linked
 from tests.conftest import ROOT
@@ -46,25 +44,6 @@ def test_the_first_of_a_name_leads_on_and_texts_stay_texts():
     )
 
 
-def test_the_table_to_use_is_whole_and_as_its_file_gives_it():
-    real, article = er3a.load_robot("er3a_c60"), er3a.load_robot("er3a_c60_article")
-    open_ones = [
-        EntryEvidence("alpha6", 0.0, "deg", "open", None, (), (), None),
-        EntryEvidence("a2", 270.0, "mm", "settled", None, (), (), None),
-    ]
-    section = table_to_use(article, real, "alpha 6, all limits", SimpleNamespace(entries=open_ones))
-    rows = [[value for value, *_ in cells] for _, cells in section["rows"]]
-    assert "Not confirmed: alpha 6, all limits. “One source”: only the source of er3a_c60 gives it" in section["text"]
-    assert [mark for _, cells in section["rows"] for *_, mark in cells if mark] == ["?"]
-    assert section["rows"][5][1][1][2:] == ("", "?")
-    assert section["page"] == "../er3a_c60/validation.html"
-    assert rows[1] == ["270", "0", "0", "−90", "−1", "−130", "90"]
-    marked = np.array([[differs for _, differs, *_ in cells] for _, cells in section["rows"]])
-    assert marked[1].tolist() == [True, False, False, True, True, True, True]
-    same = table_to_use(real, real, "", None)["rows"]
-    assert not any(differs or mark for _, cells in same for _, differs, _, mark in cells)
-
-
 @pytest.mark.parametrize(
     ("value", "interval", "shown"), [(269.999, (269.9, 270.1), 270), (321.48, (321.45, 321.55), 321.5)]
 )
@@ -81,19 +60,13 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
         (tmp_path / robot / "validation").symlink_to(small_results("validation", robot, study).resolve())
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    evidence, better = (
-        read_stage(tmp_path / robot / "validation", STAGES["validation"]).results.summary.evidence
-        for robot in (name, "er3a_c60")
-    )
-    to_use = {each.entry: each.status for each in better.entries}
+    evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
     for entry in (each for each in evidence.entries if each.value is not None):
         link = re.escape(f'<a href="{name}/validation.html#entry-{entry.entry}">')
         (status, value, rest) = re.search(
             rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
         ).groups()
-        alone = "settled" in entry.status and to_use[entry.entry] == "consistent"
-        shown = "consistent" if alone else entry.status  # what one source gives is not coloured as confirmed
-        assert (status, float(value.replace("−", "-"))) == (shown, round(entry.value, 3)), entry
+        assert (status, float(value.replace("−", "-"))) == (entry.status, round(entry.value, 3)), entry
         if status == "contradicted":
             given = float(re.search("→ <strong>(.*?)</strong>", rest).group(1).replace("−", "-"))
             assert entry.interval[0] <= given <= entry.interval[1], entry

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import assert_never
-
-import numpy as np
+from typing import Any
 
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import BASE, TRIED, bodies_of
-from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
 from er3a.finding import Finding
-from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import N_, own_title
 from er3a.pipeline.messages import expectations, scope  # noqa: F401
-from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import FORMATS, WORDS, same_text, say_as, says, sentence, texts, word
 
 KEY_FIGURES = {
@@ -43,6 +38,20 @@ STATES: dict[PairState, str] = {
 TEXTS = texts(
     {
         "pair": "{bodies:body and }",
+        "why.allowed": "Decided in the robot or scene file: {reason:own}",
+        "why.watched": "Decided in the robot or scene file: {reason:own}",
+        "why.undecided": "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.",
+        "why.overlaps": (
+            "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the shapes. "
+            "What overlaps is not checked."
+        ),
+        "why.guessed": "Shapes guessed from the table are too coarse here. Not checked: give the robot's shapes.",
+        "why.meets": (
+            "[{radius:?}They touch by design: left out within {radius:.0f} mm of their joint.]"
+            "[{radius:?} Outside they collide at ({witness}).][{radius:?}{witness:!} Outside no collision was found.]"
+            "[{radius:!}They collide at joint values ({witness}).]"
+            "[{radius:!}{witness:!}A joint joins them. Not checked.]"
+        ),
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
         "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; to keep: {margin_mm:g} mm",
         "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs:3, }.",
@@ -106,95 +115,17 @@ def _(found: Finding) -> str:
     return say_as(found, found=sentence("collision.free_space", **found.params))
 
 
-def solid_rows(scene: Scene | None) -> list[list[str]]:
-    """What stands around an arm: name, centre and size of each solid, mm; of a plane its normal and where it ends."""
-    rows = []
-    for each in scene.solids if scene else ():
-        match each:
-            case Plane():
-                rows.append([each.name, tr("all below a plane"), _below(each)])
-                continue
-            case Box():
-                size = tr("box {size}", size=_millimetres(each.size).replace(", ", " × "))
-            case Cylinder():
-                size = tr("cylinder ⌀ {wide:g} × {long:g}", wide=2000 * each.radius, long=1000 * each.length)
-            case Sphere():
-                size = tr("ball ⌀ {wide:g}", wide=2000 * each.radius)
-            case Mesh():
-                extent = np.ptp(np.concatenate(each.pieces), axis=0)
-                size = tr("mesh {size}", size=_millimetres(extent).replace(", ", " × "))
-            case _:
-                assert_never(each)
-        rows.append([each.name, size, f"({_millimetres(each.T[:3, 3])})"])
-    return rows
-
-
-def _below(plane: Plane) -> str:
-    """Where a plane's solid ends: in words where the plane is square to an axis."""
-    end = _millimetres([plane.offset])
-    if np.count_nonzero(plane.normal) == 1 and plane.normal.max() > 0:
-        return tr("all points with {axis} up to {end}", axis="xyz"[int(np.argmax(plane.normal))], end=end)
-    return tr("up to {end} from the origin along ({normal})", end=end, normal=_millimetres(plane.normal, 1))
-
-
-def _millimetres(values: Reals | list[float], scale: float = 1000) -> str:
-    return ", ".join(f"{scale * value + 0.0:.6g}" for value in values).replace("-", "−")
-
-
 def state_word(state: PairState) -> str:
     """What holds of a pair, in short."""
     return word("collision.state", STATES, state)
 
 
-def why(
-    state: PairState, least_mm: float, left_out_mm: float, boxes: int, witness: str, reason: str, *, assumed: bool
-) -> str:
+def why(state: PairState, **parts: Any) -> str:
     """Why a pair is watched or not.
 
     Parameters
     ----------
-    assumed : whether no document that verdicts rest on gives the shapes
-    witness : joint values with their units; empty where there are none
+    parts : ``radius``, mm, of what is left out around a joint; ``witness``, joint values with their units at which the
+        pair collides, empty where there are none; ``boxes`` of joint values looked at; ``reason`` that somebody wrote
     """
-    match state:
-        case "never" if assumed:
-            return tr(
-                "The assumed shapes are at least {least} mm apart in every pose ({boxes} ranges of joint values).",
-                least=at_least(least_mm, 1),
-                boxes=boxes,
-            )
-        case "never":
-            return tr(
-                "At least {least} mm apart in every pose; proven over {boxes} ranges of joint values.",
-                least=at_least(least_mm, 1),
-                boxes=boxes,
-            )
-        case "allowed" | "watched":
-            return tr("Decided in the robot or scene file: {reason}", reason=own_title(reason))
-        case "undecided":
-            return tr(
-                "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.", boxes=boxes
-            )
-        case "overlaps":
-            return tr(
-                "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the "
-                "shapes. What overlaps is not checked.",
-                count=TRIED,
-            )
-        case "guessed":
-            return tr("Shapes guessed from the table are too coarse here. Not checked: give the robot's shapes.")
-        case "joined" if not left_out_mm:
-            return tr("A joint joins them. Not checked.")
-    if not left_out_mm:
-        return tr("They collide at joint values ({witness}).", witness=witness)
-    joined = tr(
-        "They touch by design: the region within {radius:.0f} mm of their joint is left out.", radius=left_out_mm
-    )
-    if witness:
-        return tr(
-            "{first} {rest}", first=joined, rest=tr("Outside that region they collide at ({witness}).", witness=witness)
-        )
-    rest = tr(
-        "Outside that region no collision was found; if one of them lies within it as a whole, nothing is checked."
-    )
-    return tr("{first} {rest}", first=joined, rest=rest)
+    return sentence(f"why.{state if f'why.{state}' in TEXTS else 'meets'}", count=TRIED, **parts)

@@ -107,7 +107,6 @@ TEXTS = texts(
             "Quantities not known: {unknown}.][{unexamined:?} Not examined.][{none:?} Mount nothing until the "
             "manufacturer gives the rated payload.][ {rated}]"
         ),
-        "payload.ask": "[{bounded:?}Left out, because not known: {what:; }.][{bounded:!}Ask for: {what:; }.]",
         "payload.rated": "Rated payload: {kg:.3g} kg ({source:payload.source}); {doubt:payload.doubt}.",
         "impossible_inertia": "link {link}: no body can have this inertia ({why:dynamics.why})",
     }
@@ -133,9 +132,9 @@ WORDS.update(
 )
 
 
-def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
+def payload_text(summary: Summary | None, robot: Robot) -> str:
     """What the arm can carry: the least of what its paths allow, what limits it and how much is not known, or that it
-    is unknown, and what its maker rates it; then what to ask for.
+    is unknown, and what its maker rates it.
 
     ``summary`` is the stage's; None where it was not computed.
     """
@@ -154,8 +153,7 @@ def payload_text(summary: Summary | None, robot: Robot) -> tuple[str, str]:
         of_joint = [bracketed(f"J{most.joint}", by)] if most and most.joint else []
         parts = {"kg": at_least(value, "kg"), "by": [*of_joint, path.name], "guesses": _guesses(summary)}
     parts |= {"unknown": len(missing), "unexamined": not (bounds or missing), "none": not (bounds or official)}
-    known = sentence("payload", rated=official or _rated(robot), **parts)
-    return known, sentence("payload.ask", bounded=bool(bounds), what=missing) if missing else ""
+    return sentence("payload", rated=official or _rated(robot), **parts)
 
 
 def _guesses(summary: Summary | None) -> list[str]:

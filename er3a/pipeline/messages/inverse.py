@@ -8,7 +8,6 @@ from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
 
-NAMED = 3
 KEY_FIGURES = {
     "targets_solved": N_("targets solved"),
     "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),

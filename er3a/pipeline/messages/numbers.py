@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import ceil, floor, isfinite, isnan, log10
+from math import ceil, floor, isfinite, log10
 
 from er3a.pipeline.language import as_number, as_text
 
@@ -16,11 +16,6 @@ DECIMALS = {"deg": 3, "m³": 3, "m²": 3, "%": 1, "deg/s": 1, "mm/s": 1, "µdeg/
 """The decimals that matter in a unit, 2 in any other."""
 NOISE = 1e-6  # of the last decimal of a bound: rounding of the value itself
 MOST_DECIMALS = 6  # of a bound
-
-
-def no_noise(value: float) -> float:
-    """0 for what is nothing but rounding, or no number; an infinite value stays."""
-    return 0.0 if abs(value) < 1e-9 or isnan(value) else float(value)
 
 
 def number(value: float | int | None, digits: int = 4) -> str:

@@ -18,12 +18,6 @@ GROUP_WORDS = {
     "limits": N_("limits"),
     "speeds": N_("speeds"),
 }
-MISSING_WORDS = GROUP_WORDS | {
-    "axes": N_("joint axes"),
-    "envelope": N_("labels of a workspace drawing"),
-    "limits": N_("joint limits"),
-    "speeds": N_("joint speeds"),
-}
 POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
 SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}
 LABELS = {"abs_x": "|x|"}

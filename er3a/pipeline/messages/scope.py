@@ -199,8 +199,3 @@ def body_word(name: str) -> str:
     number = name.removeprefix("link_")
     base = name == link_label(BASE)
     return sentence("link", base=base, number=number) if base or number != name else own_title(name)
-
-
-def pair_words(label: str) -> str:
-    """Two bodies by their label in columns of text."""
-    return tr(" and ").join(map(body_word, label.split("/")))

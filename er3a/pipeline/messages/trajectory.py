@@ -16,7 +16,7 @@ from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RateCause, rate_ratio
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import StrategyName
 
 KEY_FIGURES = {
     "safe": N_("Paths that pass in the model, of those meant to"),
@@ -59,8 +59,6 @@ FACTS: dict[FactName, str] = {
     "end": N_("where it may end"),
 }
 """What is said of a motion to be run instead, beside what it is."""
-OPEN_VERDICTS: tuple[PathVerdict, ...] = ("undecided", "too fast for the assumed limits")
-"""Of paths that may be safe all the same, if nothing that is undecided is against it."""
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
@@ -87,11 +85,7 @@ TEXTS = texts(
         "path.shown": "the figure shows the straight joint move",
         "path.harmless": "passes singular poses, which joint moves may: {places}",
         "path.no_fault": "no fault",
-        "path.pace": "at its fastest it takes {fastest:.2f} s, of {programmed:.2f} s programmed",
-        "path.speeds": (
-            "[{bounded:?}a controller may stop there or change configuration][{bounded:!}no finite joint speed "
-            "follows the path there]"
-        ),
+        "path.from": "{t:.4g} s: {text}",
         "path.passed": "{type} within {distance} at t = {when} s",
         "path.stretch": "from t = {start:.4g} to {end:.4g} s",
         "path.worst": "{cause} at t = {t} s",
@@ -173,55 +167,16 @@ def strategy_word(name: StrategyName) -> str:
 
 
 def path_text(path: model.PathSummary) -> str:
-    """Where a path is singular or has faults, or that it has none."""
-    if not path.collisions:
-        return _apart_from_collisions(path)
-    collisions = joined(map(say, path.collisions))
-    if path.verdict == "collides":
-        other = path.too_fast or path.jumps or (path.singularities and not path.in_joint_space)
-        return joined([collisions, _apart_from_collisions(path) if other else ""])
-    starts = [part.t0_s for part in path.unreachable]
-    starts += [*(part.t0_s for part in path.out_of_limits), *(part.t0_s for part in path.too_fast)]
-    first = min(starts, default=0.0)
-    both = _apart_from_collisions(path), collisions
-    return joined(both[::-1] if path.collisions[0].t0_s < first else both)
-
-
-def _apart_from_collisions(path: model.PathSummary) -> str:
+    """What is wrong with a path, each fault after its time; or which singular poses it passes, or that it has no
+    fault."""
     if path.not_planned:
-        shown = sentence("path.shown")
-        return joined([say(path.not_planned), shown])
-    if path.unreachable:
-        return joined(map(say, path.unreachable))
-    if faults := path.out_of_limits or _first_and_worst(path.too_fast):
-        return joined([*map(say, faults), *map(say, path.singularities), _at_another_pace(path)])
-    if path.undecided:
-        return joined([*map(say, adjoined(path.undecided)), *map(say, path.singularities)])
-    met = [say(event) for event in path.singularities if event.crossing]
-    if path.in_joint_space and met:
-        return sentence("path.harmless", places=joined(met))
-    if not path.in_joint_space and (met or path.jumps):
-        speeds = sentence("path.speeds", bounded=path.joint_speed_bounded)
-        return joined([*met, *map(say, path.jumps), speeds])
+        return joined([say(path.not_planned), sentence("path.shown")])
+    if found := first_faults(path):
+        return joined(sentence("path.from", t=each.t_s, text=each.text) for each in found)
     if not path.in_joint_space and path.singularities:
         return joined(map(say, path.singularities))
-    return sentence("path.no_fault")
-
-
-def _first_and_worst(stretches: tuple[model.Stretch[RateCause], ...]) -> list[model.Stretch[RateCause]]:
-    """Of each kind of limit the stretch that exceeds it first and, if it is another, the one that exceeds it most."""
-    found: list[model.Stretch[RateCause]] = []
-    for kind in dict.fromkeys((part.cause.code, part.cause.basis) for part in stretches):
-        alike = [part for part in stretches if (part.cause.code, part.cause.basis) == kind]
-        found += [min(alike, key=lambda part: part.t0_s), max(alike, key=lambda part: rate_ratio(part.cause))]
-    return sorted(dict.fromkeys(found), key=lambda part: part.t0_s)
-
-
-def _at_another_pace(path: model.PathSummary) -> str:
-    """What the shortest time of a path that is too fast means; empty where its pace is not its only fault."""
-    if path.fastest_s is None or not _only_too_fast(path):
-        return ""
-    return sentence("path.pace", fastest=path.fastest_s, programmed=path.duration_s)
+    met = [say(event) for event in path.singularities if event.crossing]
+    return sentence("path.harmless", places=joined(met)) if met else sentence("path.no_fault")
 
 
 def _only_too_fast(path: model.PathSummary) -> bool:
@@ -246,11 +201,6 @@ def _kind(event: model.Singularity) -> str:
 @say.register
 def _(jump: model.Jump) -> str:
     return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
-
-
-@say.register
-def _(stretch: model.Stretch) -> str:  # type: ignore[type-arg]  # singledispatch takes no parametrised class
-    return sentence("path.cause", event=_when(stretch), pose=_with_worst(stretch, say(stretch.cause)))
 
 
 def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
@@ -389,25 +339,6 @@ class Slowed(NamedTuple):
     part: float
 
 
-def advice(
-    path: model.PathSummary,
-    limits: model.LimitsUsed | None = None,
-    *,
-    shapes: Finding | None = None,
-    slowed: Slowed | None = None,
-) -> str | None:
-    """What to do about a path; None where nothing is to be done. ``limits``: of the joints, whose assumed ones are
-    named; ``shapes``: that clearance is that of assumed ones; ``slowed``: where a motion that repairs it is slower."""
-    if not path.avoidance:
-        return None
-    if path.chosen:
-        return joined([repair_text(path, limits, shapes=shapes, slowed=slowed), whole_pace(path)], ". ")
-    only = path.avoidance[0] if len(path.avoidance) == 1 else None
-    if only and only.name != "planned":
-        return no_repair(path)
-    return joined([no_repair(path), _until(path), _of_end(path, shapes)], ". ")
-
-
 def no_repair(path: model.PathSummary) -> str:
     """Why no strategy repairs a path."""
     if len(path.avoidance) == 1:
@@ -423,14 +354,6 @@ def no_repair(path: model.PathSummary) -> str:
         causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))
     return _within_reach(path) or sentence("advice.none", why=why)
-
-
-def _of_end(path: model.PathSummary, shapes: Finding | None) -> str:
-    """That the clearance up to where a path may be run is that of assumed shapes; empty where none is named."""
-    end, last = path.sound_end, path.clear_until
-    if end is None or last is None or end.t_s < last.t_s or path.unreachable:
-        return ""
-    return _of_assumed(last.margin_mm, shapes)
 
 
 def _of_assumed(clearance_mm: float, shapes: Finding | None) -> str:
@@ -498,16 +421,10 @@ def reasons(tried: model.TriedStrategy) -> str:
     return joined(listed(tried.reasons))
 
 
-def repair_text(
-    path: model.PathSummary,
-    limits: model.LimitsUsed | None = None,
-    *,
-    shapes: Finding | None = None,
-    slowed: Slowed | None = None,
-) -> str:
-    """All that is said of the strategy that was chosen; arguments as of :func:`advice`."""
-    facts = repair_facts(path, limits, shapes)
-    return joined([repair_lead(path, slowed), *(text for _, text in facts)], ". ")
+def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str:
+    """All that is said of the strategy that was chosen; ``limits``: of the joints, whose assumed ones are named."""
+    facts = repair_facts(path, limits, None)
+    return joined([repair_lead(path), *(text for _, text in facts), whole_pace(path)], ". ")
 
 
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:

@@ -12,7 +12,7 @@ from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.language import N_, as_text, distinct, tr, with_unit
-from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, MISSING_WORDS, quoted
+from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, quoted
 from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.stages.validation.model import (
@@ -55,12 +55,6 @@ GRADES = {
     "export": N_("a URDF exported from CAD"),
     "claim": N_("an article's text"),
     "inferred": N_("inferred, not stated"),
-}
-SET_ASIDE = {
-    "no_such_joint": N_("no such joint"),
-    "no_wrist_centre": N_("no wrist centre"),
-    "joint_slides": N_("stated for a joint that turns, but it slides"),
-    "joint_turns": N_("stated for a joint that slides, but it turns"),
 }
 PLACED = {"tool": N_("tool"), "base": N_("base")}
 PART_ENTRIES = {
@@ -118,7 +112,6 @@ TEXTS = texts(
         ),
         "part_found.more": "{more} more of the {part:part_entries}",
         "self_check": "{quantity:self_check}",
-        "whole_group": "{group:missing_group}",
         "named_pose": "{name:own}",
         "validation.no_reference": (
             "There is no official, CAD or exported data to compare this table with. Read five poses at the pendant: "
@@ -127,21 +120,6 @@ TEXTS = texts(
         "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
         "contradiction": (
             "References contradict each other about the {subjects}: measure that on the arm before you rely on it."
-        ),
-        "not_in_robot_file": "the robot's file gives no value",
-        "source_gives_none": "the source gives none",
-        "not_of_this_arm": "set aside (arm of {joints} joints): {reason:set_aside}",
-        "too_uncertain": (
-            "decides nothing: uncertain by ±{uncertainty:g}; from {undecided_from:.4g} on a value taken at random "
-            "would pass as often as not"
-        ),
-        "set_has_no_data": "{reference_set} has no data",
-        "in_no_set": "no reference set gives it",
-        "numbers_missing": "numbers are missing",
-        "no_closed_form": "no closed-form inverse, because {missing}",
-        "near_singular_left_out": (
-            "{judged} of {poses} random poses, the others within {wrist_deg:g} deg (wrist, elbow) or "
-            "{shoulder_mm:g} mm (shoulder) of a singularity"
         ),
     }
 )
@@ -152,8 +130,6 @@ WORDS.update(
         "data": DATA_GRADES,
         "part_entries": PART_ENTRIES,
         "self_check": SELF_CHECKS,
-        "missing_group": MISSING_WORDS,
-        "set_aside": SET_ASIDE,
         "speaks": {
             "uncovered": N_("No independent document covers this table"),
             "unsettled": N_("Don't rely on this table: no independent document settles any of its entries"),

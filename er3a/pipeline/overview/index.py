@@ -134,13 +134,13 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
         for stage, head in heads.items()
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     ]
-    use, said = _use(table, heads.get("validation"), failed, instead)
+    use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
     asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
     return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
 
 
-def _use(table: str, head: Head | None, failed: Sequence[str], instead: str | None) -> tuple[str, str]:
+def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
     """What to do with a robot's table: a word for its colour, and a few for its reader."""
     if table == "fail":
         same_arm = head is not None and head.finding.code == "validation.defined_otherwise"
@@ -230,7 +230,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     if left:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
-        steps.append((text, f"{address}#table-described"))
+        steps.append((text, f"{address}#table-entries"))
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
     if any(part.settled + part.up_to_signs < part.entries for part in limits):
         steps.append((tr("Enter limits and speeds from the controller."), f"{address}#table-entries"))
@@ -240,10 +240,9 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
 def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[Any]:
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
     doubtful = [entry.name for entry in entries if entry.use == "never"] or [entries[0].name]
-    instead = next((entry.instead for entry in entries if entry.name == doubtful[0]), None)
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
-        table_tile(study, doubtful[0], stored[doubtful[0]], stored.get(instead or "", {})),
+        table_tile(study, doubtful[0], stored[doubtful[0]]),
         paths_tile(study, name, stored[name]) if (name := first_with("trajectory", trusted, stored)) else None,
         tray_tile(study, name, stored[name]) if (name := first_with("workspace", trusted, stored)) else None,
     ]

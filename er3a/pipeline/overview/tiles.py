@@ -55,21 +55,18 @@ def _is_there(found: Stored[Any]) -> bool:
     return isinstance(found.results, TrajectoryResults | WorkspaceResults)
 
 
-def table_tile(study: Study, name: str, stored: Results, instead: Results) -> Tile | None:
+def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     """Which entries of a robot's table evidence contradicts or leaves open; None where no document speaks of it.
 
     Parameters
     ----------
     stored : results of the robot's stages
-    instead : those of the robot whose table is to be used; empty where there is none
     """
     results = stored["validation"].results if "validation" in stored else None
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
-    other = instead["validation"].results if "validation" in instead else None
-    known = other.summary.evidence if isinstance(other, ValidationResults) else None
     robot = study.robot(name)
-    entries = evidence_section(robot, results.summary.evidence, known)
+    entries = evidence_section(robot, results.summary.evidence)
     status = [each.status for each in results.summary.evidence.entries if each.value is not None]
     bad, open_ = status.count("contradicted"), sum(each in ("open", "weak", "consistent") for each in status)
     title = tr("Which numbers of {robot} are wrong?", robot=own_title(robot.title))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -31,12 +31,11 @@ from er3a.pipeline import language
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
-from er3a.pipeline.viewing.palette import GRID, INK, MODEL, MUTED, SIX_JOINTS, VERDICTS
+from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
 
-PANELS = 4  # side by side, of curves of many paths
 MAX_STEPS = 16  # a colour map of few colours stands for whole numbers or classes
 NUMBER = re.compile(r"[-−]?[\d.]*(e\d+)?")
 
@@ -289,35 +288,6 @@ def axis_label(table: Table | type[Table], attribute: str, unit: str = "") -> st
     spec = table.columns()[attribute]
     what, unit = tr(spec.heading or spec.meaning), (unit or spec.unit).replace("^2", "²").replace("^3", "³")
     return bracketed(what, tr(unit))
-
-
-def clearance_panels(rows: Any, names: Sequence[str]) -> tuple[Figure, list[tuple[Axes, str]]]:
-    """Least distances over time, a panel for each path, overlaps in red.
-
-    Parameters
-    ----------
-    rows : table with ``path``, ``t_s`` and ``clearance_mm``
-    names : of the paths to show
-
-    Returns
-    -------
-    figure, panels : pairs of axes and the path's name
-    """
-    lines = -(-len(names) // PANELS)
-    figure, axes = new_figure(lines, PANELS, width=11.0, height=1.5 * lines + 0.4, sharey=True, squeeze=False)
-    for k, (ax, name) in enumerate(zip(axes.flat, names)):
-        t, gap = rows.t_s[rows.path == name], rows.clearance_mm[rows.path == name]
-        ax.plot(t, gap, color=MODEL)
-        ax.fill_between(t, gap, 0, where=gap < 0, color=VERDICTS["fail"], alpha=0.5, interpolate=True)
-        ax.axhline(0, color=INK, linewidth=0.8)
-        ax.set_title(name, fontsize=9)
-        if k + PANELS >= len(names):
-            ax.set_xlabel(axis_label(rows, "t_s"), fontsize=8)
-    for ax in axes.flat[len(names) :]:
-        ax.set_visible(False)
-    for ax in axes[:, 0]:
-        ax.set_ylabel(axis_label(rows, "clearance_mm"), fontsize=8)
-    return figure, list(zip(axes.flat, names))
 
 
 def svg_data_uri(figure: Figure) -> Markup:

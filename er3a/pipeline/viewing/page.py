@@ -294,21 +294,6 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-OF_SHAPES = frozenset(
-    (
-        *("free_of_collisions", "free_of_itself", "free_of_scene", "clear_places", "joined_places", "lost_volume"),
-        *("colliding", "least_clearance"),
-    )
-)
-"""Key figures that rest on the shapes of the arm."""
-
-
-def _figure_text(stage: str, name: str, text: str, assumed: bool) -> str:
-    """What a key figure is, with the grade of the shapes that it rests on; ``assumed``: whether these are."""
-    said = language.translated(f"{stage}.figure", text)
-    return tr("{figure}, with assumed shapes", figure=said) if assumed and name in OF_SHAPES else said
-
-
 def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head:
     """The head of a stage's page.
 
@@ -325,7 +310,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
     shown = tuple(
         ShownFigure(
             figure.name,
-            _figure_text(stage, figure.name, words[figure.name], verdict.shapes is not None),
+            language.translated(f"{stage}.figure", words[figure.name]),
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,

@@ -63,7 +63,8 @@ def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None, least_wide
     -------
     svg : colours come from the page's style sheet
     """
-    corners = np.concatenate([each for arm in arms for each in (arm.points_mm, *arm.reach_mm)])
+    named = [[at] for arm in arms for _, at in arm.holes]
+    corners = np.concatenate([*named, *(each for arm in arms for each in (arm.points_mm, *arm.reach_mm))])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin

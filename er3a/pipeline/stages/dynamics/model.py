@@ -62,7 +62,6 @@ class Use:
         return self.asked / self.allowed
 
 
-Compared = Finding
 """What was compared with limits: ``dynamics.fits`` (all is within, tolerances included), ``dynamics.marginal`` (all is
 within what is known: not with the tolerances of the masses, or not all was examined), ``dynamics.overload``.
 ``compared`` with limits and ``beyond`` them; ``tightest`` is what is nearest to its limit, or farthest beyond it

@@ -30,9 +30,6 @@ TimesIn = Literal["path_file", "table", "program"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
 
-SAME_SPEED = 1e-9
-"""Speeds whose relative difference is less are equal but for rounding."""
-
 AT_EDGE, AROUND_EDGE = 0.001, 0.1
 """Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
 joints may be too fast because of it."""
@@ -269,13 +266,6 @@ class PathSummary:
     sound_end: SoundEnd | None = None
     of_program: tuple[FindingAt, ...] = ()
     times_in: TimesIn = "path_file"
-
-    @property
-    def fastest_joint(self) -> int | None:
-        """The joint (from 0) that turns fastest, of equals the first; None where speeds have no bound."""
-        speeds = {j: v for j, v in enumerate(self.max_joint_speed_deg_s or ()) if j + 1 not in self.sliding}
-        nearly = max(speeds.values(), default=0.0) * (1 - SAME_SPEED)
-        return next((joint for joint, speed in speeds.items() if speed >= nearly), None)
 
     @property
     def singular_times_s(self) -> list[float]:

@@ -16,7 +16,7 @@ from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, CheckKind
 from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.study import Study
@@ -508,11 +508,6 @@ class Axes(Table):
     distance_mm: Reals = column("distance of the two points", heading=N_("distance"))
     uncertainty_deg: Reals = column("the source's uncertainty of the direction")
     uncertainty_mm: Reals = column("the source's uncertainty of the line's place")
-
-    @property
-    def is_off(self) -> Flags:
-        """Which lines (rows,) the model misses by more than their uncertainty, in direction or place."""
-        return (self.distance_mm > self.uncertainty_mm) | (self.angle_deg > self.uncertainty_deg)
 
 
 class KeyPoses(Table):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from er3a.collision.pairs import TRIED
@@ -26,33 +26,18 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.palette import HIGHLIGHT, VERDICTS
 from er3a.robots.robot import Robot
 
-MAX_PAIRS = 12
 LOST, CLEAR, JOINED = 0, 1, 2
 
 
-def by_pair(pairs: model.PairShares) -> Picture | None:
-    """How much of joint space each pair takes; None where none takes any."""
-    shown = pairs.take(np.flatnonzero(pairs.ratio > 0)[:MAX_PAIRS])
-    if not len(shown):
-        return None
-    figure, ax = new_figure(width=9.0, height=0.8 + 0.28 * len(shown))
-    y = np.arange(len(shown))[::-1]
-    spread = 100 * np.abs(np.stack([shown.ratio - shown.low, shown.high - shown.ratio]))
-    colours = [MODEL if own else REFERENCE for own in shown.of_itself]
-    ax.barh(y, 100 * shown.ratio, color=colours, xerr=spread, ecolor=INK, height=0.7)
-    ax.set_yticks(y, [say(pair) for pair in shown.between])
-    ax.set_xlabel(tr("share of the joint space in which the pair overlaps (%)"))
-    worst = say(shown.between[0])
-    caption = tr(
-        "{pair} collide most often: in {percent} % of the joint space. Blue: self-collision; orange: with the "
-        "scene. Lines: 95 % intervals.",
-        pair=worst[:1].upper() + worst[1:],
-        percent=fixed(100 * shown.ratio[0], 1),
-    )
-    return Picture(figure, tr("Bars: share of joint space per pair. {conclusion}", conclusion=caption), caption)
+def most_often(pairs: model.PairShares) -> str:
+    """The pair that takes the largest part of joint space; empty where none takes any."""
+    if not len(pairs) or not pairs.ratio[0]:
+        return ""
+    worst, percent = say(pairs.between[0]), fixed(100 * pairs.ratio[0], 1)
+    return tr("{pair} overlap most often, in {percent} % of it.", pair=worst[:1].upper() + worst[1:], percent=percent)
 
 
 def _two_views(height: float) -> tuple[Figure, list[tuple[Axes, list[int]]]]:
@@ -103,19 +88,13 @@ def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
     np.add.at(apart, tuple(index[state == CLEAR].T), 1)
     share = np.where(count > 0, lost / np.maximum(count, 1), np.nan)
     edges = [low[k] + cell * (np.arange(size[k] + 1) - 0.5) for k in (0, 1)]
-    colours = ListedColormap([_mixed(k / 20) for k in range(21)])
+    colours = LinearSegmentedColormap.from_list("lost", [VERDICTS["pass"], VERDICTS["fail"]], 21)
     mesh = ax.pcolormesh(
         *edges, 100 * share.T, cmap=colours, vmin=0, vmax=100, edgecolors="white", linewidth=0.3, rasterized=True
     )
     ringed = np.argwhere(apart > 0)
     ax.plot(*(low + cell * ringed).T, "o", markerfacecolor="none", markeredgecolor=HIGHLIGHT, markersize=5)
     return mesh
-
-
-def _mixed(share: float) -> tuple[float, ...]:
-    """From the colour of a pass to that of a fail."""
-    ends = [np.array([int(VERDICTS[key][k : k + 2], 16) for k in (1, 3, 5)]) / 255 for key in ("pass", "fail")]
-    return tuple(1 - (0.35 + 0.65 * share) * (1 - (1 - share) * ends[0] - share * ends[1]))
 
 
 NO_BREAK_SPACE = "\u00a0"
@@ -134,9 +113,10 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         stored,
         output,
         _answer(summary, closest),
-        matrix=_matrix(robot, results.matrix, results.summary.verdict.shapes is not None),
+        matrix=_matrix(robot, results.matrix),
+        never=int((results.matrix.state == "never").sum()),
         tried=TRIED,
-        by_pair=by_pair(results.pairs),
+        most_often=most_often(results.pairs),
         workspace=workspace(results),
         player=player(robot, motions(robot, results), scene, opened=worst),
         drawing_head=drawing_head(),
@@ -171,8 +151,9 @@ def _row(found: model.Closest) -> ListRow:
     return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, "" if play else "#clearance", play)
 
 
-def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[str]]:
-    order = sorted(range(len(rows)), key=lambda k: model.STATES.index(rows.state[k]))
+def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:
+    told = [k for k in range(len(rows)) if rows.state[k] != "never"]
+    order = sorted(told, key=lambda k: model.STATES.index(rows.state[k]))
     return [
         [
             *(body_word(name).replace(" ", NO_BREAK_SPACE) for name in (rows.first[k], rows.second[k])),
@@ -180,12 +161,10 @@ def _matrix(robot: Robot, rows: model.MatrixRows, assumed: bool) -> list[list[st
             tr("yes") if rows.watched[k] else tr("no"),
             why(
                 rows.state[k],
-                rows.least_mm[k],
-                rows.left_out_mm[k],
-                int(rows.boxes[k]),
-                _angles(robot, rows.witness_deg[k]),
-                rows.reason[k],
-                assumed=assumed,
+                radius=float(rows.left_out_mm[k]),
+                boxes=int(rows.boxes[k]),
+                witness=_angles(robot, rows.witness_deg[k]),
+                reason=rows.reason[k],
             ),
         ]
         for k in order

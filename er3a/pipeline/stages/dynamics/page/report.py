@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
-from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
 from er3a.pipeline.player.player import drawing_head, player
@@ -19,7 +18,7 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
-from er3a.pipeline.viewing.figures import axis_label, new_figure, row_of_panels
+from er3a.pipeline.viewing.figures import axis_label, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
 from er3a.pipeline.viewing.side_view import seen_arm, side_view
@@ -84,29 +83,6 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 
 
-def holding_figure(summary: model.DynamicsSummary) -> Picture:
-    """Bars of the largest holding torque at each joint."""
-    figure, ax = new_figure(1, 1, width=7.0, height=2.8)
-    joints = np.arange(len(summary.holding))
-    size = np.array([abs(held.torque) for held in summary.holding])
-    tolerance = np.array([held.tolerance for held in summary.holding])
-    ax.bar(joints, size, color=[joint_colour(int(j)) for j in joints], width=0.6)
-    ax.errorbar(joints, size, yerr=tolerance, fmt="none", ecolor=INK, capsize=4)
-    ax.set_xticks(joints, [f"J{j + 1}" for j in joints])
-    ax.set_ylabel(tr("holding torque ({unit})", unit=_units(summary)["torque"]))
-    ax.grid(visible=False, axis="x")
-    worst = model.hardest_held(summary.holding)
-    caption = tr(
-        "At rest J{joint} needs the greatest holding torque: {torque} {unit}. No pose within the "
-        "joint limits needs more than {bound} {unit} there, for the masses as given.",
-        joint=worst.joint,
-        torque=within(abs(worst.torque), worst.tolerance),
-        unit=worst.unit,
-        bound=at_most(worst.bound, decimals_of_column([worst.bound])),
-    )
-    return Picture(figure, tr("Bars: the greatest holding torque at each joint, with its tolerance."), caption)
-
-
 MAX_USES = 12
 NONE = "–"
 
@@ -120,14 +96,13 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         for path in summary.paths
         if path.complete
     ]
-    holding = holding_figure(summary) if summary.holding else None
     render_stage(
         study,
         stored,
         output,
         _answer(summary),
         arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
-        payload=payload_text(summary, robot)[0],  # what to ask for is the list of what is not known
+        payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         unknown=listed(summary.unknown),
         links=_links(summary),
@@ -135,15 +110,13 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         more_uses=max(0, len(summary.uses) - MAX_USES),
         motors=_motors(summary.motors),
         paths=[_path(path) for path in summary.paths if path.counts],
-        not_run=[_not_run(path) for path in summary.paths if not path.counts],
+        not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
         margins=any(path.payload or path.speed_scale for path in summary.paths),
         figures=figures,
         player=player(robot, motions(robot, results), opened=_greatest(results)),
         drawing_head=drawing_head(),
         wrist=_wrist(summary),
-        wrist_uses=_wrist_uses(summary),
         units=_units(summary),
-        holding=holding,
         held=_held(summary.holding),
     )
 
@@ -275,15 +248,6 @@ def _motor(motor: model.MotorNeed, torque: int, power: int, inertia: int) -> lis
     ]
 
 
-def _not_run(path: model.PathLoad) -> list[str]:
-    why = joined(map(outcome_word, path.outcomes), ", ")
-    if not path.complete:
-        return [path.name, why, tr("not followed to its end")]
-    worst = path.hardest
-    peak = f"{within(worst.peak, worst.tolerance)} {worst.unit} (J{worst.joint})"
-    return [Markup('<a href="#{0}">{0}</a>').format(path.name), why, peak]
-
-
 def _path(path: model.PathLoad) -> list[str]:
     worst = path.hardest
     energy, back = sum(load.work_j for load in path.joints), sum(load.recovered_j for load in path.joints)
@@ -318,11 +282,6 @@ def _held(holding: Sequence[model.HoldingTorque]) -> list[list[str]]:
         ]
         for held in holding
     ]
-
-
-def _wrist_uses(summary: model.DynamicsSummary) -> list[list[str]]:
-    at_rest = [use for use in summary.uses if use.path is None and use.quantity in ("payload", "moment", "inertia")]
-    return [[*_use(use)[:2], *_use(use)[3:]] for use in at_rest]
 
 
 def _wrist(summary: model.DynamicsSummary) -> list[list[str]]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
@@ -22,109 +22,55 @@ from er3a.pipeline.messages.inverse import (
     SHAPES,
     limits_in_short,
 )
-from er3a.pipeline.messages.kinematics import RULE_NAMES, RULE_TITLES, branch_word, singularity_word
-from er3a.pipeline.messages.numbers import fixed, no_noise, number
-from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import pair_words
+from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
+from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
-from er3a.pipeline.viewing.figures import equal_scale, row_of_panels
-from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, shape_of
+from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.pipeline.viewing.palette import shape_of
+from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, SeenArm, side_view
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
 
-NAMED = 12  # targets that a cell names
 
-
-TITLE: dict[str, Any] = {"loc": "left", "fontsize": 11, "fontweight": "bold"}
-
-
-def overlay(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Picture:
-    """All arm shapes that solve a target, from the side and from above.
+def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Markup:
+    """All arm shapes that solve a target, from the side, along its direction; the one taken over the others.
 
     Parameters
     ----------
     branches : the best row of each branch
     """
-    figure, axes = row_of_panels(2, 8.5, 5.75, (0.75, 1.05, 0.3, 0.35, 0.75), width_ratios=[1, 1])
-    handles = _draw_arms(axes[0], axes[1], robot, target, branches)
-    figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=9)
-    alt = tr(
-        "{count} branches for target {own_name}, drawn over one another", count=len(branches), own_name=target.name
-    )
-    return Picture(figure, alt, _conclude(target))
-
-
-def _conclude(target: model.TargetResult) -> str:
-    if target.chosen_deg is not None:
-        return tr("Bold: the chosen solution. Flip and no-flip look the same here.")
-    if target.collide:
-        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit or collides.")
-    if target.solutions:
-        return tr("Every solution that reaches the target (dashed) has a joint beyond its limit.")
-    return tr("The arm, drawn at the reference, can't reach the target.")
-
-
-def _draw_arms(
-    side: Axes, top: Axes, robot: Robot, target: model.TargetResult, branches: model.SolutionRows
-) -> list[Line2D]:
     from_world = np.linalg.inv(robot.base)
 
-    def in_base(points_m: np.ndarray) -> np.ndarray:
-        return (np.asarray(points_m) @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
+    def seen(points_m: Reals) -> Reals:
+        points: Reals = (points_m @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
+        return np.stack([points[..., :2] @ level, points[..., 2]], axis=-1)
 
-    goal = in_base(np.array(target.xyz_mm) / 1000)
-    level = goal[:2] / np.hypot(*goal[:2]) if np.hypot(*goal[:2]) > 1 else np.array([1.0, 0.0])
+    def arm(q: Reals, title: str, note: str, kind: Kind) -> SeenArm:
+        return SeenArm(title, note, kind, seen(skeleton(robot, meant(robot, q))))
 
-    def draw(points: np.ndarray, **style) -> None:
-        side.plot(points[:, :2] @ level, points[:, 2], solid_joinstyle="round", marker="o", **style)
-        top.plot(points[:, 0], points[:, 1], solid_joinstyle="round", marker="o", **style)
-
-    handles = []
+    level = np.array([1.0, 0.0])
+    goal = from_world[:2] @ [*np.array(target.xyz_mm) / 1000, 1.0]
+    level = goal / np.hypot(*goal) if np.hypot(*goal) > AT_AXIS else level
+    arms = []
     shapes = np.array([shape_of(int(branch), label) for branch, label in zip(branches.branch, branches.label)])
-    for shape in np.unique(shapes):
-        rows = branches.take(shapes == shape)
-        allowed, chosen = bool((rows.rank > 0).any()), bool((rows.rank == 1).any())
-        style: dict[str, Any] = {"color": colour_of(int(shape)), "linewidth": 2, "markersize": 4, "zorder": 4}
-        if chosen:
-            style |= {"linewidth": 5, "markersize": 7, "zorder": 6}
-        if not allowed:
-            style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "markersize": 3, "zorder": 3}
-        draw(in_base(skeleton(robot, meant(robot, rows.q_deg[0]))), **style)
-        if allowed:
-            label = _shape_word(rows.label[0], int(rows.branch[0]))
-            label = tr("{shape} (chosen)", shape=label) if chosen else label
-            handles.append(Line2D([], [], label=label, **style))
-    if not len(branches):
-        style = {"color": MUTED, "linewidth": 3, "markersize": 5}
-        draw(in_base(skeleton(robot, meant(robot, np.array(target.q_ref_deg)))), **style)
-        handles.append(Line2D([], [], label=tr("arm at the reference"), **style))
-    elif not (branches.rank > 0).all():
-        style = {"color": MUTED, "linewidth": 1.3, "linestyle": "--", "marker": "o", "markersize": 3}
-        words = tr("outside the limits or colliding") if target.collide else tr("outside the limits")
-        handles.append(Line2D([], [], label=words, **style))
-    cross = {"marker": "P", "markersize": 11, "color": HIGHLIGHT, "markeredgecolor": "white", "linestyle": "none"}
-    handles.append(_mark(side, top, goal, level, tr("target"), **cross))
-    near = target.neighbours
-    if near and near.shifted_to_mm:
-        ring = {"marker": "o", "markersize": 9, "color": "none", "markeredgecolor": HIGHLIGHT, "linestyle": "none"}
-        point = in_base(np.array(near.shifted_to_mm) / 1000)
-        handles.append(_mark(side, top, point, level, tr("nearest position with a solution"), **ring))
-    side.set_title(tr("Side, in the target's direction"), **TITLE)
-    top.set_title(tr("From above"), **TITLE)
-    equal_scale(side, tr("distance from axis 1 (mm)"), "z (mm)")
-    equal_scale(top, "x (mm)", "y (mm)")
-    return handles
-
-
-def _mark(side: Axes, top: Axes, point: np.ndarray, level: np.ndarray, label: str, **style) -> Line2D:
-    side.plot([point[:2] @ level], [point[2]], zorder=8, **style)
-    top.plot([point[0]], [point[1]], zorder=8, **style)
-    return Line2D([], [], label=label, **style)
+    for rows in (branches.take(shapes == shape) for shape in np.unique(shapes)):
+        refused, taken = not (rows.rank > 0).any(), (rows.rank == 1).any()
+        kind: Kind = "right" if taken else "wrong" if refused else "other"
+        note = tr("chosen") if taken else tr("refused") if refused else ""
+        arms.append(arm(rows.q_deg[0], _shape_word(rows.label[0], int(rows.branch[0])), note, kind))
+    if not arms:
+        arms = [arm(np.array(target.q_ref_deg), tr("arm at the reference"), "", "other")]
+    arms.sort(key=lambda each: ("wrong", "other", "right").index(each.kind))
+    places = [(tr("target"), target.xyz_mm)]
+    if target.neighbours and target.neighbours.shifted_to_mm:
+        places.append((tr("nearest position with a solution"), target.neighbours.shifted_to_mm))
+    named = [(f"◂ {word}", seen(np.array(place) / 1000)) for word, place in places]
+    return side_view([*arms[:-1], replace(arms[-1], holes=named)], least_wide=UPRIGHT)
 
 
 def _shape_word(label: str, branch: int) -> str:
@@ -134,6 +80,7 @@ def _shape_word(label: str, branch: int) -> str:
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
+AT_AXIS = 1e-3  # m, nearer to axis 1 a target has no direction
 
 
 MAX_SELF_MOTIONS = 6
@@ -143,7 +90,6 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
-    rules = list(dict.fromkeys(results.rankings.rule))
     names = results.solutions.target
 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
@@ -157,17 +103,14 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         _answer(summary, chosen),
         nearest_rule=tr(NEAREST_RULE),
         overview=[overview_row(robot, target, of_target(target)) for target in chosen],
-        sections=[_section(robot, target, results, rules, contradicted) for target in chosen],
+        sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
         chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
-        rule_columns=[tr("Branch"), *(_rule_heading(robot, rule) for rule in rules), tr("Clearance between")],
         trips=trips,
-        rules=[(_rule(rule), word("rule.title", RULE_TITLES, rule)) for rule in RULES],
-        mix=tr(", ").join(f"{_rule(rule)} {weight:g}" for rule, weight in summary.mix.items()),
         stops=_stops(summary.sequence, {target.name for target in chosen}),
         move=_move_rule(robot, summary.sequence),
     )
@@ -206,16 +149,14 @@ def _row(target: model.TargetResult) -> ListRow:
 def _section(
     robot: Robot,
     target: model.TargetResult,
-    results: model.InverseResults,
-    rules: list[str],
+    rows: model.SolutionRows,
     contradicted: bool,
 ) -> dict[str, Any]:
-    rows = results.solutions.take(results.solutions.target == target.name)
     branches = best_of_branches(rows)
     own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return dict(
         target=target,
-        picture=overlay(robot, target, branches),
+        picture=solutions_seen(robot, target, branches),
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
@@ -226,7 +167,6 @@ def _section(
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=_branch_rows(rows, branches),
-        rules=rule_rows(results.rankings.take(results.rankings.target == target.name), rules),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
@@ -238,38 +178,6 @@ def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
     return best.take(np.argsort(best.branch, kind="stable"))
 
 
-def _rule(rule: str) -> str:
-    return word("rule", RULE_NAMES, rule)
-
-
-def _rule_heading(robot: Robot, rule: str) -> str:
-    unit = next((own.unit_of(robot) for name, own in RULES.items() if name == rule), "1")
-    return bracketed(_rule(rule), "" if unit == "1" else tr(unit)) + ">"
-
-
-def _measure(rule: str, value: float) -> str:
-    """What a rule ranks by, in the decimals that matter in its unit."""
-    unit = next((own.unit for name, own in RULES.items() if name == rule), "1")
-    decimals = 3 if rule == "manipulability" else 2 if unit in ("1", "s") else 1
-    return "∞" if np.isinf(value) else fixed(no_noise(value), decimals)
-
-
-def rule_rows(ranked: model.RankingRows, rules: list[str]) -> list[list[str]]:
-    """One row for each branch: the measure of each rule, with its place, and the pair that has the clearance; a dash
-    for a rule that this target lacks."""
-    rows, collides = [], tr("collides")
-    for branch in np.unique(ranked.branch):
-        own = ranked.take(ranked.branch == branch)
-        cells = {
-            rule: f"{_measure(rule, measure)}{NO_BREAK_SPACE}({place or collides})"
-            for rule, measure, place in zip(own.rule, own.measure, own.place)
-        }
-        pair = next((label for label in own.between if label), "")
-        cells_shown = (cells.get(rule, "–") for rule in rules)
-        rows.append([_on_one_line(own.label[0], int(branch)), *cells_shown, pair_words(pair) if pair else "–"])
-    return rows
-
-
 def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
     """The nearest self-motions, and how many more there are."""
     texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
@@ -279,42 +187,15 @@ def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[
 
 
 def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
-    text = _curve(robot, family)
-    if family.dimension > 1:
-        return tr(
-            "{text}; this is one curve of a surface of solutions, on which the arm can move in {count} ways at once "
-            "and stay on the target",
-            text=text,
-            count=family.dimension,
-        )
-    return text
-
-
-def _curve(robot: Robot, family: model.SelfMotion) -> str:
-    of_slide = f"{NO_BREAK_SPACE}mm/°"
-    moving = [
-        f"J{j + 1} {'+' if rate > 0 else ''}{fixed(rate, 2)}{of_slide if robot.slides[j] else ''}"
-        for j, rate in enumerate(family.direction)
-        if abs(rate) > 1e-9
-    ]
-    low, high = family.range_deg
-    parts = {
-        "where": word("self_motion", FREE_AT, family.kind),
-        "joints": with_unit(f"({_listed(family.q0_deg)})", _units(robot), NO_BREAK_SPACE),
-        "rates": joined(moving, ", "),
-    }
-    if not family.within_limits:
-        return tr(
-            "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, but "
-            "every member leaves the limits",
-            **parts,
-        )
+    low, high = (fixed(end, 1) for end in family.range_deg)
     return tr(
-        "{where}: from {joints}, nearest to the reference, joints move on the target in the ratio {rates}, for {low} "
-        "to {high} deg",
-        low=fixed(low, 1),
-        high=fixed(high, 1),
-        **parts,
+        "{where}: the arm can move about ({joints}) {units} with the tool at rest, {room}",
+        where=word("self_motion", FREE_AT, family.kind),
+        joints=_listed(family.q0_deg),
+        units=_units(robot),
+        room=tr("for {low} to {high} deg", low=low, high=high)
+        if family.within_limits
+        else tr("but every member leaves the limits"),
     )
 
 
@@ -351,8 +232,7 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
 
 
 def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
-    """The cells of a target with its ``rows``: name, place, branches, what is chosen, its clearance, and why."""
-    unreached = target.obstacle if not target.solutions else None
+    """The cells of a target with its ``rows``: name, place, branches, what is chosen, and its clearance."""
     near = target.clearance
     return [
         Markup('<a href="#{0}">{0}</a>').format(target.name),
@@ -360,7 +240,6 @@ def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionR
         tr("{within} of {all}", within=target.within_limits, all=target.solutions),
         tr("none") if target.chosen_deg is None else _chosen(robot, target, rows),
         tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
-        say(unreached or target.reason),
     ]
 
 

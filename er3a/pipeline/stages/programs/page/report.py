@@ -13,7 +13,6 @@ from markupsafe import Markup, escape
 
 from er3a.finding import is_one
 from er3a.pipeline.language import first_sentence, tr, with_unit
-from er3a.pipeline.messages.collision import solid_rows
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
@@ -65,7 +64,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         faults={fault.name: fault for fault in wrong},
         player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],
-        solids=solid_rows(scene),
         drawing_head=drawing_head(),
     )
 

@@ -1,4 +1,4 @@
-"""The figure of a path: curves and measures over one time, and the joints' effort before and after.
+"""The figure of a path: curves and measures over one time.
 
 Layout is fixed, so that matplotlib draws each figure once.
 """
@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -19,17 +18,11 @@ from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label, clearance_panels, svg_data_uri
-from er3a.pipeline.viewing.page import Picture
+from er3a.pipeline.viewing.figures import axis_label, svg_data_uri
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
-
-CONDITION_SCALE = LogNorm(3, 300)
-AZIMUTH, ELEVATION = np.radians(-55.0), np.radians(24.0)
-
 
 WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves that coincide all show
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
@@ -41,7 +34,7 @@ FONT = 9.0
 
 
 class PathFigure:
-    """Joint curves on the left, measures and the joints' effort on the right.
+    """Joint curves on the left, measures on the right.
 
     One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
     """
@@ -50,7 +43,6 @@ class PathFigure:
         self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
         self.joints = [self._axes(0, row) for row in range(3)]
         self.measures = [self._axes(1, row) for row in range(2)]
-        self.effort = self._axes(1, 2)
         for column in (self.joints, self.measures):
             for ax in column:
                 ax.yaxis.set_label_coords(-0.1, 0.5)
@@ -63,7 +55,6 @@ class PathFigure:
         robot: Robot,
         path: model.PathSummary,
         rows: model.PathChecks,
-        motions: model.AvoidanceRows,
         near: model.NearThresholds,
     ) -> str:
         """The figure of a path as the data address of an image."""
@@ -75,7 +66,6 @@ class PathFigure:
         for ax in (*self.joints, *self.measures):
             _mark(ax, path)
             ax.set_xlim(rows.t_s[0], rows.t_s[-1])
-        _effort(self.effort, path, rows, motions)
         handles = _legend(path)
         legend = self.figure.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
@@ -91,10 +81,10 @@ class PathFigure:
         return [[round(float(value), 5) for value in (*extents, *ends)] for extents, ends in shown]
 
     def _axes(self, column: int, row: int) -> Axes:
-        height = (TOP - BOTTOM) / 3
-        gap = 0.07 if (column, row) == (1, 2) else 0.03  # room for the label of the axis of time above the last one
-        x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (2 - row) * height
-        ax = self.figure.add_axes((x, y, WIDTH, height - gap))
+        rows = (3, 2)[column]
+        height = (TOP - BOTTOM) / rows
+        x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (rows - 1 - row) * height
+        ax = self.figure.add_axes((x, y, WIDTH, height - 0.03))
         ax.tick_params(labelsize=FONT, length=2)
         ax.xaxis.set_major_locator(MaxNLocator(5))
         ax.yaxis.set_major_locator(MaxNLocator(4))
@@ -137,7 +127,7 @@ def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> 
     ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
-    _key(ax, "lower left")
+    _key(ax)
 
 
 def _condition(ax: Axes, rows: model.PathChecks) -> None:
@@ -158,30 +148,8 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
 
 
-def _effort(ax: Axes, path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> None:
-    """The joints' largest ratio of speed to limit over the share of the time: programmed, repaired, at its fastest."""
-    ax.plot(rows.t_s / rows.t_s[-1], rows.speed_ratio, color=palette.HIGHLIGHT, label=tr("as programmed"))
-    shown = [rows.speed_ratio]
-    for name, colour, label in (
-        (path.strategy, palette.MODEL, tr("repaired")),
-        (model.FASTEST, palette.MUTED, tr("at its fastest")),
-    ):
-        part = motions.take(motions.strategy == name)
-        if len(part):
-            ax.plot(part.t_s / (part.t_s[-1] or np.nan), part.speed_ratio, color=colour, label=label, linewidth=1.3)
-            shown.append(part.speed_ratio)
-    ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
-    size = np.concatenate(shown)
-    most = np.nanmax(size) if np.isfinite(size).any() else 1.0
-    ax.set_ylim(0, 1.35 * max(1.0, most) if path.joint_speed_bounded else 3.0)
-    ax.set_xlim(0, 1)
-    ax.set_xlabel(tr("share of each motion's time"), fontsize=FONT)
-    ax.set_ylabel(tr("joint speed / limit"), fontsize=FONT)
-    _key(ax, "upper left")
-
-
-def _key(ax: Axes, corner: Literal["upper left", "lower left"]) -> None:
-    legend = ax.legend(loc=corner, ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+def _key(ax: Axes) -> None:
+    legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
     legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
     legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
 
@@ -249,39 +217,3 @@ def _legend(path: model.PathSummary) -> list[Line2D | Patch]:
             )
     handles += [Patch(color=colour, alpha=2 * alpha, label=label) for _, colour, alpha, label in _shades(path)]
     return handles
-
-
-Measured = tuple[model.PathSummary, model.MinClearance]
-
-
-def clearance_picture(results: model.TrajectoryResults, most: int) -> Picture | None:
-    """Clearance over time of at most so many paths, those with the smallest; None if no path can be reached."""
-    paths = [(path, path.clearance) for path in results.summary.paths if path.clearance]
-    if not paths:
-        return None
-    colliding = [path.name for path, _ in paths if path.collisions]
-    if colliding:
-        names = joined(colliding, ", ")
-        caption = tr("Below zero bodies overlap: {paths} can't be driven as planned.", paths=names)
-    else:
-        caption = tr("No path reaches zero: the arm collides neither with its surroundings nor with itself.")
-    if any(path.unreachable for path, _ in paths):
-        caption = joined([caption, tr("Grey: not reachable.")], " ")
-    drawn = sorted(paths, key=lambda measured: measured[1].least_mm)[:most] if len(paths) > most else paths
-    if len(paths) > most:
-        caption = joined([caption, tr("Drawn: the {count} paths with the least clearance.", count=most)], " ")
-    alt = tr("Least clearance over time, one panel per path. {conclusion}", conclusion=caption)
-    return Picture(_curves(drawn, results.clearance), alt, caption)
-
-
-def _curves(paths: list[Measured], rows: model.Clearances) -> Figure:
-    figure, panels = clearance_panels(rows, [path.name for path, _ in paths])
-    for (ax, _), (path, smallest) in zip(panels, paths):
-        colour = palette.VERDICTS["fail"] if smallest.least_mm <= 0 else palette.INK
-        ax.plot(smallest.t_s, smallest.least_mm, "o", color=colour, markersize=4)
-        for gap in path.unreachable:
-            ax.axvspan(gap.t0_s, gap.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
-        ax.set_xlim(0, path.duration_s)
-    low, high = np.nanmin(rows.clearance_mm), np.nanmax(rows.clearance_mm)
-    panels[0][0].set_ylim(min(low, 0.0) - 0.05 * (high - low), high + 0.05 * (high - low))
-    return figure

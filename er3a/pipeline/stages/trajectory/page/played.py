@@ -21,7 +21,6 @@ from er3a.pipeline.messages.trajectory import (
     FactName,
     FaultText,
     Slowed,
-    advice,
     cause_of,
     cause_text,
     end_facts,
@@ -29,6 +28,7 @@ from er3a.pipeline.messages.trajectory import (
     event_word,
     fact_word,
     first_faults,
+    no_repair,
     path_text,
     repair_facts,
     repair_lead,
@@ -133,10 +133,10 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
 def _faults(path: model.PathSummary) -> list[FaultText] | list[FaultMoment]:
     """What is wrong with a path that is not safe, and when (s): first, and what weighs more later."""
     found = [] if path.not_planned else first_faults(path)
-    if (path.verdict in ("singular", "near-singular") and len(found) <= 1) or not found:
-        times = [] if path.not_planned else path.singular_times_s or [event.t_s for event in path.singularities]
-        return [FaultText(min(times), path_text(path), min(times))] if times else [FaultMoment(path_text(path))]
-    return found
+    if found or not path.singularities or path.not_planned:
+        return found or [FaultMoment(path_text(path))]
+    first = min(event.t_s for event in path.singularities)
+    return [FaultText(first, path_text(path), first)]
 
 
 def _in_program(path: model.PathSummary) -> list[FaultMoment]:
@@ -193,7 +193,7 @@ def _to_do(
         return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), [], None
     last = path.sound_end
     if last is None:
-        todo = advised(path, rows, motions, summary.joint_limits, shapes=shapes)
+        todo = advised(path, rows)
         return sentence("finding", finding=todo) if todo else "", [], None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     address = address_of("trajectory", path.name, last.t_s, path.name, last.t_s)
@@ -230,28 +230,15 @@ def _kept_length(path: model.PathSummary, rows: model.PathChecks, repair: model.
     return length if np.isfinite(length[-1]) and length[-1] >= MIN_LENGTH else None
 
 
-def advised(
-    path: model.PathSummary,
-    rows: model.PathChecks,
-    motions: model.AvoidanceRows,
-    limits: model.LimitsUsed,
-    *,
-    shapes: Finding | None = None,
-) -> str | None:
-    """What to do about a path; None where nothing is to be done.
-
-    ``rows``, ``motions``, ``limits``: of the path, of its repairs, of the joints; ``shapes``: that clearance is that of
-    assumed ones.
-    """
-    repair = motions.take(motions.strategy == path.strategy) if path.chosen else motions
-    text = advice(path, limits, shapes=shapes, slowed=slowed(path, rows, repair))
-    if text is None or path.chosen:
-        return text and joined([text, _switch(path, rows, motions)], ". ")
+def advised(path: model.PathSummary, rows: model.PathChecks) -> str:
+    """Why nothing repairs a path that may end nowhere, and that no part of it is to be run; empty where nothing was
+    tried. ``rows``: of the path."""
+    if not path.avoidance:
+        return ""
+    no_part = sentence("advice.no_part")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
-        near = sentence("path.cause", event=sentence("advice.no_part"), pose=sentence("advice.near"))
-        return joined([near, text], ". ")
-    no_part = path.sound_end is None and weight_of(path.verdict) == "fail"
-    return joined([text, sentence("advice.no_part")], ". ") if no_part else text
+        return joined([sentence("path.cause", event=no_part, pose=sentence("advice.near")), no_repair(path)], ". ")
+    return joined([no_repair(path), no_part if weight_of(path.verdict) == "fail" else ""], ". ")
 
 
 def _switch(path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> str:

@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.trajectory import advice, event_word, path_text
+from er3a.pipeline.messages.trajectory import event_word, path_text, repair_text
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import MotionRows, PathChecks, PathSummary, TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.played import contact, events, near_assumed, shown_verdict
@@ -87,7 +87,7 @@ def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) ->
         shapes=[*still, *_trail(shown, HIGHLIGHT)],
     )
     if path.chosen and path.chosen.motion:
-        to_do = advice(path, results.summary.joint_limits) or ""
+        to_do = repair_text(path, results.summary.joint_limits)
         repair: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         repaired = repair.take(_frames(repair))
         yield Run(

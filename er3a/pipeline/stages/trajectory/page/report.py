@@ -10,18 +10,15 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.pairs import Pair
-from er3a.pipeline.language import N_, tr, using, with_unit
-from er3a.pipeline.messages.collision import solid_rows
+from er3a.pipeline.language import tr, using, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.kinematics import branch_word
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import FAR
-from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import (
     adjoined,
     cause_text,
-    event_distance,
-    event_word,
     kind_word,
     limits_assumed,
     path_text,
@@ -34,7 +31,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure, clearance_picture
+from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     kinds,
@@ -50,7 +47,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.figures import readings
-from er3a.pipeline.viewing.page import packed_text, render_stage
+from er3a.pipeline.viewing.page import packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -62,7 +59,7 @@ MAX_DRAWN, DRAWN_OF_MORE = 16, 8  # paths with a figure and programs to save: al
 def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) -> None:
     """Write the trajectory page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
-    summary, checks, avoidance = results.summary, results.checks, results.avoidance
+    summary, checks = results.summary, results.checks
     scene = study.scene(stored.robot, stored.stage)
     figure, sections = PathFigure(), []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
@@ -72,11 +69,11 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     wrong = _by_name(results)
     played = motions(robot, results, _tray_events(met or {}))
     for i, path in enumerate(paths):
-        rows, own = checks.take(checks.path == path.name), avoidance.take(avoidance.path == path.name)
+        rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(figure, robot, path, rows, own, summary.near) if i < count else None
-        sections.append(_section(path, rows, own, drawn, links, summary))
+        drawn = _figure(figure, robot, path, rows, summary.near) if i < count else None
+        sections.append(_section(path, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
@@ -89,10 +86,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         compared_with_tray=compared_with_tray,
         faults=wrong,
         unwritten=titles_unwritten(study.section(TrajectorySettings).programs, robot),
-        clearance=clearance_picture(results, count),
-        solids=solid_rows(scene),
         assumed=assumed,
-        assumed_speeds=_assumed_speeds(summary.joint_limits, robot),
         limits_assumed=limits_assumed(summary.joint_limits.speed_assumed, summary.joint_limits.acceleration_assumed),
         contradicted=contradicted,
         drawn_paths=count,
@@ -189,26 +183,12 @@ def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:
     return {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in met.items()}
 
 
-def _assumed_speeds(limits: model.LimitsUsed, robot: Robot) -> str:
-    """The joint speeds that are assumed, each with its joints."""
-    joints: dict[str, list[str]] = {}
-    for j, (speed, assumed) in enumerate(zip(limits.speed_deg_s, limits.speed_assumed)):
-        if assumed:
-            shown = with_unit(number(speed, 4), "mm/s" if robot.slides[j] else "deg/s")
-            joints.setdefault(shown, []).append(f"J{j + 1}")
-    return joined([bracketed(speed, ", ".join(named)) for speed, named in joints.items()], ", ")
-
-
 def _programs(
     path: model.PathSummary, rows: model.ProgramFiles, head: Sequence[str], met: Mapping[str, Meeting]
 ) -> list[dict[str, Any]]:
     """The files to save, each with further lines at the beginning of its head: ``head``, and in English when it meets
     the tray; ``met``: by names of motions."""
-    speeds = [
-        ", ".join(with_unit(*speed.split(" ", 1)) for speed in text.split(", ") if speed)
-        for text in rows.assumed_speed.tolist()
-    ]
-    texts = zip(rows.file.tolist(), rows.text.tolist(), speeds)
+    texts = zip(rows.file.tolist(), rows.text.tolist(), rows.assumed_speed.tolist())
     found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
     for each in found:
         meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
@@ -225,13 +205,11 @@ def _in_head(meeting: Meeting | None) -> list[str]:
 
 def _section(
     path: model.PathSummary,
-    rows: model.PathChecks,
-    motions: model.AvoidanceRows,
     figure: dict[str, Any] | None,
     programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
 ) -> dict[str, Any]:
-    near, assumed = near_assumed(path, summary), summary.verdict.shapes is not None
+    near = near_assumed(path, summary)
     status, verdict = shown_verdict(path, near)
     return dict(
         path=path,
@@ -239,12 +217,10 @@ def _section(
         verdict=verdict,
         kind=kind_word(path.kind),
         expected=as_expected(path),
-        text=joined([path_text(path), say(near) if near else ""]),
-        distance=_clear_of(path, assumed),
+        distance=_clear_of(path),
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
-        events=[_event_row(path, event) for event in path.singularities],
         faults=_faults(path),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
@@ -254,13 +230,11 @@ def _section(
     )
 
 
-def _clear_of(path: model.PathSummary, assumed: bool) -> str:
-    """How near a path that passes comes to anything, by ``assumed`` shapes; empty where that is not known."""
+def _clear_of(path: model.PathSummary) -> str:
+    """How near a path that passes comes to anything; empty where that is not known."""
     if path.clearance is None or path.verdict != "safe":
         return ""
-    far = fixed(path.clearance.least_mm, 1)
-    text = N_("{far} mm clear of assumed shapes: {pair}.") if assumed else N_("{far} mm clear: {pair}.")
-    return tr(text, far=far, pair=say(path.clearance.between))
+    return tr("{far} mm clear: {pair}.", far=fixed(path.clearance.least_mm, 1), pair=say(path.clearance.between))
 
 
 def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
@@ -272,17 +246,16 @@ def _figure(
     robot: Robot,
     path: model.PathSummary,
     rows: model.PathChecks,
-    motions: model.AvoidanceRows,
     near: model.NearThresholds,
 ) -> dict[str, Any]:
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
-        "condition number; joint speeds against their limits. {finding}.",
+        "condition number. {finding}.",
         path=path.name,
         finding=path_text(path),
     )
-    uri = figure.draw(robot, path, _drawn(path, rows), motions, near)
-    inches, caption = float(figure.figure.get_figwidth()), _conclusion(path, rows)
+    uri = figure.draw(robot, path, _drawn(path, rows), near)
+    inches, caption = float(figure.figure.get_figwidth()), whole_sentence(path_text(path))
     return dict(
         uri=uri, alt=alt, caption=caption, inches=inches, panels=figure.panels(), readings=readings(figure.figure)
     )
@@ -364,27 +337,6 @@ def _ratio(value: float | None) -> str:
     return f"> {FAR:g}" if value > FAR else fixed(value, 2)
 
 
-def _conclusion(path: model.PathSummary, rows: model.PathChecks) -> str:
-    """What the curves show, in one or two sentences."""
-    condition, parts = rows.condition_number, []
-    joint = path.fastest_joint
-    if (path.max_joint_speed_ratio or 0.0) > FAR:
-        parts.append(tr("A joint would need more than {times:g} times its speed.", times=FAR))
-    elif path.max_joint_speed_deg_s and joint is not None:
-        speed = number(path.max_joint_speed_deg_s[joint], 3)
-        parts.append(tr("J{joint} is the fastest joint, with {speed} deg/s.", joint=joint + 1, speed=speed))
-    elif rows.reachable.any():
-        parts.append(tr("Towards the edge of reach the joint speeds grow without bound: the path must end before it."))
-    else:
-        parts.append(tr("No point of the path can be reached."))
-    if np.isinf(condition).any() or any(event.crossing for event in path.singularities):
-        parts.append(tr("The condition number has no bound at the marked singular poses."))
-    elif not np.isnan(condition).all():
-        most = number(float(np.nanmax(condition)), 3)
-        parts.append(tr("The condition number rises to {most} at most.", most=most))
-    return " ".join(parts)
-
-
 def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     """The speed of the joint that comes nearest to its limit."""
     speeds = path.max_joint_speed_deg_s
@@ -393,11 +345,3 @@ def _speed(path: model.PathSummary, limits: model.LimitsUsed) -> str:
     joint = max(range(len(speeds)), key=lambda j: speeds[j] / limits.speed_deg_s[j])
     unit = " mm/s" if joint + 1 in path.sliding else ""
     return f"{fixed(speeds[joint], 1)}{unit} (J{joint + 1})"
-
-
-def _event_row(path: model.PathSummary, event: model.Singularity) -> list[str]:
-    until = f" – {fixed(event.until_s, 3)}" if event.until_s > event.t_s else ""
-    when = moment(path.name, event.t_s, fixed(event.t_s, 3) + until)
-    if event.crossing:
-        return [event_word(event), when, tr("meets it"), "0"]
-    return [event_word(event), when, tr("passes by"), event_distance(event)]

@@ -117,7 +117,7 @@ def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
     """What is known of the payload at the tray, from the results of the stage dynamics beside these."""
     folder = stored.folder.parent / "dynamics" if stored.folder else None
     summary = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
-    lead, _ = payload_text(summary, study.robot(stored.robot))
+    lead = payload_text(summary, study.robot(stored.robot))
     there = tr("What the arm can carry at the tray was not examined.")
     if summary is None:
         return joined([lead, there], " ")
