@@ -33,7 +33,6 @@ class Block:
     subject: syntax.Expression | None = None
     step: syntax.Expression | None = None
     text: str = ""  # its first line, of a switch
-    word: str = ""  # what it is called in the text
 
 
 LOOPS = ("loop", "while", "for", "repeat")
@@ -143,74 +142,60 @@ class CodeBuilder:
         """
         return bool(self.blocks) and self.blocks[-1].kind in kinds
 
-    def open_if(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """Begin ``IF condition``: the code goes on to the next part where the condition does not hold.
+    def open(
+        self,
+        kind: str,
+        place: Place,
+        condition: syntax.Expression | None = None,
+        text: str = "",
+        *,
+        counted: bool = False,
+    ) -> None:
+        """Begin a loop or a branch.
 
         Parameters
         ----------
+        kind : ``if``, ``loop``, ``repeat``, ``while``, ``for`` or ``switch``
+        condition : without which the code goes on behind the block, or at its next part; a ``while`` of one that is
+            always true is a loop for ever
+        text : the line, for messages
+        counted : whether the condition is that of a counter
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
+        if len(self.blocks) >= MAX_NESTED:
+            raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
+        if kind in LOOPS:
+            self.add(syntax.Enter(place))
+        self.blocks.append(Block(kind, place, len(self.code)))
+        for_ever = kind == "while" and isinstance(condition, syntax.Constant) and condition.value is True
+        if condition is not None and not for_ever:
+            self._test(place, condition, text, counted)
+
+    def next_part(self, kind: str, place: Place, condition: syntax.Expression | None = None, text: str = "") -> None:
+        """End a part of a branch, if one is open, and begin the next: ``ELSE``, ``ELSEIF``, ``CASE``.
+
+        Parameters
+        ----------
+        kind : ``if`` or ``switch``
+        condition : None of ``ELSE`` and ``DEFAULT``
         text : the line, for messages
 
         Raises
         ------
         InputError
-            if too many blocks are nested
+            if the innermost block is another one
         """
-        self._open("if", place)
-        self._test(place, condition, text)
-
-    def next_arm(self, place: Place, condition: syntax.Expression | None, text: str) -> None:
-        """Go on with ``ELSE``, or ``ELSEIF`` with its condition.
-
-        Parameters
-        ----------
-        condition : None of ``ELSE``
-        text : the line, for messages
-
-        Raises
-        ------
-        InputError
-            if the innermost block is no IF
-        """
-        self._next_part(self._innermost("if", place), place, condition, text)
-
-    def open_while(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """Begin ``WHILE condition``, which is tested before each round.
-
-        Parameters
-        ----------
-        condition : one that is always true makes a loop for ever
-        text : the line, for messages
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        if isinstance(condition, syntax.Constant) and condition.value is True:
-            self._open("loop", place, "while")
-            return
-        self._open("while", place)
-        self._test(place, condition, text)
-
-    def open_loop(self, place: Place) -> None:
-        """Begin ``LOOP``, which goes on until something leaves it.
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        self._open("loop", place)
-
-    def open_repeat(self, place: Place) -> None:
-        """Begin ``REPEAT``, whose condition is tested after each round (:meth:`close`).
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        self._open("repeat", place)
+        block = self._innermost(kind, place)
+        if block.skips or block.exits:
+            block.exits.append(self._jump(place))
+        self._patch(block.skips)
+        block.skips = []
+        if condition is not None:
+            self._test(place, condition, text)
 
     def open_for(
         self,
@@ -240,11 +225,10 @@ class CodeBuilder:
         self.add(syntax.Assign(place, counter, first, text))
         self.add(syntax.Assign(place, limit, last, text, local=True))
         self.add(syntax.Assign(place, by, syntax.Constant(1) if step is None else step, text, local=True))
-        self._open("for", place)
-        self.blocks[-1].subject, self.blocks[-1].step = counter, by
         # One test for steps of either sign: until the last value is passed, what is left and the step have one sign.
         span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
-        self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
+        self.open("for", place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
+        self.blocks[-1].subject, self.blocks[-1].step = counter, by
 
     def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
         """Begin ``SWITCH subject``; cases follow.
@@ -262,15 +246,15 @@ class CodeBuilder:
         self._hidden += 1
         value = syntax.Variable(f"%subject{self._hidden}")
         self.add(syntax.Assign(place, value, subject, text, local=True))
-        self._open("switch", place)
+        self.open("switch", place)
         self.blocks[-1].subject, self.blocks[-1].text = value, text
 
-    def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
-        """Begin ``CASE values``, or ``DEFAULT``.
+    def case(self, place: Place, values: list[syntax.Expression], text: str) -> None:
+        """Begin ``CASE values``.
 
         Parameters
         ----------
-        values : the case is taken where the subject is one of them; None of ``DEFAULT``
+        values : the case is taken where the subject is one of them
         text : the line, for messages
 
         Raises
@@ -281,19 +265,10 @@ class CodeBuilder:
         block = self._innermost("switch", place)
         assert block.subject is not None
         condition: syntax.Expression | None = None
-        for value in values or ():
+        for value in values:
             test = syntax.Binary("==", block.subject, value)
             condition = test if condition is None else syntax.Binary("OR", condition, test)
-        self._next_part(block, place, condition, f"{block.text} {text}")
-
-    def _next_part(self, block: Block, place: Place, condition: syntax.Expression | None, text: str) -> None:
-        """The end of a part of a branch, if one is open, and the beginning of the next."""
-        if block.skips or block.exits:
-            block.exits.append(self._jump(place))
-        self._patch(block.skips)
-        block.skips = []
-        if condition is not None:
-            self._test(place, condition, text)
+        self.next_part("switch", place, condition, f"{block.text} {text}")
 
     def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
         """End the innermost block, which must be of this kind; its open jumps lead here.
@@ -314,42 +289,32 @@ class CodeBuilder:
             # A ``continue`` goes on at the condition, not after the loop.
             self._patch(block.skips)
             self.add(syntax.Branch(place, until, block.start, text))
-        elif block.kind in LOOPS:
-            if block.kind == "for":
-                self._count(block, place)
-            self.add(syntax.GoTo(place, block.start))
-        if kind != "repeat":
+        else:
+            if kind in LOOPS:
+                self._again(block, place)
             self._patch(block.skips)
         self._patch(block.exits)
         self.blocks.pop()
 
-    def leave_loop(self, place: Place) -> None:
-        """Go on after the innermost loop: ``EXIT``, ``break``.
+    def leave_loop(self, place: Place, goes_on: bool = False) -> None:
+        """Go on after the innermost loop (``EXIT``, ``break``), or with its next round (``continue``).
+
+        Parameters
+        ----------
+        goes_on : with the next round; a counter is advanced first, and a REPEAT goes on at its condition
 
         Raises
         ------
         InputError
             if no loop is open
         """
-        self._loop(place).exits.append(self._jump(place))
-
-    def next_round(self, place: Place) -> None:
-        """Go on with the next round of the innermost loop: ``continue``.
-
-        A counter is advanced first; a REPEAT goes on at its condition.
-
-        Raises
-        ------
-        InputError
-            if no loop is open
-        """
-        loop = self._loop(place)
-        if loop.kind == "repeat":
-            loop.skips.append(self._jump(place))
-            return
-        if loop.kind == "for":
-            self._count(loop, place)
-        self.add(syntax.GoTo(place, loop.start))
+        loop = next((block for block in reversed(self.blocks) if block.kind in LOOPS), None)
+        if loop is None:
+            raise fault(place, "leaves a loop, but none is open", "Remove it")
+        if goes_on and loop.kind != "repeat":
+            self._again(loop, place)
+        else:
+            (loop.skips if goes_on else loop.exits).append(self._jump(place))
 
     def label(self, name: str) -> None:
         """Name the next operation, so that :meth:`goto` can lead to it.
@@ -379,7 +344,7 @@ class CodeBuilder:
         """
         if self.blocks:
             block = self.blocks[-1]
-            raise fault(block.place, f"the {block.word.upper()} that begins here has no end", "Close it")
+            raise fault(block.place, f"the {block.kind.upper()} that begins here has no end", "Close it")
         for at, name in self._gotos:
             place = self.code[at].place
             if name not in self._labels:
@@ -388,30 +353,18 @@ class CodeBuilder:
         code = (*self.code, syntax.Return(end))
         return syntax.Routine(self.name, self.parameters, code, self.place, self.thread)
 
-    def _open(self, kind: str, place: Place, word: str = "") -> None:
-        if len(self.blocks) >= MAX_NESTED:
-            raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
-        if kind in LOOPS:
-            self.add(syntax.Enter(place))
-        self.blocks.append(Block(kind, place, len(self.code), word=word or kind))
-
-    def _innermost(self, word: str, place: Place) -> Block:
-        if not self.blocks or self.blocks[-1].word != word:
-            opened = f"the {self.blocks[-1].word.upper()} of line {self.blocks[-1].place.line}" if self.blocks else None
-            problem = f"ends or continues a {word.upper()}, but {opened or 'none'} is open"
+    def _innermost(self, kind: str, place: Place) -> Block:
+        if not self.inside(kind):
+            opened = f"the {self.blocks[-1].kind.upper()} of line {self.blocks[-1].place.line}" if self.blocks else None
+            problem = f"ends or continues a {kind.upper()}, but {opened or 'none'} is open"
             raise fault(place, problem, "Close blocks in the order in which they were opened")
         return self.blocks[-1]
 
-    def _count(self, block: Block, place: Place) -> None:
-        assert block.subject is not None
-        assert block.step is not None
-        self.add(syntax.Assign(place, block.subject, syntax.Binary("+", block.subject, block.step), ""))
-
-    def _loop(self, place: Place) -> Block:
-        for block in reversed(self.blocks):
-            if block.kind in LOOPS:
-                return block
-        raise fault(place, "leaves a loop, but none is open", "Remove it")
+    def _again(self, loop: Block, place: Place) -> None:
+        """Go on with a loop's next round, its counter advanced."""
+        if loop.subject is not None and loop.step is not None:
+            self.add(syntax.Assign(place, loop.subject, syntax.Binary("+", loop.subject, loop.step), ""))
+        self.add(syntax.GoTo(place, loop.start))
 
     def _test(self, place: Place, condition: syntax.Expression, text: str, counted: bool = False) -> None:
         self.blocks[-1].skips.append(len(self.code))
@@ -422,12 +375,14 @@ class CodeBuilder:
         return len(self.code) - 1
 
     def _patch(self, places: list[int]) -> None:
+        """Let jumps lead to what comes next."""
         for at in places:
-            operation = self.code[at]
-            if isinstance(operation, syntax.Branch):
-                self.code[at] = replace(operation, otherwise=len(self.code))
-            elif isinstance(operation, syntax.GoTo):
-                self.code[at] = replace(operation, to=len(self.code))
+            self.code[at] = led_to(self.code[at], len(self.code))
+
+
+def led_to(operation: syntax.Operation, to: int) -> syntax.Operation:
+    """A jump that leads to an operation of another number; one that jumps nowhere is returned as it is."""
+    return replace(operation, to=to) if isinstance(operation, syntax.GoTo | syntax.Branch) else operation
 
 
 Blocks = Mapping[str, tuple[str, str]]
@@ -451,12 +406,10 @@ def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: B
         return False
     words.take()
     match action:
-        case "if":
-            builder.open_if(place, words.condition(needs), text)
+        case "if" | "while":
+            builder.open(action, place, words.condition(needs), text)
         case "elif":
-            builder.next_arm(place, words.condition(needs), text)
-        case "while":
-            builder.open_while(place, words.condition(needs), text)
+            builder.next_part("if", place, words.condition(needs), text)
         case "until":
             builder.close("repeat", place, words.condition(needs), text)
         case "switch":
@@ -485,18 +438,12 @@ def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: B
 def _simple(builder: CodeBuilder, place: Place, action: str) -> None:
     """A word that stands alone."""
     match action:
-        case "else" if not builder.inside("switch"):
-            builder.next_arm(place, None, "")
         case "else" | "default":
-            builder.case(place, None, "")
-        case "loop":
-            builder.open_loop(place)
-        case "repeat":
-            builder.open_repeat(place)
-        case "leave":
-            builder.leave_loop(place)
-        case "next":
-            builder.next_round(place)
+            builder.next_part("if" if action == "else" and not builder.inside("switch") else "switch", place)
+        case "loop" | "repeat":
+            builder.open(action, place)
+        case "leave" | "next":
+            builder.leave_loop(place, goes_on=action == "next")
         case "end":
             builder.add(syntax.Return(place, ends=True))
         case kind if kind.startswith("close "):
@@ -653,15 +600,11 @@ def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple
             last = syntax.Call(last.place, call.function, call.arguments, call.keywords, last.text)
         code += [*calls.found, last]
     starts.append(len(code))
-    return tuple(_moved(operation, starts) for operation in code) if len(code) > len(given) else tuple(code)
-
-
-def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
-    if isinstance(operation, syntax.GoTo):
-        return replace(operation, to=starts[operation.to])
-    if isinstance(operation, syntax.Branch):
-        return replace(operation, otherwise=starts[operation.otherwise])
-    return operation
+    if len(code) > len(given):
+        code = [
+            led_to(each, starts[each.to]) if isinstance(each, syntax.GoTo | syntax.Branch) else each for each in code
+        ]
+    return tuple(code)
 
 
 class _Calls:

@@ -272,7 +272,7 @@ class Machine:
         not while the loop's own condition is known."""
         frame = way.frames[-1]
         head = frame.routine.code[frame.at]
-        if isinstance(head, syntax.Branch) and head.otherwise > end and self._is_known(way, head):
+        if isinstance(head, syntax.Branch) and head.to > end and self._is_known(way, head):
             return
         last = way.visits.get(way.where)
         rounds, unknown = (last.rounds, last.unknown) if last else (0, 0)
@@ -374,14 +374,14 @@ class Machine:
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
             if not holds:
-                frame.at = branch.otherwise
+                frame.at = branch.to
             return True
         way.decisions += 1
         other = way.fork()
-        other.frames[-1].at = branch.otherwise
+        other.frames[-1].at = branch.to
         self._note(way, branch.place, instructions.Decision(branch.text, True))
         self._note(other, branch.place, instructions.Decision(branch.text, False))
-        if branch.otherwise <= at:
+        if branch.to <= at:
             self._round(other, at)
         if len(self.pending) + 1 >= self.limits.ways:
             by_place: dict[Where, list[Way]] = {}
@@ -439,9 +439,7 @@ class Machine:
 
 def _labels(routine: syntax.Routine) -> frozenset[int]:
     """Where jumps of a routine lead to."""
-    jumps = (each.to for each in routine.code if isinstance(each, syntax.GoTo))
-    branches = (each.otherwise for each in routine.code if isinstance(each, syntax.Branch))
-    return frozenset((*jumps, *branches))
+    return frozenset(each.to for each in routine.code if isinstance(each, syntax.GoTo | syntax.Branch))
 
 
 def _counts(program: syntax.Program) -> set[str]:

@@ -298,11 +298,11 @@ class GoTo:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Go on if the condition holds, else at ``otherwise``; ``counted``: at the head of a loop that counts."""
+    """Go on if the condition holds, else at ``to``; ``counted``: at the head of a loop that counts."""
 
     place: Place
     condition: Expression
-    otherwise: int
+    to: int
     text: str
     counted: bool = False
 

@@ -295,7 +295,7 @@ class _ModuleReader:
         try:
             if words.next == "IF" and words.texts[-2] != "THEN":
                 words.take()
-                builder.open_if(place, words.expression(), text)
+                builder.open("if", place, words.expression(), text)
                 self._instruction(builder, place, text[words.offset() :])
                 builder.close("if", place)
             elif not block(builder, words, place, text, BLOCKS):

@@ -236,7 +236,7 @@ class _UrReader:
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:
         if builder.blocks:
-            builder.close(builder.blocks[-1].word, place)
+            builder.close(builder.blocks[-1].kind, place)
             return
         if len(self.open) == 1:
             raise fault(place, "an end without a beginning", "Remove it")
