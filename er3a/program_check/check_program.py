@@ -37,7 +37,7 @@ from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRules, MotionPath
-from er3a.program_check.program_check_findings import with_touches_of
+from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, with_touches_of
 from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
@@ -100,8 +100,8 @@ class LocatedFinding:
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     """
 
-    level: found_in.Level
-    finding: found_in.CheckFinding
+    level: Level
+    finding: CheckFinding
     place: Place
     calls: tuple[Place, ...] = ()
     times: int = 1
@@ -127,7 +127,7 @@ class MotionVerdict:
     line: int
     text: str
     kind: str
-    level: found_in.Level
+    level: Level
     followed: bool
     times: int
     duration_s: float | None
@@ -174,7 +174,7 @@ class ProgramCheck(ByValue):
     """
 
     execution: Execution
-    level: found_in.Level
+    level: Level
     findings: tuple[LocatedFinding, ...]
     verdicts: tuple[MotionVerdict, ...]
     motions: Mapping[int, CheckedMotion]
@@ -228,7 +228,7 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
             obstacles.corner(one, other)
     located = _located(execution, robot, motions, obstacles)
     verdicts = _verdicts(program, execution, motions, located)
-    level: found_in.Level = found_in.worst_of(each.level for each in located)
+    level: Level = found_in.worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
@@ -288,7 +288,7 @@ def _located(
         for finding, moment in motion.findings.items():
             # What follows from an instruction that is named at its own line is no second question.
             told = is_one(finding, "not_followed") and finding.text in named
-            level: found_in.Level = "note" if told else motion.level_of(finding)
+            level: Level = "note" if told else motion.level_of(finding)
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     for step in execution.steps:
         if isinstance(what := step.instruction, Unknown):
@@ -320,14 +320,12 @@ def _located(
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
     grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
-    return tuple(
-        sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
-    )
+    return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
 
 
 def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     """One of like findings of an instruction: when and where it is so first, and how far it goes at worst."""
-    level = max((each.level for each in same), key=found_in.RANKS.__getitem__)
+    level = max((each.level for each in same), key=RANKS.__getitem__)
     grave = [each for each in same if each.level == level]
     first, found = grave[0], max((each.finding for each in grave), key=found_in.gravity)
     if is_one(first.finding, "motion_collides"):
@@ -365,13 +363,13 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
             return
 
 
-def _which(finding: found_in.CheckFinding) -> str:
+def _which(finding: CheckFinding) -> str:
     """Key that distinguishes findings of one code at one instruction."""
     names = ("joint", "joints", "side", "type", "name", "text", "kind", "mass_kg", "reason")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
-def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
+def _place_of(finding: CheckFinding, top: Place) -> Place:
     """The place of a finding about the text."""
     place = getattr(finding, "place", None)
     return place if isinstance(place, Place) else top
@@ -413,7 +411,7 @@ def _verdicts(
         step = execution.steps[number]
         done[step.place].append(motion)
         lines.setdefault(step.place, execution.own_line(step))
-    levels: dict[Place, list[found_in.Level]] = defaultdict(list)
+    levels: dict[Place, list[Level]] = defaultdict(list)
     lost: set[Place] = set()
     for each in located:
         levels[each.place].append(each.level)
@@ -577,7 +575,7 @@ def _beyond_paths(check: ProgramCheck, held: set[Place]) -> list[LocatedFinding]
     return [
         each
         for each in check.findings
-        if found_in.RANKS[each.level] >= found_in.RANKS["caution"]
+        if RANKS[each.level] >= RANKS["caution"]
         and not (each.finding.code in FOUND_OF_PATHS and (each.place in held or not each.place.line))
     ]
 

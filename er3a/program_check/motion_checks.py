@@ -23,7 +23,7 @@ from er3a.kinematics.singularity import TYPES, NearSingular, factor_of, factors_
 from er3a.numerics.arrays import Reals, runs
 from er3a.planning import motion_faults
 from er3a.planning.timing import JointLimits
-from er3a.program_check import program_check_findings as found_in
+from er3a.program_check.program_check_findings import CheckFinding
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
 from er3a.programs.solving import WIDE_STEP, joints_along, way_of
 from er3a.robots.joint_limits import joint_shown
@@ -370,7 +370,7 @@ def _parts(length: float, turned: float) -> int:
     return int(np.clip(np.ceil(max(length / POINTS_APART_M, turned / POINTS_APART_RAD)), MIN_PARTS, MAX_PARTS))
 
 
-Shares = dict[found_in.CheckFinding, float]
+Shares = dict[CheckFinding, float]
 """Findings with the share of the way at which each begins."""
 
 
@@ -392,7 +392,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     return found
 
 
-def _stopped(path: MotionPath, target: Reals) -> found_in.CheckFinding:
+def _stopped(path: MotionPath, target: Reals) -> CheckFinding:
     """Why a line or arc can't be followed on."""
     assert path.stop is not None
     arm, last, at_mm = path.arm, path.q[-1], path.along_mm(float(path.share[-1]))
@@ -505,7 +505,7 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
     return _beyond_rates(path, 2, needed, able, lambda j, first: float(share[first]))
 
 
-def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
+def far_turns(path: MotionPath) -> list[CheckFinding]:
     """Joints that turn further than the motion needs.
 
     Returns
@@ -515,7 +515,7 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
         limits is shorter.
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
-    found: list[found_in.CheckFinding] = []
+    found: list[CheckFinding] = []
     turned = np.where(arm.slides, 0.0, np.abs(step))
     lead = int(np.argmax(turned))
     if turned[lead] > FAR_TURN and path.length < NEAR_MOVE:
@@ -570,7 +570,7 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
     return found
 
 
-def arrives_otherwise(path: MotionPath, given: Reals) -> found_in.CheckFinding | None:
+def arrives_otherwise(path: MotionPath, given: Reals) -> CheckFinding | None:
     """Whether a line or arc to given joints ends in other joints than these.
 
     Parameters

@@ -45,7 +45,8 @@ from er3a.program_check.motion_checks import (
     singular_findings,
     tool_path,
 )
-from er3a.programs import instructions
+from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
 from er3a.programs.solving import solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
@@ -74,18 +75,18 @@ class CheckedMotion(ByValue):
     guessed : whether its start was taken among several solutions of an earlier target, so that nothing is certain
     """
 
-    motion: instructions.ArmMotion
+    motion: ArmMotion
     arm: Robot
     base: Reals | None
     start: Reals | None
     end: Reals | None = None
     path: MotionPath | None = None
     stays: bool = False
-    findings: dict[found_in.CheckFinding, float | None] = field(default_factory=dict)
+    findings: dict[CheckFinding, float | None] = field(default_factory=dict)
     clearance: float | None = None
     guessed: bool = False
 
-    def add(self, *findings: found_in.CheckFinding) -> None:
+    def add(self, *findings: CheckFinding) -> None:
         """Add findings about the motion as a whole.
 
         Parameters
@@ -107,7 +108,7 @@ class CheckedMotion(ByValue):
             for each, share in found.items():
                 self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
 
-    def level_of(self, finding: found_in.CheckFinding) -> found_in.Level:
+    def level_of(self, finding: CheckFinding) -> Level:
         """How severe one of the motion's findings is.
 
         Parameters
@@ -122,7 +123,7 @@ class CheckedMotion(ByValue):
         return "caution" if self.guessed and level == "fail" else level
 
     @property
-    def level(self) -> found_in.Level:
+    def level(self) -> Level:
         """The worst of its findings."""
         return found_in.worst_of(map(self.level_of, self.findings))
 
@@ -136,19 +137,19 @@ class Judge:
         self._arms: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
         self._guessed: set[bytes] = set()  # joints at which the arm stands if what was guessed is right
 
-    def __call__(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
+    def __call__(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         """A motion from joints (n,), None where they are not known."""
         key = pickle.dumps(motion), _rounded(before)  # equal bytes are equal motions; hashes of arrays are crude
         if key not in self.motions:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
-            chosen = motion.kind != "joint" or isinstance(motion.target, instructions.PoseTarget)
+            chosen = motion.kind != "joint" or isinstance(motion.target, PoseTarget)
             first = any(is_one(each, "configuration_guessed") for each in checked.findings)
             if checked.end is not None and (first or (checked.guessed and chosen)):
                 self._guessed.add(_rounded(checked.end))
         return self.motions[key]
 
-    def _arm(self, tool: instructions.NamedFrame) -> Robot | None:
+    def _arm(self, tool: NamedFrame) -> Robot | None:
         """The robot with a tool; None where the tool is not known."""
         if tool.pose is None and tool.name and tool.name != FLANGE:
             return None
@@ -156,22 +157,22 @@ class Judge:
         pose = pose if tool.pose is None else tool.pose
         return self._arms.setdefault(pose.tobytes(), self.robot.replace(tool=pose))
 
-    def _checked(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
+    def _checked(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         arm, base = self._arm(motion.tool), motion.base.pose
         if base is None and not motion.base.name:
             base = np.eye(4)
         placed = None if base is None else self.robot.base @ base
         checked = CheckedMotion(motion, arm or self.robot, placed, before)
         target, of_tool = motion.target, motion.kind != "joint"
-        if isinstance(target, instructions.UnresolvedTarget):
+        if isinstance(target, UnresolvedTarget):
             by_tool = target.reason == "position_unknown" and arm is None
             text, reason = (motion.tool.name, "tool") if by_tool else (target.text, target.reason)
             checked.add(fact("not_followed", text=text, reason=reason))
             return checked
         _say_of(checked)
-        if arm is None and (of_tool or isinstance(target, instructions.PoseTarget)):
+        if arm is None and (of_tool or isinstance(target, PoseTarget)):
             checked.add(fact("not_followed", text=motion.tool.name, reason="tool"))
-        elif placed is None and isinstance(target, instructions.PoseTarget):
+        elif placed is None and isinstance(target, PoseTarget):
             checked.add(fact("not_followed", text=motion.base.name, reason="base"))
         elif of_tool:
             self._along_tool_path(checked, target)
@@ -185,7 +186,7 @@ class Judge:
             checked.add(fact("speed_not_given", assumed=speed, word=word, refused=refused))
         return checked
 
-    def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:
+    def _to_joints(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> None:
         """A joint move."""
         goal = self._goal(checked, target)
         if goal is None:
@@ -200,25 +201,23 @@ class Judge:
         checked.end = goal if beyond < MOST_TURNS else None
         if checked.path is not None:
             checked.add_on_way(path_findings(checked.path, self.rules, None))
-            if isinstance(target, instructions.JointTarget) or target.branch is None:  # no configuration that is meant
+            if isinstance(target, JointTarget) or target.branch is None:  # no configuration that is meant
                 checked.add_on_way(dict.fromkeys(far_turns(checked.path), 0.0))
 
-    def _along_tool_path(
-        self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget
-    ) -> None:
+    def _along_tool_path(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> None:
         """A line or an arc."""
         motion, arm = checked.motion, checked.arm
         if motion.angle is not None:  # which ends elsewhere than at its target
             checked.add(fact("not_followed", text="CA", reason="arc_angle"))
             return
-        given = target.joints if isinstance(target, instructions.JointTarget) else None
+        given = target.joints if isinstance(target, JointTarget) else None
         if given is not None and np.isnan(given).any():
             checked.add(fact("not_followed", text=motion.form, reason="position_unknown"))
             return
         if given is not None:
             end = forward(arm, given)
         else:
-            assert isinstance(target, instructions.PoseTarget)
+            assert isinstance(target, PoseTarget)
             assert checked.base is not None
             end = checked.base @ target.pose
         if checked.start is None:
@@ -241,24 +240,24 @@ class Judge:
         checked.add_on_way(singular_findings(found, self.rules.near))
         if given is not None and (other := arrives_otherwise(found, given)) is not None:
             checked.add(other)
-        branch = target.branch if isinstance(target, instructions.PoseTarget) else None
+        branch = target.branch if isinstance(target, PoseTarget) else None
         if branch is not None and found.end is not None and not solutions_meant(branch, arm, found.end[None])[0]:
             checked.add(fact("configuration_not_met", text=_configuration(target)))
 
     def _via(self, checked: CheckedMotion) -> Reals | None:
         """The arc's point: T_world_tool (4, 4), m."""
         via = checked.motion.via
-        if isinstance(via, instructions.PoseTarget) and checked.base is not None:
+        if isinstance(via, PoseTarget) and checked.base is not None:
             pose: Reals = checked.base @ via.pose
             return pose
-        if isinstance(via, instructions.JointTarget) and not np.isnan(via.joints).any():
+        if isinstance(via, JointTarget) and not np.isnan(via.joints).any():
             return forward(checked.arm, via.joints)
         return None
 
-    def _goal(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> Reals | None:
+    def _goal(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> Reals | None:
         """Joints (n,) of a target, of several solutions the nearest within the limits; None where unknown."""
         before = checked.start
-        if isinstance(target, instructions.JointTarget):
+        if isinstance(target, JointTarget):
             open_ = np.isnan(target.joints)
             if before is None and open_.any():
                 checked.add(
@@ -302,8 +301,8 @@ def _rounded(joints: Reals | None) -> bytes:
     return b"" if joints is None else (np.round(joints, SAME_DIGITS) + 0.0).tobytes()
 
 
-def _configuration(target: instructions.Target) -> str:
-    given = target.configuration if isinstance(target, instructions.PoseTarget) else ()
+def _configuration(target: Target) -> str:
+    given = target.configuration if isinstance(target, PoseTarget) else ()
     return ", ".join(f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in given)
 
 
@@ -491,7 +490,7 @@ class Obstacles(ByValue):
             )
 
 
-def zone_share(zone: instructions.Zone, path: MotionPath) -> float:
+def zone_share(zone: Zone, path: MotionPath) -> float:
     """The share of a motion's way that its zone may take.
 
     Parameters

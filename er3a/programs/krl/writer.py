@@ -12,7 +12,9 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, writing
+from er3a.programs.instructions import PoseTarget
 from er3a.programs.krl.dialect import AXIS_KEYS, FRAME_KEYS, TURN_RATES, ZONES
+from er3a.programs.writing import ReadyMotion
 from er3a.robots.masses import MassBody
 
 DIGITS = 6
@@ -69,7 +71,7 @@ class KrlWriter(writing.Writer):
         mass = "-1.0" if load is None else writing.short(load.mass)
         self.set_once("$LOAD", f"$LOAD={{M {mass},CM {_frame_text(pose)},J {{{about}}}}}")
 
-    def motion(self, ready: writing.ReadyMotion) -> None:
+    def motion(self, ready: ReadyMotion) -> None:
         """Write PTP, LIN or CIRC, and before it tool, base, speeds and zone where they change.
 
         Parameters
@@ -92,11 +94,11 @@ class KrlWriter(writing.Writer):
         else:
             self.lines.append(f"{'PTP' if motion.kind == 'joint' else 'LIN'} {target}{zone}")
 
-    def _target(self, ready: writing.ReadyMotion) -> str | None:
+    def _target(self, ready: ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
             turns = self._turns(target)
-            if isinstance(target, instructions.PoseTarget) and {"S", "T"} <= turns.keys():
+            if isinstance(target, PoseTarget) and {"S", "T"} <= turns.keys():
                 return _frame_text(target.pose, turns)
             if ready.joints is not None:
                 return _axes_text(ready.joints)
@@ -107,7 +109,7 @@ class KrlWriter(writing.Writer):
 
     def _turns(self, target: instructions.Target) -> dict[str, int]:
         """Status and Turn of a target that was read from KRL, as far as they are known."""
-        given = target.configuration if isinstance(target, instructions.PoseTarget) and self.own else ()
+        given = target.configuration if isinstance(target, PoseTarget) and self.own else ()
         return {key: int(value) for key, value in given if key in ("S", "T") and not isinstance(value, str)}
 
     def _frame(self, variable: str, frame: instructions.NamedFrame) -> None:
@@ -122,7 +124,7 @@ class KrlWriter(writing.Writer):
             return
         self.set_once(variable, f"{variable}={text}")
 
-    def _speeds(self, ready: writing.ReadyMotion) -> None:
+    def _speeds(self, ready: ReadyMotion) -> None:
         motion = ready.motion
         if motion.kind == "joint":
             self._joint_speed(ready)
@@ -141,7 +143,7 @@ class KrlWriter(writing.Writer):
             for name in TURN_RATES:
                 self.set_once(name, f"{name}={writing.short(math.degrees(motion.turn_speed))}")
 
-    def _joint_speed(self, ready: writing.ReadyMotion) -> None:
+    def _joint_speed(self, ready: ReadyMotion) -> None:
         speed = ready.motion.speed
         share = self.share(ready)
         if speed is None or (share is None and speed.unit == "share"):

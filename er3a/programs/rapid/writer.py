@@ -15,7 +15,10 @@ import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.programs import instructions, writing
+from er3a.programs.instructions import ArmMotion, PoseTarget
 from er3a.programs.rapid import data_types
+from er3a.programs.rapid.data_types import MIN_LOAD, TURN_SPEED
+from er3a.programs.writing import ReadyMotion
 from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -76,7 +79,7 @@ class RapidWriter(writing.Writer):
         load : of the next motions, which carry it themselves
         """
 
-    def motion(self, ready: writing.ReadyMotion) -> None:
+    def motion(self, ready: ReadyMotion) -> None:
         """Write MoveAbsJ, MoveJ, MoveL or MoveC, and before it what has to be set.
 
         Parameters
@@ -86,7 +89,7 @@ class RapidWriter(writing.Writer):
         """
         motion = ready.motion
         target = motion.target
-        own_pose = self.own and motion.kind == "joint" and isinstance(target, instructions.PoseTarget)
+        own_pose = self.own and motion.kind == "joint" and isinstance(target, PoseTarget)
         if motion.kind == "joint" and not own_pose:
             joints = ready.joints
             if joints is None and isinstance(target, instructions.JointTarget):
@@ -115,12 +118,12 @@ class RapidWriter(writing.Writer):
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
 
-    def _configuration(self, ready: writing.ReadyMotion, supervision: str) -> str:
+    def _configuration(self, ready: ReadyMotion, supervision: str) -> str:
         """The target's confdata as it was read, or by the joints; not supervised where neither is known."""
         target = ready.motion.target
-        said = dict(target.configuration) if isinstance(target, instructions.PoseTarget) and self.own else {}
+        said = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
         if {"cf1", "cf4", "cf6", "cfx"} <= said.keys():
-            followed = isinstance(target, instructions.PoseTarget) and target.branch is not None
+            followed = isinstance(target, PoseTarget) and target.branch is not None
             self.set_once(supervision, f"{supervision} \\{'On' if followed else 'Off'};")
             return "[" + ",".join(f"{float(said[key]):g}" for key in ("cf1", "cf4", "cf6", "cfx")) + "]"
         self.set_once(supervision, f"{supervision} \\Off;")
@@ -155,7 +158,7 @@ class RapidWriter(writing.Writer):
                 self.declared.append(f'PERS wobjdata {name}:=[FALSE,TRUE,"",{pose},{null_pose}];')
         return self.frames[key]
 
-    def _speed(self, ready: writing.ReadyMotion) -> str:
+    def _speed(self, ready: ReadyMotion) -> str:
         motion = ready.motion
         speed = motion.speed
         given = speed is not None and speed.value > 0
@@ -174,12 +177,12 @@ class RapidWriter(writing.Writer):
         if speed.unit != "m/s":
             return "v100"
         along = speed.value * 1000
-        turn = math.degrees(motion.turn_speed) if motion.turn_speed else data_types.TURN_SPEED
-        if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
+        turn = math.degrees(motion.turn_speed) if motion.turn_speed else TURN_SPEED
+        if along in data_types.TOOL_SPEEDS and abs(turn - TURN_SPEED) < 1e-9:
             return f"v{along:g}"
         return f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
 
-    def _zone(self, motion: instructions.ArmMotion) -> str:
+    def _zone(self, motion: ArmMotion) -> str:
         """A zone by its name, or with turn and external axes as those that have one."""
         zone: instructions.Zone = motion.zone
         if zone.kind != "distance" or zone.value <= 0:
@@ -190,7 +193,7 @@ class RapidWriter(writing.Writer):
         own, wide, turn = (writing.cut(share * size) for share in (1.0, 1.5, 0.15))
         return name or f"[FALSE,{own},{wide},{wide},{turn},{wide},{turn}]"
 
-    def _set_before(self, motion: instructions.ArmMotion) -> None:
+    def _set_before(self, motion: ArmMotion) -> None:
         acceleration = motion.acceleration
         if acceleration is None:
             return
@@ -209,7 +212,7 @@ def _joints_text(joints: Reals) -> str:
 def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
-        return f"[{data_types.MIN_LOAD},[0,0,{data_types.MIN_LOAD}],[1,0,0,0],0,0,0]"
+        return f"[{MIN_LOAD},[0,0,{MIN_LOAD}],[1,0,0,0],0,0,0]"
     pose, moments = writing.principal_axes(load)
     quaternion = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in instructions.numbers_of(pose, "abb")[3:])
     centre = ",".join(writing.short(each * 1000) for each in load.centre)

@@ -13,11 +13,11 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from er3a.errors import InputError
-from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
 from er3a.programs.instructions import Disabled, Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.rpl.reader import expression, initial, statement
+from er3a.programs.syntax import Assign, Fixed, Program, Return, Routine, RoutineParameter, Variable
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -107,7 +107,7 @@ PARTS: Mapping[str, tuple[str, ...]] = {
 """The elements that are understood, with those that they hold. An element with others, or with attributes, is not."""
 
 
-def read_xpl(source: ProgramText) -> syntax.Program:
+def read_xpl(source: ProgramText) -> Program:
     """The program of an .XPL file.
 
     Raises
@@ -130,14 +130,14 @@ def read_xpl(source: ProgramText) -> syntax.Program:
     entry = next((pou for pou in pous if _text(pou, "Type").upper() == "PROGRAM"), pous[0])
     data = tuple(_declared(source, var, local=False) for var in environment.findall("VarDeclarations/*/Var"))
     name = _text(entry, "Name")
-    return syntax.Program("xpl", source.path.stem, source.path, by_name, name, data, lines=source.lines)
+    return Program("xpl", source.path.stem, source.path, by_name, name, data, lines=source.lines)
 
 
-def _declared(source: ProgramText, var: Element, local: bool) -> syntax.Assign:
+def _declared(source: ProgramText, var: Element, local: bool) -> Assign:
     kind, name, first = _text(var, "Type"), _text(var, "Name"), _text(var, "InitValue")
     place = _place(source, var, f"Var {name}")
     value = initial(first, kind) if first else None
-    return syntax.Assign(place, syntax.Variable(name), value, f"{kind} {name} := {first}", kind, local)
+    return Assign(place, Variable(name), value, f"{kind} {name} := {first}", kind, local)
 
 
 class _Pou:
@@ -148,7 +148,7 @@ class _Pou:
         self.name = _text(pou, "Name")
         self.place = _place(source, pou, self.name)
 
-    def routine(self) -> syntax.Routine:
+    def routine(self) -> Routine:
         """The routine: its parameters, its own variables, and its body with all loops.
 
         Returns
@@ -161,7 +161,7 @@ class _Pou:
             for a loop without a body, or blocks nested too deeply
         """
         parameters = tuple(
-            syntax.RoutineParameter(_text(var, "Name"), _text(var, "Attrib").upper() not in ("IN", ""))
+            RoutineParameter(_text(var, "Name"), _text(var, "Attrib").upper() not in ("IN", ""))
             for var in self.pou.findall("VarDeclarations/VarInterface/Var")
         )
         builder = CodeBuilder(self.name, parameters, self.place)
@@ -177,13 +177,13 @@ class _Pou:
             place = _place(self.source, element, f"{path}/{element.tag}[{counts[element.tag]}]")
             switch = element.attrib.pop("disable", "false").lower()
             if switch == "true" and len(element.attrib) == 1:
-                builder.add(syntax.Fixed(place, Disabled(text_of(element))))
+                builder.add(Fixed(place, Disabled(text_of(element))))
             elif switch != "false" or _is_strange(element):
                 builder.unread(place, f"{text_of(element)} {_all_text(element)}")
             elif element.tag == "rem":
                 builder.remark(place, _text(element, "text"))
             elif element.tag == "end_pro":
-                builder.add(syntax.Return(place, ends=True))
+                builder.add(Return(place, ends=True))
             else:
                 statement(builder, place, text_of(element))
             if element.find("pouref") is not None and element.tag in ("while", "for"):

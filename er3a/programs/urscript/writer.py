@@ -8,6 +8,7 @@ from er3a.numerics.arrays import Reals
 from er3a.programs import writing
 from er3a.programs.instructions import RAMP_OF_A_DURATION, Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
+from er3a.programs.writing import ReadyMotion
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
@@ -91,7 +92,7 @@ class UrScriptWriter(writing.Writer):
         )
         self.line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
-    def motion(self, ready: writing.ReadyMotion) -> None:
+    def motion(self, ready: ReadyMotion) -> None:
         """Write movej, movel, movep or movec, and before it the tool where it changes.
 
         Parameters
@@ -116,7 +117,7 @@ class UrScriptWriter(writing.Writer):
         via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "
         self.line(f"{form}({via}{target}{self._speed(ready, form)}{self._zone(ready)})")
 
-    def _target(self, ready: writing.ReadyMotion) -> str | None:
+    def _target(self, ready: ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
             if isinstance(target, PoseTarget) and target.joints is None and (self.own or ready.joints is None):
@@ -126,14 +127,14 @@ class UrScriptWriter(writing.Writer):
             return None if ready.joints is None else _joints_text(ready.joints)
         return None if ready.pose is None else _pose_text(self._in_robot(ready, ready.pose))
 
-    def _in_robot(self, ready: writing.ReadyMotion, pose: Reals) -> Reals:
+    def _in_robot(self, ready: ReadyMotion, pose: Reals) -> Reals:
         base = ready.motion.base.pose
         if base is None or np.array_equal(base, np.eye(4)):
             return pose
         found: Reals = base @ pose
         return found
 
-    def _tool(self, ready: writing.ReadyMotion) -> None:
+    def _tool(self, ready: ReadyMotion) -> None:
         tool = ready.motion.tool
         if tool.pose is None:
             if tool.name:
@@ -141,7 +142,7 @@ class UrScriptWriter(writing.Writer):
             return
         self.set_once("tcp", f"set_tcp({_pose_text(tool.pose)})")
 
-    def _speed(self, ready: writing.ReadyMotion, form: str) -> str:
+    def _speed(self, ready: ReadyMotion, form: str) -> str:
         """Acceleration and speed, or the motion's time, unless that is too short for a motion from rest to rest."""
         motion = ready.motion
         usual_a, usual_v = DEFAULTS[form]
@@ -164,7 +165,7 @@ class UrScriptWriter(writing.Writer):
             self.count["estimated"] += 1
         return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
 
-    def _is_short(self, ready: writing.ReadyMotion) -> bool:
+    def _is_short(self, ready: ReadyMotion) -> bool:
         """Whether a joint would be too fast if it moved in the motion's time with ramps as check-program takes them."""
         speed, before, after = ready.motion.speed, ready.joints_before, ready.joints
         if speed is None or before is None or after is None or self.robot is None:
@@ -172,7 +173,7 @@ class UrScriptWriter(writing.Writer):
         peak = np.abs(after - before) / speed.value / (1 - RAMP_OF_A_DURATION)
         return any(float(each) > self._speed_of(joint)[0] for joint, each in enumerate(peak))
 
-    def _zone(self, ready: writing.ReadyMotion) -> str:
+    def _zone(self, ready: ReadyMotion) -> str:
         zone = ready.motion.zone
         if zone.kind == "distance" and zone.value > 0:
             return f", r={writing.cut(zone.value)}"
