@@ -35,9 +35,16 @@ from er3a.planning.commands import (
 from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRules, MotionPath
-from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, with_touches_of
+from er3a.program_check.program_check_findings import (
+    RANKS,
+    Level,
+    NotFollowedReason,
+    gravity,
+    level_of,
+    with_touches_of,
+    worst_of,
+)
 from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
@@ -101,7 +108,7 @@ class LocatedFinding:
     """
 
     level: Level
-    finding: CheckFinding
+    finding: Finding
     place: Place
     calls: tuple[Place, ...] = ()
     times: int = 1
@@ -222,13 +229,13 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     if options.measures:
         tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
         around = options.penetration_tolerance, options.assumed_margin
-        obstacles = Obstacles.around(robot, options.scene, tools, *around)
+        obstacles = Obstacles(robot, options.scene, tools, *around)
         obstacles.check(list(judge.motions.values()), options.keep_on)
         for one, other in _corners(execution, motions):
             obstacles.corner(one, other)
     located = _located(execution, robot, motions, obstacles)
     verdicts = _verdicts(program, execution, motions, located)
-    level: Level = found_in.worst_of(each.level for each in located)
+    level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
@@ -281,7 +288,7 @@ def _located(
 ) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped."""
     program, top = execution.program, Place(execution.program.file)
-    found = [LocatedFinding(found_in.level_of(each), each, _place_of(each, top)) for each in program.findings]
+    found = [LocatedFinding(level_of(each), each, _place_of(each, top)) for each in program.findings]
     named = {step.instruction.text for step in execution.steps if isinstance(step.instruction, Unknown)}
     for number, motion in motions.items():
         step = execution.steps[number]
@@ -292,7 +299,7 @@ def _located(
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     for step in execution.steps:
         if isinstance(what := step.instruction, Unknown):
-            reason: found_in.NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
+            reason: NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
             text = (
                 fact("program_not_understood", text=what.text, place=step.place)
                 if what.stops
@@ -312,8 +319,7 @@ def _located(
         found.append(LocatedFinding("caution", fact("pairs_unexamined", pairs=obstacles.bodies.in_error), top))
     found += [*_loads(execution, robot), *_not_set(execution)]
     found += [
-        LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
-        for step, each in suspect_numbers(execution, robot)
+        LocatedFinding(level_of(each), each, step.place, step.calls) for step, each in suspect_numbers(execution, robot)
     ]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
@@ -327,7 +333,7 @@ def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     """One of like findings of an instruction: when and where it is so first, and how far it goes at worst."""
     level = max((each.level for each in same), key=RANKS.__getitem__)
     grave = [each for each in same if each.level == level]
-    first, found = grave[0], max((each.finding for each in grave), key=found_in.gravity)
+    first, found = grave[0], max((each.finding for each in grave), key=gravity)
     if is_one(first.finding, "motion_collides"):
         others = [each.finding for each in same if is_one(each.finding, "motion_collides")]
         found = with_touches_of(first.finding, others)
@@ -363,13 +369,13 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
             return
 
 
-def _which(finding: CheckFinding) -> str:
+def _which(finding: Finding) -> str:
     """Key that distinguishes findings of one code at one instruction."""
     names = ("joint", "joints", "side", "type", "name", "text", "kind", "mass_kg", "reason")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
-def _place_of(finding: CheckFinding, top: Place) -> Place:
+def _place_of(finding: Finding, top: Place) -> Place:
     """The place of a finding about the text."""
     place = getattr(finding, "place", None)
     return place if isinstance(place, Place) else top
@@ -432,7 +438,7 @@ def _verdicts(
                 lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].motion.kind if here else "",
-                found_in.worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
+                worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
                 followed,
                 len(here),
                 max(durations, default=None),

@@ -21,7 +21,6 @@ NotFollowedReason = Literal[
     "base",
     "turns_with_path",
     "external_axes",
-    "arc_angle",
     "half_turn",
     "redundant",
     "operations",
@@ -64,8 +63,6 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     return found.but(touches=tuple(deepest.values()))
 
 
-CheckFinding = Finding
-
 FAILS = frozenset(
     (
         *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
@@ -77,7 +74,7 @@ WRONG = frozenset(("not_understood", "not_finite", "too_far", "too_many_joints")
 """Why a target is none: the program gives it, but not as a target of its motion or of the arm."""
 
 
-def level_of(finding: CheckFinding) -> Level:
+def level_of(finding: Finding) -> Level:
     """Severity of a finding: ``fail`` where the program can't be executed as written, never on a guess.
 
     Parameters
@@ -104,7 +101,7 @@ def level_of(finding: CheckFinding) -> Level:
     return "note" if finding.code in NOTES else "caution"
 
 
-def gravity(finding: CheckFinding) -> float:
+def gravity(finding: Finding) -> float:
     """How far a finding goes, to choose the worst of like ones.
 
     Parameters

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import Pair, names_of
+from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by
 from er3a.errors import PoseError
@@ -45,7 +45,7 @@ from er3a.program_check.motion_checks import (
     singular_findings,
     tool_path,
 )
-from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
 from er3a.programs.solving import solutions_meant
 from er3a.robots.joint_limits import equivalents_within
@@ -82,11 +82,11 @@ class CheckedMotion(ByValue):
     end: Reals | None = None
     path: MotionPath | None = None
     stays: bool = False
-    findings: dict[CheckFinding, float | None] = field(default_factory=dict)
+    findings: dict[Finding, float | None] = field(default_factory=dict)
     clearance: float | None = None
     guessed: bool = False
 
-    def add(self, *findings: CheckFinding) -> None:
+    def add(self, *findings: Finding) -> None:
         """Add findings about the motion as a whole.
 
         Parameters
@@ -108,7 +108,7 @@ class CheckedMotion(ByValue):
             for each, share in found.items():
                 self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
 
-    def level_of(self, finding: CheckFinding) -> Level:
+    def level_of(self, finding: Finding) -> Level:
         """How severe one of the motion's findings is.
 
         Parameters
@@ -181,8 +181,7 @@ class Judge:
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
             speed = Amount(assumed.tool_speed, "m/s") if of_tool else Amount(100 * assumed.joint_share, "%")
-            number = word.rpartition("=")[2]
-            refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
+            refused = motion.speed is not None and motion.speed.refused is not None
             checked.add(fact("speed_not_given", assumed=speed, word=word, refused=refused))
         return checked
 
@@ -192,7 +191,7 @@ class Judge:
         if goal is None:
             return
         if checked.start is None:
-            checked.add(fact("way_not_known"), *limit_findings(checked.arm, goal))
+            checked.add(fact("way_not_known"), *limit_findings(checked.arm, np.zeros(1), goal[None]))
             checked.end = goal
             return
         checked.path = joint_path(checked.arm, checked.motion, checked.start, goal, self.rules)
@@ -207,9 +206,6 @@ class Judge:
     def _along_tool_path(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> None:
         """A line or an arc."""
         motion, arm = checked.motion, checked.arm
-        if motion.angle is not None:  # which ends elsewhere than at its target
-            checked.add(fact("not_followed", text="CA", reason="arc_angle"))
-            return
         given = target.joints if isinstance(target, JointTarget) else None
         if given is not None and np.isnan(given).any():
             checked.add(fact("not_followed", text=motion.form, reason="position_unknown"))
@@ -260,13 +256,8 @@ class Judge:
         if isinstance(target, JointTarget):
             open_ = np.isnan(target.joints)
             if before is None and open_.any():
-                checked.add(
-                    *(
-                        ()
-                        if open_.all()
-                        else (fact("not_followed", text=checked.motion.form, reason="position_unknown"),)
-                    )
-                )
+                if not open_.all():
+                    checked.add(fact("not_followed", text=checked.motion.form, reason="position_unknown"))
                 return None
             return target.joints if before is None else np.where(open_, before, target.joints)
         assert checked.base is not None
@@ -316,36 +307,26 @@ def _say_of(checked: CheckedMotion) -> None:
         checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
 
 
-@dataclass(frozen=True, eq=False)
-class Obstacles(ByValue):
-    """The bodies that the arm must not touch.
+class Obstacles:
+    """The bodies that an arm must not touch, itself among it.
 
-    Attributes
+    What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``tools``
+    (4, 4), the first of them that is no bare flange: it stays there whatever tool a motion names.
+
+    Parameters
     ----------
     tolerance : m, of an overlap that may go unnoticed
-    assumed_margin : m, within which of the arm's shapes nothing is settled; 0 where a document gives them
+    assumed_margin : m, within which of the arm's shapes nothing is settled, unless a document gives them
     """
 
-    robot: Robot
-    scene: Scene | None
-    bodies: Bodies
-    tolerance: float
-    assumed_margin: float
-
-    @classmethod
-    def around(
-        cls, robot: Robot, scene: Scene | None, tools: Iterable[Reals], tolerance: float, assumed_margin: float
-    ) -> Obstacles:
-        """What a robot must not meet, itself among it.
-
-        What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``tools``
-        (4, 4), the first of them that is no bare flange: it stays there whatever tool a motion names.
-        """
+    def __init__(
+        self, robot: Robot, scene: Scene | None, tools: Iterable[Reals], tolerance: float, assumed_margin: float
+    ):
         bare = np.array_equal(robot.tool, np.eye(4))
         carrier = next((each for each in tools if bare and not np.array_equal(each, np.eye(4))), robot.tool)
-        holding = robot if scene is None or not scene.carried else robot.replace(tool=carrier)
-        margin = assumed_margin if arm_shapes(robot).assumed else 0.0
-        return cls(holding, scene, Bodies(holding, scene), tolerance, margin)
+        self.robot = robot if scene is None or not scene.carried else robot.replace(tool=carrier)
+        self.scene, self.bodies, self.tolerance = scene, Bodies(self.robot, scene), tolerance
+        self.assumed_margin = assumed_margin if arm_shapes(robot).assumed else 0.0
 
     def check(self, motions: list[CheckedMotion], keep_on: Callable[[], bool]) -> None:
         """Measure the clearance of motions, and find what touches on them; both are added to the motions.
@@ -432,24 +413,27 @@ class Obstacles(ByValue):
             touches_there = self.bodies.min_distance(path.at(np.array([middle])))[0][0] < 0
             clear, first = (clear, middle) if touches_there else (middle, first)
         every = np.arange(len(self.bodies.pairs))
-        touches: dict[Pair, Finding] = {}
         shares = np.linspace(first, share[int(rows[-1])], MOST_TOUCHING)
-        for at, joints in zip(shares.tolist(), path.at(shares)):
-            depths = -1000 * self.bodies.distances(joints, every)
-            for k in np.flatnonzero(depths > 0).tolist():
-                name = self.bodies.pairs[k]
-                when, where = float(path.law.times(np.array(at))), path.along_mm(at) if path.of_tool else None
-                enlarged = 1000 * enlarged_by(self.robot, self.scene, names_of(name))
-                touch = {"pair": name, "t_s": when, "at_mm": where, "enlarged_mm": enlarged}
-                before = touches.get(name, fact("bodies_touch", depth_mm=0.0, **touch))
-                depth = max(before.depth_mm, float(depths[k]))
-                touches[name] = before.but(depth_mm=depth, at_target=at > 1 - 1e-9)
+        depths = np.array([-1000 * self.bodies.distances(joints, every) for joints in path.at(shares)])
+        touches = []
+        for i, k in sorted((int(np.argmax(depths[:, k] > 0)), k) for k in every.tolist() if (depths[:, k] > 0).any()):
+            name, at = self.bodies.pairs[k], float(shares[i])
+            touch = fact(
+                "bodies_touch",
+                pair=name,
+                t_s=float(path.law.times(np.array(at))),
+                at_mm=path.along_mm(at) if path.of_tool else None,
+                depth_mm=float(depths[:, k].max()),
+                enlarged_mm=1000 * enlarged_by(self.robot, self.scene, names_of(name)),
+                at_target=bool(depths[-1, k] > 0 and shares[-1] > 1 - 1e-9),
+            )
+            touches.append(touch)
         if not touches:
             return {}
-        given = any(is_one(each.pair, "carried_and_solid") for each in touches.values())  # by the scene, not the arm
+        given = any(is_one(each.pair, "carried_and_solid") for each in touches)  # by the scene, not the arm
         assumed = arm_shapes(self.robot).assumed and not given
-        hit = fact("motion_collides", touches=tuple(touches.values()), assumed=assumed)
-        return {hit: float(first)}
+        hit = fact("motion_collides", touches=(), assumed=assumed)
+        return {found_in.with_touches_of(hit, [hit.but(touches=tuple(touches))]): float(first)}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
         """Find what the corner between two motions touches that a zone rounds; what is found is added to the first.

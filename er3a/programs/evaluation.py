@@ -95,11 +95,9 @@ class Position:
 
         Returns
         -------
-        position : of which nothing is known after a target that is not known, or a motion by an angle
+        position : of which nothing is known after a target that is not known
         """
         target, ends = motion.target, (motion.tool, motion.base, motion.zone.kind != "fine")
-        if motion.angle is not None:  # which is not followed
-            return Position()
         if isinstance(target, PoseTarget):
             return Position(target.joints, target.pose, *ends)
         if not isinstance(target, JointTarget):
@@ -224,6 +222,7 @@ class Dialect(ABC):
     harmless : functions outside of programs that neither move the arm nor set what motions use
     reading : of these, those that leave their arguments as they are
     by_reference : whether a function outside of the program may set what it is given
+    running : variables that the controller changes after the program has set them, such as timers
     """
 
     modal: frozenset[str] = frozenset()
@@ -235,19 +234,7 @@ class Dialect(ABC):
     harmless: frozenset[str] = frozenset()
     reading: frozenset[str] = frozenset()
     by_reference: bool = False
-
-    def reads_back(self, name: str) -> bool:
-        """Whether reading a variable gives the value that the program set last.
-
-        Parameters
-        ----------
-        name : full, with fields and indices
-
-        Returns
-        -------
-        same : False for those that the controller changes meanwhile, such as timers
-        """
-        return True
+    running: tuple[str, ...] = ()
 
     def is_followed(self, name: str) -> bool:
         """Whether it is followed how setting a variable changes motions.
@@ -582,7 +569,8 @@ class ProgramMemory:
             case syntax.Constant(value=value):
                 return value
             case Variable(name=name):
-                return known(self.read(name), name)
+                found = self.read(name)
+                return Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
             case Member() | Element():
                 return self._part(expression)
             case syntax.Unary(operator=sign, of=of):
@@ -739,6 +727,27 @@ def external_axes(value: Record, keys: Sequence[str]) -> tuple[tuple[str, float]
     return tuple((key, each) for key, each in known if each)
 
 
+def target_numbers(parts: Sequence[Value | None], text: str) -> tuple[float, ...] | UnresolvedTarget:
+    """The numbers of a target.
+
+    Parameters
+    ----------
+    parts : its components; None for one that is missing
+    text : of the line
+
+    Returns
+    -------
+    numbers : or why it is no target: a part is unclear, is no number, or not finite
+    """
+    unclear = next((each for each in parts if isinstance(each, Unclear)), None)
+    if unclear is not None:
+        return unresolved(unclear, text)
+    plain = syntax.numbers(tuple(parts))
+    if plain is None:
+        return UnresolvedTarget(text, "not_understood")
+    return plain if syntax.finite(plain) else UnresolvedTarget(text, "not_finite")
+
+
 def unresolved(value: Unclear, text: str = "") -> UnresolvedTarget:
     """A target that is made of an unclear value.
 
@@ -752,21 +761,6 @@ def unresolved(value: Unclear, text: str = "") -> UnresolvedTarget:
     """
     is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
     return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
-
-
-def known(found: Value | None, name: str) -> Value:
-    """The value that was found for a name, or an unclear one.
-
-    Parameters
-    ----------
-    found : None, or :class:`Unset`, where nothing was assigned to it
-    name : for messages
-
-    Returns
-    -------
-    value : unclear by this name where nothing was found
-    """
-    return Unclear(name) if found is None or isinstance(found, Unset) else found
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import assert_never
 import numpy as np
 import scipy
 
-from er3a.finding import fact
+from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
@@ -30,7 +30,6 @@ from er3a.programs.instructions import (
     Rate,
     Zone,
 )
-from er3a.programs.program_findings import WriteFinding
 from er3a.robots.robot import Robot
 
 TO_START = Rate(0.1, "share")
@@ -47,7 +46,7 @@ class PathListing:
 
     listing: Listing
     start: Reals
-    findings: tuple[WriteFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def listing_of(

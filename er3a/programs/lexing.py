@@ -458,7 +458,7 @@ def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Pa
 
 
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
-    """Text and encoding: by its mark, as UTF-8, as UTF-16 without a mark, as GBK, or as Windows-1252.
+    """Text and encoding: by its mark, as UTF-8, as GBK, or as Windows-1252.
 
     Raises
     ------
@@ -478,12 +478,6 @@ def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
         text = ""
     if text and "\x00" not in text:
         return text, "utf-8"
-    for encoding, zeros in (("utf-16-le", raw[1::2]), ("utf-16-be", raw[::2])):
-        if len(raw) % 2 == 0 and zeros.count(0) * 4 > len(raw):
-            try:
-                return raw.decode(encoding), encoding
-            except UnicodeDecodeError:
-                continue
     if text or not raw:
         return text, "utf-8"
     if all(len(run) % 2 == 0 for run in HIGH_RUNS.findall(raw)):

@@ -372,7 +372,7 @@ class Machine:
             return Output(name, syntax.shown(value))
         if key is None and memory.outside:  # where the controller stops: nothing is set
             return None
-        if not self.dialect.reads_back(name):
+        if root(name) in self.dialect.running:
             memory.write(name, Unclear(name))
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default

@@ -148,7 +148,7 @@ class Resolver:
         before = self.here.seen(*frames, self.flange)
         self.motions.append((motion, before))
         here = self.here.after(motion)
-        if isinstance(motion.target, JointTarget) and motion.angle is None:
+        if isinstance(motion.target, JointTarget):
             here = Position(self.joints_after(len(self.motions) - 1), None, *frames)
         target = motion.target.pose if isinstance(motion.target, PoseTarget) else None
         via = motion.via.pose if isinstance(motion.via, PoseTarget) else None
@@ -173,7 +173,7 @@ class Resolver:
             return self.start
         motion, _ = self.motions[number]
         target = motion.target
-        if isinstance(target, JointTarget) and motion.angle is None and not np.isnan(target.joints).any():
+        if isinstance(target, JointTarget) and not np.isnan(target.joints).any():
             return target.joints
         while len(self._solved) <= number:
             before = self.joints_after(len(self._solved) - 1)
@@ -216,7 +216,7 @@ class Resolver:
     def _end(self, motion: ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:
         """Joints (n,) in rad at a motion's end; those of a line or arc come from following its way."""
         target = motion.target
-        if motion.angle is not None or isinstance(target, UnresolvedTarget):
+        if isinstance(target, UnresolvedTarget):
             return None
         if isinstance(target, JointTarget):
             return None if before is None else np.where(np.isnan(target.joints), before, target.joints)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from er3a.by_value import ByValue
+from er3a.finding import Finding
 from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
-from er3a.programs.program_findings import ProgramFinding
 from er3a.programs.program_names import LanguageName
 
 POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -430,7 +430,7 @@ class Program(ByValue):
     routines: Mapping[str, Routine]
     entry: str
     data: tuple[Assign, ...] = ()
-    findings: tuple[ProgramFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     slides: tuple[bool, ...] = ()
     constants: frozenset[str] = frozenset()

@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.finding import fact
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Reals
-from er3a.programs import program_findings
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
     Decision,
-    Disabled,
     Instruction,
     Listing,
     Load,
@@ -124,7 +122,7 @@ class WrittenProgram(ByValue):
 
     name: str
     files: Mapping[str, str]
-    findings: tuple[program_findings.WriteFinding, ...]
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +141,7 @@ class WriteOptions(ByValue):
     robot: Robot | None = None
     start: Reals | None = None
     arc_deviation: float = ARC_DEVIATION
-    notes: tuple[program_findings.WriteFinding, ...] = ()
+    notes: tuple[Finding, ...] = ()
     head: tuple[str, ...] = ()
     assumed_speed: Reals | None = None
 
@@ -409,8 +407,6 @@ class Writer(ABC):
                 self._add_motion(instruction)
             case Remark(text=text):
                 self._remark(text)
-            case Disabled(text=text):
-                self.comment(f"disabled: {text}")
             case Aside(text=text) | Unknown(text=text):
                 self._foreign(text, self.own)
             case Pause(condition=condition):
@@ -453,9 +449,9 @@ class Writer(ABC):
             self.count["foreign"] += 1
             self.comment(f"not translated: {' '.join(text.split())}")
 
-    def _findings(self) -> tuple[program_findings.WriteFinding, ...]:
+    def _findings(self) -> tuple[Finding, ...]:
         count = self.count
-        found: list[program_findings.WriteFinding] = []
+        found: list[Finding] = []
         if count["arcs"]:
             found.append(
                 fact(
@@ -520,7 +516,7 @@ HEADS = {
 """What the head of a file says of findings: files are read by controllers, so this is plain ASCII."""
 
 
-def head_line(finding: program_findings.WriteFinding) -> str:
+def head_line(finding: Finding) -> str:
     """A finding as a line of a file's head, which a controller reads.
 
     Parameters

@@ -13,11 +13,11 @@ from er3a.programs.instructions import (
     ArmMotion,
     Aside,
     Decision,
-    Disabled,
     JointTarget,
     Output,
     Pause,
     PoseTarget,
+    Remark,
     Unknown,
     UnresolvedTarget,
 )
@@ -72,7 +72,7 @@ def test_an_xpl_program_is_read_by_its_elements(tmp_path):
     np.testing.assert_allclose(second.target.pose[:3, 3] * 1000, [383.85 + 49, 5.71, 597.03])
     assert third.target.reason == "undefined"
     assert (second.zone.value, second.tool.name) == (0.05, "tool2")
-    assert Disabled("MJOINT(S1, v500, fine, tool0)") in found
+    assert Remark("disabled: MJOINT(S1, v500, fine, tool0)") in found
     assert Output("io.DOut[8]", "TRUE") in found
     assert Pause(condition="!io.DIn[8]") in found
     assert Aside("tcpip.sockopen()") in found

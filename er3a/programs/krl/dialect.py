@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, syntax
+from er3a.programs import syntax
 from er3a.programs.evaluation import (
     IN_DEGREES,
     SIZES,
@@ -22,20 +22,39 @@ from er3a.programs.evaluation import (
     unresolved,
 )
 from er3a.programs.instructions import (
+    FINE,
     ArmMotion,
+    Instruction,
     JointTarget,
     Load,
     MeantSolution,
     MotionKind,
     NamedFrame,
+    Output,
     PoseTarget,
     Rate,
     Target,
     UnclearLoad,
+    Unknown,
     UnresolvedTarget,
     Zone,
+    ZoneKind,
+    numbers_of,
+    pose_of,
 )
-from er3a.programs.syntax import Element, Expression, Invocation, Move, Record, Unclear, Value, Variable
+from er3a.programs.syntax import (
+    Element,
+    Expression,
+    Invocation,
+    Move,
+    Record,
+    Unclear,
+    Value,
+    Variable,
+    numbers,
+    rate_of,
+    shown,
+)
 from er3a.robots.masses import MassBody, moved
 
 FRAME_KEYS = ("X", "Y", "Z", "A", "B", "C")
@@ -83,8 +102,8 @@ def record_pose(value: Value | None) -> Reals | None:
     """
     if not isinstance(value, Record):
         return None
-    plain = syntax.numbers(tuple(value.get(key) for key in FRAME_KEYS))
-    return instructions.pose_of(plain, "kuka") if plain is not None and syntax.finite(plain) else None
+    plain = numbers(tuple(value.get(key) for key in FRAME_KEYS))
+    return pose_of(plain, "kuka") if plain is not None and syntax.finite(plain) else None
 
 
 def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
@@ -95,7 +114,7 @@ def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
     pose : (4, 4), m
     kind : the type's name, such as ``FRAME`` or ``E6POS``
     """
-    return Record(kind, tuple(zip(FRAME_KEYS, instructions.numbers_of(pose, "kuka"))))
+    return Record(kind, tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
 
 
 def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:
@@ -150,7 +169,7 @@ def relative(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[st
     seen = memory.here.seen(*frames, memory.cell.flange)
     if seen is None:
         return UnresolvedTarget(text, "position_unknown")
-    offset = instructions.pose_of([each or 0.0 for each in given], "kuka")
+    offset = pose_of([each or 0.0 for each in given], "kuka")
     if in_tool:
         return PoseTarget(seen @ offset, external=external_axes(found, EXTERNAL_KEYS))
     # Along and about the axes of the base, with the tool point as the centre of the turn.
@@ -211,11 +230,11 @@ def _pose(memory: ProgramMemory, value: Record, frames: Frames, text: str) -> Ta
         seen = memory.here.seen(*frames, memory.cell.flange)
         if seen is None:
             return UnresolvedTarget(text, "position_unknown")
-        given = [old if each is None else each for each, old in zip(given, instructions.numbers_of(seen, "kuka"))]
+        given = [old if each is None else each for each, old in zip(given, numbers_of(seen, "kuka"))]
     words = ((key, value.get(key)) for key in ("S", "T"))
     given_words = ((key, each.text if isinstance(each, Unclear) else syntax.number(each)) for key, each in words)
     configuration = tuple((key, each) for key, each in given_words if each is not None)
-    pose = instructions.pose_of([each or 0.0 for each in given], "kuka")
+    pose = pose_of([each or 0.0 for each in given], "kuka")
     branch = _branch(syntax.number(value.get("T")), memory.cell.joints)
     return PoseTarget(pose, configuration, external=external_axes(value, EXTERNAL_KEYS), branch=branch)
 
@@ -244,7 +263,7 @@ def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
         if isinstance(own, Unclear) and not isinstance(own, syntax.Unset):  # the program or others change it
             name = f"{name}, changed" if own.text == name else f"{name}={own.text}"
     elif pose is None and is_frame(value):
-        name = syntax.shown(value)
+        name = shown(value)
     mapped = memory.cell.frames.get(name)
     if pose is None or (mapped is not None and value == frame_record(mapped)):
         pose = mapped
@@ -353,7 +372,7 @@ def load_of(value: Value | None) -> Load | None:
     if mass is not None and mass <= 0:
         return None
     centre = record_pose(value.get("CM"))
-    given = syntax.numbers(tuple(moments.get(key) for key in "XYZ")) if isinstance(moments, Record) else NULL[:3]
+    given = numbers(tuple(moments.get(key) for key in "XYZ")) if isinstance(moments, Record) else NULL[:3]
     if mass is None or not math.isfinite(mass) or centre is None or given is None:
         return UnclearLoad("LOAD", mass)
     x, y, z = given
@@ -547,15 +566,7 @@ class KrlDialect(Dialect):
     harmless = HARMLESS | EVALUATED | OF_SETTINGS
     reading = READING | EVALUATED | OF_SETTINGS | {"BAS"}
     by_reference = True
-
-    def reads_back(self, name: str) -> bool:
-        """Whether reading a variable gives the value that the program set last.
-
-        Returns
-        -------
-        same : False for timers, cyclic flags, the override and others that go on by themselves (``RUNNING``)
-        """
-        return root(name) not in RUNNING
+    running = RUNNING
 
     def is_followed(self, name: str) -> bool:
         """Whether motions are followed as a variable asks.
@@ -596,7 +607,7 @@ class KrlDialect(Dialect):
             ``$AXIS_ACT`` (deg); None for other names, and where the position is not known
         """
         if name in ("$NULLFRAME", "$WORLD", "$ROBROOT"):
-            return frame_record(instructions.pose_of(NULL, "kuka"))
+            return frame_record(pose_of(NULL, "kuka"))
         if name == "$NUM_AX":
             return memory.cell.joints
         if name in SIZES_BY_AXES:
@@ -652,26 +663,21 @@ class KrlDialect(Dialect):
 
         Returns
         -------
-        motion : ``not_followed`` names a setting whose effect is not followed. The angle of CA is in rad, NaN where it
-            is not known.
+        motion : ``not_followed`` names a setting whose effect is not followed. Where an arc with CA ends is not known.
         """
         if not move.settings:
-            return self._motion(memory, move, None)
-        kept, angle, other = dict(memory.shared), None, ""
+            return self._motion(memory, move)
+        kept, other = dict(memory.shared), ""
         for name, expression in move.settings:
-            if name == "CA":
-                degrees = syntax.number(memory.value(expression))
-                angle = math.radians(degrees) if degrees is not None else math.nan
-                continue
             keep_setting(memory, name, expression)
             if not self.is_followed(name):
                 other = name
-        found = self._motion(memory, move, angle)
+        found = self._motion(memory, move)
         memory.shared = kept
         memory.kept.clear()
         return replace(found, not_followed=found.not_followed or other)
 
-    def _motion(self, memory: ProgramMemory, move: Move, angle: float | None) -> ArmMotion:
+    def _motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         plain = move.form.removesuffix("_REL")
         kind, is_relative = KINDS[plain.removeprefix("S")], plain != move.form
         settings = _settings(memory, kind, move)
@@ -681,6 +687,8 @@ class KrlDialect(Dialect):
         made = [make(memory, value, settings[:2], (move.text, in_tool)) for value in values]
         if len(made) != (2 if kind == "arc" else 1):
             made = [UnresolvedTarget(move.text, "not_understood")] * 2
+        if any(name == "CA" for name, _ in move.settings):
+            made = [UnresolvedTarget("CA", "arc_angle")] * 2
         said = [] if kind == "joint" else _other_turns(memory, kind)
         if kind != "joint":  # which ignores S and T
             made = [replace(each, branch=None) if isinstance(each, PoseTarget) else each for each in made]
@@ -694,7 +702,6 @@ class KrlDialect(Dialect):
             made[-1],
             move.form,
             made[0] if kind == "arc" else None,
-            angle if kind == "arc" else None,
             settings.speed,
             settings.acceleration,
             settings.zone,
@@ -705,7 +712,7 @@ class KrlDialect(Dialect):
             turn_speed=None if kind == "joint" else _turn_speed(memory),
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
         """Carry out settings by BAS, and signals by PULSE; the rest as in all languages.
 
         Returns
@@ -719,11 +726,11 @@ class KrlDialect(Dialect):
             BAS[str(values[0])](memory, values[1] if len(values) > 1 else Unclear("BAS"))
             return None
         if call.function == "PULSE" and values:
-            return instructions.Output("$OUT", doing.text)
+            return Output("$OUT", doing.text)
         if call.function == "P00":
             memory.forget("PGNO")
         if call.function == "CWRITE" and Variable("$CMD") in call.arguments:  # commands, as to run a program
-            return instructions.Unknown(doing.text)
+            return Unknown(doing.text)
         return super().carry_out(memory, doing)
 
 
@@ -739,13 +746,13 @@ def _argument(memory: ProgramMemory, argument: Expression | None) -> Value:
 def _other_turns(memory: ProgramMemory, kind: MotionKind) -> list[str]:
     """The settings of how the tool turns on lines and arcs that are not followed."""
     given = ((name, memory.read(name)) for name in FOLLOWED_TYPES if kind == "arc" or name != "$CIRC_TYPE")
-    return [f"{name}={syntax.shown(value)}" for name, value in given if value and value != FOLLOWED_TYPES[name]]
+    return [f"{name}={shown(value)}" for name, value in given if value and value != FOLLOWED_TYPES[name]]
 
 
 def _turned_by(value: Value) -> list[str]:
     """The angles of a relative position, as text."""
     items = value.items if isinstance(value, Record) else ()
-    return [f"{key} {syntax.shown(each)}" for key, each in items if key in "ABC" and syntax.number(each) != 0]
+    return [f"{key} {shown(each)}" for key, each in items if key in "ABC" and syntax.number(each) != 0]
 
 
 def _left_out(memory: ProgramMemory, argument: Expression | None, value: Value) -> list[str]:
@@ -776,7 +783,7 @@ def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
 def _speed(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
     if kind == "joint":
         return _axis_share(memory, "$VEL_AXIS")
-    speed = syntax.rate_of(memory.read("$VEL.CP"), "m/s")
+    speed = rate_of(memory.read("$VEL.CP"), "m/s")
     if speed is not None and speed.value > MOST_SPEED:
         return Rate(0.0, "m/s", f"$VEL.CP={speed.value:g}")
     return speed
@@ -787,8 +794,8 @@ def _acceleration(memory: ProgramMemory, kind: MotionKind) -> Rate | None:
         return _axis_share(memory, "$ACC_AXIS")
     value = memory.read("$ACC.CP")
     if isinstance(value, Record):
-        return syntax.rate_of(value.get("share"), "share")
-    return syntax.rate_of(value, "m/s2")
+        return rate_of(value.get("share"), "share")
+    return rate_of(value, "m/s2")
 
 
 def _turn_speed(memory: ProgramMemory) -> float | None:
@@ -801,15 +808,15 @@ def _axis_share(memory: ProgramMemory, name: str) -> Rate | None:
     """What is set for the axes in percent: one that is not known, else one beyond 100, else the slowest."""
     values = [memory.read(f"{name}[{axis}]") for axis in range(1, 7)]
     if isinstance(values[0], Record):
-        return Rate(1.0, "share", f"{syntax.shown(values[0].values()[0])} %")
-    given = [rate for value in values if (rate := syntax.rate_of(value, "share", 100.0)) is not None]
+        return Rate(1.0, "share", f"{shown(values[0].values()[0])} %")
+    given = [rate for value in values if (rate := rate_of(value, "share", 100.0)) is not None]
     if any(rate.text for rate in given):
         return next(rate for rate in given if rate.text)
     beyond = [rate for rate in given if rate.value > 1]
     return min(beyond or given, key=lambda rate: rate.value, default=None)
 
 
-ZONES: dict[str, tuple[instructions.ZoneKind, str, float]] = {
+ZONES: dict[str, tuple[ZoneKind, str, float]] = {
     "C_PTP": ("share", "$APO.CPTP", 100.0),
     "C_DIS": ("distance", "$APO.CDIS", 1000.0),
     "C_ORI": ("angle", "$APO.CORI", math.degrees(1.0)),
@@ -821,7 +828,7 @@ ZONES: dict[str, tuple[instructions.ZoneKind, str, float]] = {
 def _zone(memory: ProgramMemory, kind: MotionKind, words: tuple[str, ...]) -> Zone:
     given = [word for word in words if word.startswith("C_")]
     if not given:
-        return instructions.FINE
+        return FINE
     if kind == "joint" and {"C_ORI", "C_VEL"}.intersection(given):  # which hold on the line or arc after it
         return Zone("named", 0.0, " ".join(given))
     word = given[0]

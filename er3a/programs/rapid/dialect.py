@@ -35,8 +35,8 @@ from er3a.programs.instructions import (
     Zone,
 )
 from er3a.programs.rapid import data_types, known_names
-from er3a.programs.rapid.data_types import NO_AXIS
-from er3a.programs.syntax import Record, Unclear, Value, Variable
+from er3a.programs.rapid.data_types import NO_AXIS, orient_record, pos_record, pose_matrix
+from er3a.programs.syntax import Record, Unclear, Value, Variable, numbers, rate_of, shown
 
 ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
@@ -104,9 +104,9 @@ class RapidDialect(Dialect):
         a, b = data_types.plain(left, 3), data_types.plain(right, 3)
         scale = syntax.number(left) if a is None else syntax.number(right)
         if a is not None and b is not None and sign in "+-":
-            return data_types.pos_record(np.array(a) / 1000 + np.array(b) / (1000 if sign == "+" else -1000))
+            return pos_record(np.array(a) / 1000 + np.array(b) / (1000 if sign == "+" else -1000))
         if sign == "*" and scale is not None and (xyz := a or b) is not None:
-            return data_types.pos_record(scale * np.array(xyz) / 1000)
+            return pos_record(scale * np.array(xyz) / 1000)
         return None
 
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> Value:
@@ -128,7 +128,7 @@ class RapidDialect(Dialect):
             found = _of_data(name, values, named)
         if found is not None:
             return found
-        unclear = f"{given.function.lower()}({', '.join(map(syntax.shown, values))})"
+        unclear = f"{given.function.lower()}({', '.join(map(shown, values))})"
         return next((each for each in values if isinstance(each, Unclear)), Unclear(unclear))
 
     def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
@@ -170,7 +170,6 @@ class RapidDialect(Dialect):
             made[-1],
             SPELLED.get(move.form, move.form),
             via,
-            None,
             speed,
             None if percent is None else Rate(percent / 100, "share"),
             _zone(values[zone_at], options, move.arguments[zone_at]),
@@ -204,7 +203,7 @@ class RapidDialect(Dialect):
             case "ACCSET" if values and (percent := syntax.number(values[0])) is not None:
                 memory.write("%ACC", max(percent, SLOWEST_RAMP))
                 return None
-            case "VELSET" if len(values) == 2 and (found := syntax.numbers(values)) is not None:
+            case "VELSET" if len(values) == 2 and (found := numbers(values)) is not None:
                 memory.write("%SPEED", found)
                 return None
             case name if name in known_names.NOT_SIMULATED | known_names.SHIFTING:
@@ -235,7 +234,7 @@ def _target(memory: ProgramMemory, value: Value, said: tuple[str, MotionKind, bo
         if any(each and abs(each) < NO_AXIS / 10 for each in degrees[count:]):
             return UnresolvedTarget(text, "too_many_joints")
         return JointTarget(np.radians(degrees[:count]), external)
-    pose = data_types.pose_matrix(value)
+    pose = pose_matrix(value)
     if pose is None:
         return UnresolvedTarget(text, "not_understood")
     conf = data_types.part(value, "ROBCONF")
@@ -250,7 +249,7 @@ def _said(conf: Value | None) -> tuple[tuple[str, float | str], ...]:
     parts = conf.values() if isinstance(conf, Record) else ()
     if len(parts) != 4 or AS_IT_STANDS in parts:
         return ()
-    known = [number if (number := syntax.number(each)) is not None else syntax.shown(each) for each in parts]
+    known = [number if (number := syntax.number(each)) is not None else shown(each) for each in parts]
     return tuple(zip(("cf1", "cf4", "cf6", "cfx"), known))
 
 
@@ -268,7 +267,7 @@ def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
     """
     data = data_types.typed(value, "TOOLDATA") if value is not None else None
     held = data_types.part(data, "ROBHOLD")
-    pose = None if isinstance(held, Unclear) else data_types.pose_matrix(data_types.part(data, "TFRAME"))
+    pose = None if isinstance(held, Unclear) else pose_matrix(data_types.part(data, "TFRAME"))
     return pose, held is False
 
 
@@ -279,7 +278,7 @@ def frame_of_object(value: Value | None) -> tuple[Reals | None, bool]:
     is set up otherwise. None where an external unit moves the user's frame (ufprog FALSE, ufmec).
     """
     data = data_types.typed(value, "WOBJDATA") if value is not None else None
-    user, own = (data_types.pose_matrix(data_types.part(data, name)) for name in ("UFRAME", "OFRAME"))
+    user, own = (pose_matrix(data_types.part(data, name)) for name in ("UFRAME", "OFRAME"))
     still = data_types.part(data, "UFPROG") is True
     held = data_types.part(data, "ROBHOLD")
     if user is None or own is None or not still or isinstance(held, Unclear):
@@ -322,7 +321,7 @@ def _speed(
 ) -> tuple[Rate | None, float | None]:
     """Speed of the tool and of its turn (rad/s). 1 VelSet scales and bounds it, but no time, as the faster reading."""
     if "T" in options:
-        return syntax.rate_of(options["T"], "s"), None
+        return rate_of(options["T"], "s"), None
     percent, most = data_types.plain(memory.read("%SPEED"), 2) or (100.0, FULL_SPEED)
     share = percent / 100
     if isinstance(value, Record) and value.get("FASTEST") is True:
@@ -331,9 +330,9 @@ def _speed(
         return Rate(most / 1000 * share, "m/s", "vmax"), math.radians(data_types.TURN_SPEED) * share
     data = data_types.typed(value, "SPEEDDATA")
     turn = syntax.number(data_types.part(data, "V_ORI"))
-    along = syntax.rate_of(data_types.part(data, "V_TCP"), "m/s")
+    along = rate_of(data_types.part(data, "V_TCP"), "m/s")
     if along is None or along.text:
-        return along or Rate(0.0, "m/s", syntax.shown(value)), None
+        return along or Rate(0.0, "m/s", shown(value)), None
     limited = min(along.value * share, most)
     return Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
 
@@ -368,27 +367,27 @@ def _of_position(
     base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
     seen = here.seen(tool, base, memory.cell.flange)
     if seen is None or name == "CPOS":
-        return None if seen is None else data_types.pos_record(seen[:3, 3])
+        return None if seen is None else pos_record(seen[:3, 3])
     conf: Value = (AS_IT_STANDS,) * 4  # cfx is -1 where the arm's sides are not known
     if here.joints is not None and len(here.joints) == 6:
         conf = (*data_types.quarters_of(here.joints), -1)
-    parts = data_types.pos_record(seen[:3, 3]), data_types.orient_record(seen[:3, :3]), conf, (NO_AXIS,) * 6
+    parts = pos_record(seen[:3, 3]), orient_record(seen[:3, :3]), conf, (NO_AXIS,) * 6
     return data_types.typed(parts, "ROBTARGET")
 
 
 def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
     """Functions of positions, as ABB's manual defines them (2, each by its name)."""
-    plain = syntax.numbers(values)
-    poses = [pose for each in values if (pose := data_types.pose_matrix(each)) is not None]
+    plain = numbers(values)
+    poses = [pose for each in values if (pose := pose_matrix(each)) is not None]
     match name, len(values):
         case "OFFS" | "RELTOOL", 4:
             return _shifted(name, values, named)
         case "POSEMULT", 2 if len(poses) == 2:
             return data_types.pose_record(poses[0] @ poses[1])
         case "ORIENTZYX", 3 if plain is not None:  # about z, then the new y, then the new x
-            return data_types.orient_record(transform(np.zeros(3), np.radians(plain[::-1]))[:3, :3])
+            return orient_record(transform(np.zeros(3), np.radians(plain[::-1]))[:3, :3])
         case "EULERZYX", 1:
-            turn = data_types.rotation_of(values[0])
+            turn = pose_matrix(((0.0, 0.0, 0.0), values[0]))
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
             return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
     return None
@@ -397,16 +396,14 @@ def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -
 def _shifted(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
     """2 Offs: along the object's axes. 2 RelTool: along the tool's, then turned about x, the new y, the new z."""
     target = data_types.typed(values[0], "ROBTARGET")
-    pose, shift = data_types.pose_matrix(target), syntax.numbers(values[1:])
-    angles = syntax.numbers(tuple(named.get(key, 0.0) for key in ("RX", "RY", "RZ")))
+    pose, shift = pose_matrix(target), numbers(values[1:])
+    angles = numbers(tuple(named.get(key, 0.0) for key in ("RX", "RY", "RZ")))
     if not isinstance(target, Record) or pose is None or shift is None or angles is None:
         return None
     step = np.eye(4)
     step[:3, 3] = np.array(shift) / 1000
     if name == "OFFS":
-        return target.having("TRANS", data_types.pos_record(pose[:3, 3] + step[:3, 3]))
+        return target.having("TRANS", pos_record(pose[:3, 3] + step[:3, 3]))
     step[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
     moved = pose @ step
-    return target.having("TRANS", data_types.pos_record(moved[:3, 3])).having(
-        "ROT", data_types.orient_record(moved[:3, :3])
-    )
+    return target.having("TRANS", pos_record(moved[:3, 3])).having("ROT", orient_record(moved[:3, :3]))

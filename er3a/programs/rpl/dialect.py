@@ -8,11 +8,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, evaluated, external_axes, unresolved
+from er3a.programs import instructions
+from er3a.programs.evaluation import (
+    IN_DEGREES,
+    Dialect,
+    ProgramMemory,
+    evaluated,
+    external_axes,
+    target_numbers,
+    unresolved,
+)
 from er3a.programs.instructions import ArmMotion, NamedFrame, Rate, UnresolvedTarget, Zone
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
-from er3a.programs.syntax import Record, Unclear, Value
+from er3a.programs.syntax import Expression, Invocation, Move, Record, Unclear, Value, number, shown
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
@@ -28,7 +36,7 @@ class RplDialect(Dialect):
     signals = ("io.", "fidbus.")
     harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
 
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function of RPL: points, OFFSET, roots and absolute values.
 
         Returns
@@ -42,10 +50,10 @@ class RplDialect(Dialect):
         if name == "OFFSET" and values and isinstance(values[0], Record):
             return _offset(values[0], values[1:])
         found = evaluated(ROOTS[name.upper()], values) if name.upper() in ROOTS and len(values) == 1 else None
-        unclear = f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})"
+        unclear = f"{name}({', '.join('' if each is None else shown(each) for each in values)})"
         return Unclear(unclear) if found is None else found
 
-    def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion of MJOINT and MLIN: target, speed, zone, tool, reference frame.
 
         Returns
@@ -81,9 +89,9 @@ class RplDialect(Dialect):
         return name.partition(".")[0] not in LIBRARY_NAMES
 
 
-def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
+def _word(memory: ProgramMemory, expression: Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
-    return "" if expression is None else syntax.shown(memory.value(expression))
+    return "" if expression is None else shown(memory.value(expression))
 
 
 def _speed(word: str) -> Rate | None:
@@ -107,7 +115,7 @@ def _point(name: str, values: list[Value | None]) -> Value:
     if not 6 <= len(values) <= len(fields) and not any(each is None or isinstance(each, Unclear) for each in values):
         return Record(name, ())  # which is no point
     if not 6 <= len(values) <= len(fields) or None in values:
-        return Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
+        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
     given = [each for each in values if each is not None]
     if name == "EPOINTC" and len(given) == 10 and isinstance(given[6], str):
         fields = FIELDS["POINTC"]
@@ -116,15 +124,15 @@ def _point(name: str, values: list[Value | None]) -> Value:
 
 def _offset(point: Record, by: list[Value | None]) -> Value:
     if len(by) > 3:
-        return Unclear(f"OFFSET({syntax.shown(point)}, ...)")
+        return Unclear(f"OFFSET({shown(point)}, ...)")
     for key, step in zip(POSITION, by):
         old = point.get(key)
         for part in (old, step):
             if isinstance(part, Unclear):
                 return part
-        a, b = syntax.number(old), syntax.number(step)
+        a, b = number(old), number(step)
         if a is None or b is None:
-            return Unclear(f"OFFSET({syntax.shown(point)})")
+            return Unclear(f"OFFSET({shown(point)})")
         point = point.having(key, a + b)
     return point
 
@@ -132,20 +140,12 @@ def _offset(point: Record, by: list[Value | None]) -> Value:
 def _target(value: Value, text: str) -> instructions.Target:
     if isinstance(value, Unclear):
         return unresolved(value)
-    if not isinstance(value, Record):
-        return UnresolvedTarget(text, "not_understood")
-    if not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
+    if not isinstance(value, Record) or not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
         return UnresolvedTarget(text, "not_understood")
     keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
-    parts = [value.get(key) for key in keys]
-    for part in parts:
-        if isinstance(part, Unclear):
-            return _target(part, text)
-    plain = syntax.numbers(tuple(parts))
-    if plain is None:
-        return UnresolvedTarget(text, "not_understood")
-    if not syntax.finite(plain):
-        return UnresolvedTarget(text, "not_finite")
+    plain = target_numbers([value.get(key) for key in keys], text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
     outer = external_axes(value, OUTER)
     if keys is JOINTS:
         return instructions.JointTarget(np.radians(plain), outer)

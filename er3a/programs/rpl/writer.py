@@ -162,7 +162,7 @@ class RplWriter(Writer):
         """Lines near the arc, through the joints that the arm's table gives."""
         motion = ready.motion
         joints = None
-        if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
+        if ready.pose is not None and ready.pose_before is not None and ready.via is not None:
             poses = _chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
             frames = (motion.tool, motion.base)
             joints = None if poses is None else self.resolver.along(poses, frames, ready.joints_before)

@@ -14,10 +14,10 @@ from xml.parsers import expat
 
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, linked
-from er3a.programs.instructions import Disabled, Place
+from er3a.programs.instructions import Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.rpl.reader import expression, initial, statement
-from er3a.programs.syntax import Assign, Fixed, Program, Return, Routine, RoutineParameter, Variable
+from er3a.programs.syntax import Assign, Program, Return, Routine, RoutineParameter, Variable
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
@@ -177,7 +177,7 @@ class _Pou:
             place = _place(self.source, element, f"{path}/{element.tag}[{counts[element.tag]}]")
             switch = element.attrib.pop("disable", "false").lower()
             if switch == "true" and len(element.attrib) == 1:
-                builder.add(Fixed(place, Disabled(text_of(element))))
+                builder.remark(place, f"disabled: {text_of(element)}")
             elif switch != "false" or _is_strange(element):
                 builder.unread(place, f"{text_of(element)} {_all_text(element)}")
             elif element.tag == "rem":

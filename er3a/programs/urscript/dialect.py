@@ -11,25 +11,46 @@ import scipy
 
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, unresolved
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, target_numbers
 from er3a.programs.instructions import (
+    FINE,
     ArmMotion,
     Aside,
+    Instruction,
     JointTarget,
+    Load,
+    MotionKind,
     NamedFrame,
+    Output,
     PoseTarget,
     RateUnit,
+    Target,
     UnclearLoad,
     Unknown,
     UnresolvedTarget,
     Zone,
+    numbers_of,
+    pose_of,
 )
-from er3a.programs.syntax import POSE_KEYS, Expression, Record, Unclear, Value
+from er3a.programs.syntax import (
+    POSE_KEYS,
+    Doing,
+    Expression,
+    Invocation,
+    Move,
+    Record,
+    Unclear,
+    Value,
+    finite,
+    number,
+    numbers,
+    rate_of,
+    shown,
+)
 from er3a.programs.urscript.reader import LIST_METHODS
 from er3a.robots.masses import MassBody
 
-KINDS: dict[str, instructions.MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
+KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
     "movej": ("q", "a", "v", "t", "r"),
     "movel": ("pose", "a", "v", "t", "r"),
@@ -166,10 +187,10 @@ class UrScriptDialect(Dialect):
         if not kind:
             return values
         if len(values) != 6:
-            return Unclear(f"p[{', '.join(map(syntax.shown, values))}]")
+            return Unclear(f"p[{', '.join(map(shown, values))}]")
         return Record("p", tuple(zip(POSE_KEYS, values)))
 
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function of URScript: mathematics, poses, lists, where the arm is.
 
         Returns
@@ -179,7 +200,7 @@ class UrScriptDialect(Dialect):
         values, keywords = _given(memory, given.arguments, given.keywords)
         if name == "struct":
             return Record(name, tuple(keywords.items()))
-        unclear = Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
+        unclear = Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
         placed = _placed(SIGNATURES.get(name), values, keywords)
         if placed is None:
             return unclear
@@ -190,7 +211,7 @@ class UrScriptDialect(Dialect):
             found = _of_values(name, list(placed.values())) if found is None else found
         return unclear if found is None else found
 
-    def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion of movej, movel, movep and movec.
 
         Returns
@@ -209,29 +230,28 @@ class UrScriptDialect(Dialect):
         unit: tuple[RateUnit, RateUnit] = ("m/s", "m/s2")
         if kind == "joint":
             unit = ("rad/s", "rad/s2")
-        timed = "t" in values and syntax.number(values["t"]) != 0.0  # 0: by speed and acceleration
-        speed = syntax.rate_of(values["t"], "s") if timed else syntax.rate_of(values.get("v", v), unit[0])
+        timed = "t" in values and number(values["t"]) != 0.0  # 0: by speed and acceleration
+        speed = rate_of(values["t"], "s") if timed else rate_of(values.get("v", v), unit[0])
         radius = values.get("r", 0.0)
-        blend = syntax.number(radius)
-        zone = Zone("named", 0.0, syntax.shown(radius))
+        blend = number(radius)
+        zone = Zone("named", 0.0, shown(radius))
         if blend is not None:
-            zone = Zone("distance", blend) if blend > 0 else instructions.FINE
+            zone = Zone("distance", blend) if blend > 0 else FINE
         return ArmMotion(
             kind,
             made[-1],
             move.form,
             made[0] if kind == "arc" else None,
-            None,
             speed,
-            syntax.rate_of(values.get("a", a), unit[1]),
+            rate_of(values.get("a", a), unit[1]),
             zone,
             tool,
             ROBOT_BASE,
             load=_load(memory.read("%load")),
-            not_followed="" if syntax.number(values.get("mode", 0)) == 0 else "mode",
+            not_followed="" if number(values.get("mode", 0)) == 0 else "mode",
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """Carry out settings of tool and load, and outputs; the rest as in all languages.
 
         Returns
@@ -259,8 +279,8 @@ class UrScriptDialect(Dialect):
             return Unknown(doing.text)
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
-            name = f"{OUTPUTS[call.function]}[{syntax.shown(output['n'])}]"
-            return instructions.Output(name, syntax.shown(output["b"]))
+            name = f"{OUTPUTS[call.function]}[{shown(output['n'])}]"
+            return Output(name, shown(output["b"]))
         if call.function.partition(".")[2] in LIST_METHODS:
             return Aside(doing.text)
         return super().carry_out(memory, doing)
@@ -291,16 +311,16 @@ def _tool(memory: ProgramMemory) -> NamedFrame:
     return NamedFrame(value.text if isinstance(value, Unclear) else "", _pose(value))
 
 
-def _load(value: Value | None) -> instructions.Load | None:
+def _load(value: Value | None) -> Load | None:
     """What the program says hangs on the flange: mass (kg), centre (m, in its frame), inertia (kg m^2, about it)."""
     if not isinstance(value, Record):
         return UnclearLoad(value.text) if isinstance(value, Unclear) else None
     mass, centre, inertia = (value.get(key) for key in ("m", "cog", "inertia"))
     parts = (mass, *(centre if isinstance(centre, tuple) else ()), *(inertia if isinstance(inertia, tuple) else ()))
-    plain = syntax.numbers(parts)
-    if plain is None or len(plain) != 10 or not syntax.finite(plain) or plain[0] < 0:
-        text = "set_payload" if mass is None else f"set_payload({syntax.shown(mass)})"
-        return UnclearLoad(text, syntax.number(mass))
+    plain = numbers(parts)
+    if plain is None or len(plain) != 10 or not finite(plain) or plain[0] < 0:
+        text = "set_payload" if mass is None else f"set_payload({shown(mass)})"
+        return UnclearLoad(text, number(mass))
     kg, x, y, z, xx, yy, zz, xy, xz, yz = plain
     return MassBody(kg, (x, y, z), (xx, yy, zz, xy, xz, yz)) if kg else None
 
@@ -309,15 +329,15 @@ def _pose(value: Value | None) -> Reals | None:
     """The transform (4, 4) of a pose of six finite numbers."""
     if not isinstance(value, Record) or value.kind != "p":
         return None
-    plain = syntax.numbers(value.values())
-    return instructions.pose_of(plain, "ur") if plain is not None and syntax.finite(plain) else None
+    plain = numbers(value.values())
+    return pose_of(plain, "ur") if plain is not None and finite(plain) else None
 
 
 def _record(pose: Reals) -> Record:
-    return Record("p", tuple(zip(POSE_KEYS, instructions.numbers_of(pose, "ur"))))
+    return Record("p", tuple(zip(POSE_KEYS, numbers_of(pose, "ur"))))
 
 
-def _target(value: Value, text: str) -> instructions.Target:
+def _target(value: Value, text: str) -> Target:
     if isinstance(value, Record) and value.kind == "near":  # a solution near to given joints
         pose = _target(value.values()[0], text)
         near = _target(value.values()[-1], text)
@@ -325,16 +345,13 @@ def _target(value: Value, text: str) -> instructions.Target:
             return pose if len(value.items) == 1 else near
         return replace(pose, near=near.joints) if isinstance(pose, PoseTarget) else pose
     parts = value.values() if isinstance(value, Record) else value if isinstance(value, tuple) else (value,)
-    unclear = next((each for each in parts if isinstance(each, Unclear)), None)
-    if unclear is not None:
-        return unresolved(unclear, text)
-    plain = syntax.numbers(parts)
-    if plain is None or len(plain) != 6 or (isinstance(value, Record) and value.kind != "p"):
+    plain = target_numbers(parts, text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
+    if len(plain) != 6 or (isinstance(value, Record) and value.kind != "p"):
         return UnresolvedTarget(text, "not_understood")
-    if not syntax.finite(plain):
-        return UnresolvedTarget(text, "not_finite")
     if isinstance(value, Record):
-        return PoseTarget(instructions.pose_of(plain, "ur"))
+        return PoseTarget(pose_of(plain, "ur"))
     return JointTarget(np.array(plain))
 
 
@@ -380,14 +397,14 @@ def _of_values(name: str, values: list[Value]) -> Value | None:
     """
     value = values[0] if values else None
     poses = [pose for pose in map(_pose, values) if pose is not None]
-    plain = syntax.numbers(value) if isinstance(value, tuple) else None
+    plain = numbers(value) if isinstance(value, tuple) else None
     match name:
         case "length" | "get_list_length":
             return len(value) if isinstance(value, tuple) else None
-        case "norm" | "normalize" if plain and syntax.finite(plain):
+        case "norm" | "normalize" if plain and finite(plain):
             size = math.hypot(*plain)
             return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
-        case "rpy2rotvec" if plain is not None and len(plain) == 3 and syntax.finite(plain):
+        case "rpy2rotvec" if plain is not None and len(plain) == 3 and finite(plain):
             turn = transform(np.zeros(3), np.array(plain))[:3, :3]
             return tuple(map(float, scipy.spatial.transform.Rotation.from_matrix(turn).as_rotvec()))
         case "pose_inv" if len(poses) == 1:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs import writing
 from er3a.programs.instructions import RAMP_OF_A_DURATION, Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
-from er3a.programs.writing import ReadyMotion
+from er3a.programs.writing import LOAD_DIGITS, ReadyMotion, Writer, cut, duration, fixed, short, tool_speed
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
 
 
-class UrScriptWriter(writing.Writer):
+class UrScriptWriter(Writer):
     """Writes URScript."""
 
     languages = ("urscript",)
@@ -81,15 +80,8 @@ class UrScriptWriter(writing.Writer):
         load : kg, m, kg m^2, in the flange's axes; None is written as a mass of 0
         """
         load = load or MassBody(0.0)
-        parts = [
-            f"[{', '.join(writing.short(each, writing.LOAD_DIGITS) for each in part)}]"
-            for part in (load.centre, load.inertia)
-        ]
-        given = (
-            ", ".join((writing.short(load.mass), *parts))
-            if any(load.inertia)
-            else f"{writing.short(load.mass)}, {parts[0]}"
-        )
+        parts = [f"[{', '.join(short(each, LOAD_DIGITS) for each in part)}]" for part in (load.centre, load.inertia)]
+        given = ", ".join((short(load.mass), *parts)) if any(load.inertia) else f"{short(load.mass)}, {parts[0]}"
         self.line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
     def motion(self, ready: ReadyMotion) -> None:
@@ -102,7 +94,7 @@ class UrScriptWriter(writing.Writer):
         motion = ready.motion
         target = self._target(ready)
         base = motion.base
-        if target is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
+        if target is None or (motion.kind == "arc" and ready.via is None):
             self.omit(motion)
             return
         if base.pose is None and base.name:
@@ -155,15 +147,15 @@ class UrScriptWriter(writing.Writer):
         if speed is not None and timed and form == "movej" and (stops or self.stops or self._is_short(ready)):
             self.count["estimated"] += 1
             v = self.leading_joint_speed(ready)
-            return f", a={writing.short(a)}, v={writing.short(usual_v if v is None else v)}"
+            return f", a={short(a)}, v={short(usual_v if v is None else v)}"
         if speed is not None and timed and form in ("movej", "movel"):
-            return f", a={writing.short(a)}, t={writing.short(speed.value)}"
-        v = self.leading_joint_speed(ready) if joint else writing.tool_speed(ready)
-        if v is None and joint and (seconds := writing.duration(ready)) is not None:
-            return f", a={writing.short(a)}, t={writing.short(seconds)}"
+            return f", a={short(a)}, t={short(speed.value)}"
+        v = self.leading_joint_speed(ready) if joint else tool_speed(ready)
+        if v is None and joint and (seconds := duration(ready)) is not None:
+            return f", a={short(a)}, t={short(seconds)}"
         if speed is not None and speed.unit == "s":
             self.count["estimated"] += 1
-        return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
+        return f", a={short(a)}, v={short(v if v is not None and v > 0 else usual_v)}"
 
     def _is_short(self, ready: ReadyMotion) -> bool:
         """Whether a joint would be too fast if it moved in the motion's time with ramps as check-program takes them."""
@@ -176,14 +168,14 @@ class UrScriptWriter(writing.Writer):
     def _zone(self, ready: ReadyMotion) -> str:
         zone = ready.motion.zone
         if zone.kind == "distance" and zone.value > 0:
-            return f", r={writing.cut(zone.value)}"
+            return f", r={cut(zone.value)}"
         self.count["zones"] += zone.kind != "fine"
         return ""
 
 
 def _joints_text(joints: Reals) -> str:
-    return "[" + ", ".join(writing.fixed(float(value), DIGITS) for value in joints) + "]"
+    return "[" + ", ".join(fixed(float(value), DIGITS) for value in joints) + "]"
 
 
 def _pose_text(pose: Reals) -> str:
-    return "p[" + ", ".join(writing.fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"
+    return "p[" + ", ".join(fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"
