@@ -50,7 +50,7 @@ from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
-from er3a.programs.syntax import Fixed, Move, Program
+from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -386,20 +386,9 @@ def _unreached(execution: Execution) -> Iterator[tuple[Place, str]]:
     if not execution.complete:
         return
     met = {step.place for step in execution.steps}
-    for place, text in _motion_texts(execution.program):
+    for place, text in execution.program.motions():
         if place not in met and place.file == execution.program.file:
             yield place, text
-
-
-def _motion_texts(program: Program) -> list[tuple[Place, str]]:
-    """All motion instructions of the text."""
-    found: list[tuple[Place, str]] = []
-    for operation in program.operations():
-        if isinstance(operation, Move):
-            found.append((operation.place, operation.text))
-        elif isinstance(operation, Fixed) and isinstance(operation.instruction, ArmMotion):
-            found.append((operation.place, operation.instruction.form))
-    return list(dict.fromkeys(found))
 
 
 NOT_FOLLOWED = ("not_followed", "way_not_known", "configuration_guessed")
@@ -425,7 +414,7 @@ def _verdicts(
             lost.add(each.place)
     nowhere = {place for place, _ in _unreached(execution)}
     found = []
-    for place, text in _motion_texts(program):
+    for place, text in program.motions():
         here = done[place]
         if not here and place.file != program.file:
             continue

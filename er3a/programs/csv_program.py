@@ -26,8 +26,6 @@ from er3a.numerics.si_units import may_be_radians
 from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_language import Language
-from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"
@@ -175,7 +173,3 @@ def _numbers(place: Place, row: list[str], columns: list[str], head: list[str]) 
             raise fault(replace(place, element=f"column {name}"), problem, "Write a number")
         found.append(value)
     return found
-
-
-SIGN = re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*[,;\t]")
-CSV = Language("CSV", (".csv",), SIGN, read_csv_program, RplDialect, writer=None, joints=None)

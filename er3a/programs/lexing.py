@@ -26,14 +26,6 @@ class MisreadError(Exception):
     """A statement that does not follow the grammar; it never leaves this package."""
 
 
-class MoreError(MisreadError):
-    """Another statement follows on the line."""
-
-    def __init__(self, at: int):
-        super().__init__("another statement follows")
-        self.at = at
-
-
 @dataclass(frozen=True)
 class Lexicon:
     """How a language is spelled.
@@ -174,19 +166,12 @@ class Words:
         Returns
         -------
         condition : :class:`Opaque` with its text if it is not understood
-
-        Raises
-        ------
-        MoreError
-            if another statement follows on the line
         """
         start = self.at
         try:
             found = self.expression()
             self.accept(end)
             self.finish()
-        except MoreError:
-            raise
         except MisreadError:
             texts = self.texts[start:-1]
             return Opaque(" ".join(texts[:-1] if texts and texts[-1] == end else texts))

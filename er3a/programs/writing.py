@@ -349,7 +349,7 @@ class Writer(ABC):
         moved = _moved(ready)
         if speed.unit == "rad/s":
             return speed.value / self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
-        seconds = duration(ready)
+        seconds = by_length(ready, "s")
         if seconds is None or moved is None or not (seconds > 0 and moved.any()):
             return None
         lead = int(np.argmax(moved / [self._speed_of(j)[0] for j in range(len(moved))]))
@@ -652,29 +652,17 @@ LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
 ASSUMED_JOINT_SPEED, ASSUMED_SLIDE_SPEED = math.radians(100), 0.5  # rad/s, m/s, where nobody states a joint's greatest
 
 
-def tool_speed(ready: ReadyMotion) -> float | None:
-    """The speed of a line or arc.
+def by_length(ready: ReadyMotion, unit: str) -> float | None:
+    """A program's speed of the tool, or its time, in one of both units: the other one by the length of the way.
+
+    Parameters
+    ----------
+    unit : ``m/s`` or ``s``
 
     Returns
     -------
-    speed : m/s, by the length of the way if the program gives a time; None if it is not known
+    rate : None if the program gives neither, or the length is not known; ramps are not counted
     """
-    return _by_length(ready, "m/s")
-
-
-def duration(ready: ReadyMotion) -> float | None:
-    """How long a motion takes.
-
-    Returns
-    -------
-    seconds : as the program gives it, or by its tool speed and the length of the way; None if neither is known. Ramps
-        are not counted.
-    """
-    return _by_length(ready, "s")
-
-
-def _by_length(ready: ReadyMotion, unit: str) -> float | None:
-    """A program's speed (m/s) or time (s) in one of both units, the other one by the length of the way."""
     speed = ready.motion.speed
     if speed is None or speed.value <= 0 or speed.unit not in ("m/s", "s"):
         return None

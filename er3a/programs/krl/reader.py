@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
@@ -128,13 +127,9 @@ class _Statement:
             self._read()
         except MisreadError:
             builder.unread(place, text, not inside_data, folds=True)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
     def _read(self) -> None:
         words, first = self.words, self.words.next
-        if words.kind == "end":
-            raise MisreadError("no words")
         given = words.texts[words.at + 1] == "="
         if first in MOTIONS:
             words.take()

@@ -20,11 +20,11 @@ from er3a.programs.writing import (
     WriteOptions,
     Writer,
     ascii_text,
+    by_length,
     cut,
     fixed,
     principal_axes,
     short,
-    tool_speed,
 )
 from er3a.robots.masses import MassBody
 
@@ -140,7 +140,7 @@ class KrlWriter(Writer):
             if acceleration is not None and acceleration.unit == "share" and not self.accelerates_fully:  # by INITMOV
                 self.set_once("acc", f"BAS(#ACC_PTP,{short(acceleration.value * 100, 3)})")
             return
-        speed = tool_speed(ready)
+        speed = by_length(ready, "m/s")
         if speed is not None and speed > 0:
             self.set_once("$VEL.CP", f"$VEL.CP={short(speed)}")
         if motion.speed is not None and motion.speed.unit != "m/s":

@@ -90,25 +90,6 @@ class RapidDialect(Dialect):
         """
         return data_types.typed(value, kind)
 
-    def combined(self, sign: str, left: Value, right: Value) -> Value | None:
-        """Sums of positions, and a number times a position.
-
-        Returns
-        -------
-        value : a pos in mm; None for other operands
-
-        References
-        ----------
-        ABB, *RAPID Reference Manual*, section 7.1.
-        """
-        a, b = data_types.plain(left, 3), data_types.plain(right, 3)
-        scale = syntax.number(left) if a is None else syntax.number(right)
-        if a is not None and b is not None and sign in "+-":
-            return pos_record(np.array(a) / 1000 + np.array(b) / (1000 if sign == "+" else -1000))
-        if sign == "*" and scale is not None and (xyz := a or b) is not None:
-            return pos_record(scale * np.array(xyz) / 1000)
-        return None
-
     def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> Value:
         """The value of a function of RAPID: mathematics in degrees, positions, where the arm is.
 
@@ -119,7 +100,7 @@ class RapidDialect(Dialect):
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
         named = {key: memory.value(each) for key, each in given.keywords}
         found: Value | None = None
-        if name in ("CROBT", "CJOINTT", "CPOS") and not values and named.keys() <= {"TOOL", "WOBJ"}:
+        if name in ("CROBT", "CPOS") and not values and named.keys() <= {"TOOL", "WOBJ"}:
             found = _of_position(memory, name, named, dict(given.keywords))
         elif name in MATHEMATICS and not named:
             found = evaluated(MATHEMATICS[name], values)
@@ -358,11 +339,6 @@ def _of_position(
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
     """
     here = Position() if memory.here.passing else memory.here
-    if name == "CJOINTT":
-        if here.joints is None:
-            return None
-        degrees: list[Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
-        return data_types.typed((tuple(degrees), (NO_AXIS,) * 6), "JOINTTARGET")
     tool = _tool(memory, words.get("TOOL"), named["TOOL"])[0] if "TOOL" in named else here.tool
     base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
     seen = here.seen(tool, base, memory.cell.flange)

@@ -305,8 +305,6 @@ class _ModuleReader:
             builder.unknown(place, text, stops=is_no_statement(text, calls_without_brackets=True))
             if ":=" in words.texts and words.kinds[0] == "name":
                 builder.unclear(place, Variable(words.texts[0]), text)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
         if counter is not None:
             self.names[name] = own
         elif text.upper() == "ENDFOR":

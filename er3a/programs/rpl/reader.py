@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, block, linked, statements
 from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
@@ -57,7 +56,6 @@ FIELDS = {
     "EPOINTJ": JOINTS + OUTER,
     "EPOINTC": POSITION + OUTER + CONFIGURATION,
 }
-WORD = re.compile(r"[^\W\d]\w*$")
 
 
 class RplWords(Words):
@@ -86,15 +84,7 @@ def expression(text: str) -> Expression:
     -------
     expression : :class:`Opaque` with its text if it is not understood
     """
-    if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
-        return Variable(text)
-    words = RplWords(text)
-    try:
-        found = words.expression()
-        words.finish()
-    except MisreadError:
-        return Opaque(" ".join(text.split()))
-    return found
+    return RplWords(text).condition()
 
 
 def initial(text: str, kind: str) -> Expression:
@@ -108,20 +98,8 @@ def initial(text: str, kind: str) -> Expression:
     return expression(kind + text if kind in FIELDS and text.startswith("(") else text)
 
 
-def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
-    """Read a statement that begins and ends no block: an assignment or a call.
-
-    Parameters
-    ----------
-    builder : takes the operation
-    text : without the semicolon
-
-    Raises
-    ------
-    MisreadError
-        if it can't be read
-    """
-    words = RplWords(text)
+def _plain(builder: CodeBuilder, words: Words, place: Place, text: str) -> None:
+    """An assignment or a call."""
     left = words.expression()
     if words.accept(":="):
         value = words.expression()
@@ -131,18 +109,11 @@ def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
     words.finish()
     if not isinstance(left, Invocation):
         raise MisreadError("neither an assignment nor a call")
-    call(builder, place, left, text)
+    _call(builder, place, left, text)
 
 
-def call(builder: CodeBuilder, place: Place, left: Invocation, text: str) -> None:
-    """Read a statement that is a call: a motion, a wait, a routine.
-
-    Parameters
-    ----------
-    builder : takes the operation
-    left : the call
-    text : of the statement, for messages
-    """
+def _call(builder: CodeBuilder, place: Place, left: Invocation, text: str) -> None:
+    """A call: a motion, a wait, a routine."""
     name, given = left.function.upper(), left.arguments
     if name in MOTIONS:
         builder.add(Move(place, name, given, text))
@@ -224,12 +195,11 @@ def statement(builder: CodeBuilder, place: Place, text: str) -> None:
     if not text:
         return
     try:
-        if not block(builder, RplWords(text), place, text, BLOCKS):
-            plain_statement(builder, place, text)
+        words = RplWords(text)
+        if not block(builder, words, place, text, BLOCKS):
+            _plain(builder, words, place, text)
     except MisreadError:
         builder.unread(place, text)
-    except RecursionError:
-        raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
 
 
 BLOCKS = {

@@ -9,11 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, MoreError, ProgramText, Words, as_number
+from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
 from er3a.programs.syntax import (
     POSE_KEYS,
     Assign,
@@ -55,10 +54,6 @@ TEXT = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
 BREAKS = re.compile(rf"""(?P<comment>#[^\n]*)|(?P<text>{TEXT.pattern})|(?P<bad>["'])|(?P<mark>\n)""")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
-STATEMENT = re.compile(
-    r"(?:[A-Za-z_][\w.]*\s*(?:\(|(?:\[[^]]*\]\s*)?=(?!=))|(?:end|break|continue|return|halt|if|while|global|local)\b)"
-)
-"""With what a statement begins for sure."""
 
 
 class UrWords(Words):
@@ -68,32 +63,9 @@ class UrWords(Words):
         super().__init__(UR, text)
 
     def finish(self) -> None:
-        """Nothing may follow but another statement: :class:`MoreError`."""
+        """Nothing may follow but a semicolon."""
         self.accept(";")
-        if self.kind != "end":
-            start = self.offset()
-            if STATEMENT.match(self.text, start):
-                raise MoreError(start)
         super().finish()
-
-    def parts_of(self, found: Expression) -> Expression:
-        """An expression with what follows it; elements of matrices, ``m[1,0]``, as those of lists of lists.
-
-        Parameters
-        ----------
-        found : what was read before them
-
-        Returns
-        -------
-        expression : with one index for each element
-        """
-        made = super().parts_of(found)
-        if not isinstance(made, Element) or len(made.indices) < 2:
-            return made
-        found = made.of
-        for index in made.indices:
-            found = Element(found, (index,))
-        return found
 
     def special(self) -> Expression | None:
         """Lists and poses, with an index after them."""
@@ -196,15 +168,10 @@ class _UrReader:
             return
         try:
             self._read(builder, UrWords(text), place, text)
-        except MoreError as more:
-            self._statement(place, text[: more.at].strip())
-            self._statement(place, text[more.at :].strip())
         except MisreadError:
             if re.match(r"(else|elif)\b", text) or text.endswith(":"):  # of a block, which means nothing without it
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
             builder.unread(place, text)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
     def _read(self, builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
         first = words.next
@@ -243,8 +210,6 @@ class _UrReader:
                 break
         words.accept(":")
         words.finish()
-        if len(self.open) > 50:
-            raise fault(place, "more than 50 routines within each other", "Nest fewer")
         self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import RAMP_OF_A_DURATION, Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
-from er3a.programs.writing import LOAD_DIGITS, ReadyMotion, Writer, cut, duration, fixed, short, tool_speed
+from er3a.programs.writing import LOAD_DIGITS, ReadyMotion, Writer, by_length, cut, fixed, short
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
@@ -150,8 +150,8 @@ class UrScriptWriter(Writer):
             return f", a={short(a)}, v={short(usual_v if v is None else v)}"
         if speed is not None and timed and form in ("movej", "movel"):
             return f", a={short(a)}, t={short(speed.value)}"
-        v = self.leading_joint_speed(ready) if joint else tool_speed(ready)
-        if v is None and joint and (seconds := duration(ready)) is not None:
+        v = self.leading_joint_speed(ready) if joint else by_length(ready, "m/s")
+        if v is None and joint and (seconds := by_length(ready, "s")) is not None:
             return f", a={short(a)}, t={short(seconds)}"
         if speed is not None and speed.unit == "s":
             self.count["estimated"] += 1
