@@ -420,10 +420,10 @@ class Obstacles:
             name, at = self.bodies.pairs[k], float(shares[i])
             touch = fact(
                 "bodies_touch",
+                depth_mm=float(depths[:, k].max()),
                 pair=name,
                 t_s=float(path.law.times(np.array(at))),
                 at_mm=path.along_mm(at) if path.of_tool else None,
-                depth_mm=float(depths[:, k].max()),
                 enlarged_mm=1000 * enlarged_by(self.robot, self.scene, names_of(name)),
                 at_target=bool(depths[-1, k] > 0 and shares[-1] > 1 - 1e-9),
             )

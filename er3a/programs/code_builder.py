@@ -478,7 +478,7 @@ def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs:
     words.finish()
     if isinstance(step, Constant) and step.value == 0:
         raise MisreadError(f"{by} 0")
-    if words.lexicon.counts_down and isinstance(first, Constant) and isinstance(last, Constant):
+    if words.counts_down and isinstance(first, Constant) and isinstance(last, Constant):
         ends = syntax.numbers((first.value, last.value))
         step = Constant(-1) if step is None and ends and ends[0] > ends[1] else step
     builder.open_for(place, name, first, last, step, text)

@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import assert_never
 
 import numpy as np
-import scipy
 
 from er3a.finding import Finding, fact
+from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
@@ -146,7 +146,7 @@ class _Making:
         found, pose = [], self.pose
         for part in parts:
             end = self.to_robot @ part.end
-            turn = float(np.linalg.norm(_turn(pose, end)))
+            turn = float(rotation_angle(pose[:3, :3], end[:3, :3]))
             found.append(max(float(np.linalg.norm(end[:3, 3] - pose[:3, 3])), TURN_LENGTH * turn))
             pose = end
         return np.array(found)
@@ -244,8 +244,3 @@ def _halts(timing: float | Times, count: int) -> dict[int, float]:
         return {}
     rests = {i: float(np.ptp(timing.times[timing.corner == i + 1])) for i in range(count)}
     return {i: seconds for i, seconds in rests.items() if seconds > 0}
-
-
-def _turn(start: Reals, end: Reals) -> Reals:
-    found: Reals = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-    return found

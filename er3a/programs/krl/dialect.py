@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -545,17 +544,6 @@ HERE = ("$POS_ACT", "$POS_FOR", "$POS_ACT_MES")
 HERE_JOINTS = ("$AXIS_ACT", "$AXIS_FOR", "$AXIS_ACT_MEAS")
 
 
-class Settings(NamedTuple):
-    """What is set when a motion begins."""
-
-    tool: NamedFrame
-    base: NamedFrame
-    speed: Rate | None
-    acceleration: Rate | None
-    zone: Zone
-    load: Load | None
-
-
 class KrlDialect(Dialect):
     """KRL, as a run needs it."""
 
@@ -684,7 +672,7 @@ class KrlDialect(Dialect):
         values = [_argument(memory, each) for each in move.arguments]
         in_tool = "#TOOL" in move.words
         make = relative if is_relative else target
-        made = [make(memory, value, settings[:2], (move.text, in_tool)) for value in values]
+        made = [make(memory, value, (settings.tool, settings.base), (move.text, in_tool)) for value in values]
         if len(made) != (2 if kind == "arc" else 1):
             made = [UnresolvedTarget(move.text, "not_understood")] * 2
         if any(name == "CA" for name, _ in move.settings):
@@ -697,20 +685,8 @@ class KrlDialect(Dialect):
                 said += _left_out(memory, argument, value)
             elif not in_tool:  # no public text says how angles are added to those before
                 said += _turned_by(value)
-        return ArmMotion(
-            kind,
-            made[-1],
-            move.form,
-            made[0] if kind == "arc" else None,
-            settings.speed,
-            settings.acceleration,
-            settings.zone,
-            settings.tool,
-            settings.base,
-            load=settings.load,
-            not_followed=", ".join(said),
-            turn_speed=None if kind == "joint" else _turn_speed(memory),
-        )
+        via, said_of_all = made[0] if kind == "arc" else None, ", ".join(said)
+        return replace(settings, target=made[-1], form=move.form, via=via, not_followed=said_of_all)
 
     def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
         """Carry out settings by BAS, and signals by PULSE; the rest as in all languages.
@@ -764,18 +740,26 @@ def _left_out(memory: ProgramMemory, argument: Expression | None, value: Value) 
     return [key for key in keys if value.get(key) is None]
 
 
-def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> Settings:
-    """What is set for a motion; it is kept, because most motions follow one whose settings are the same."""
+def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> ArmMotion:
+    """A motion with all that is set for it; it is kept, because most motions follow one whose settings are the same."""
     key = (kind, move.words)
     found = memory.kept.get(key)
-    if not isinstance(found, Settings):
-        tool, base = _frame(memory, "$TOOL"), _frame(memory, "$BASE")
-        zone, load = _zone(memory, kind, move.words), memory.read("$LOAD")
-        part = memory.read("$LOAD.M")
+    if not isinstance(found, ArmMotion):
+        load, part = memory.read("$LOAD"), memory.read("$LOAD.M")
         given = load_of(load)
         if part is not None and not isinstance(load, Record):  # of a load whose whole is not known
             given = UnclearLoad("$LOAD.M", syntax.number(part))
-        found = Settings(tool, base, _speed(memory, kind), _acceleration(memory, kind), zone, given)
+        found = ArmMotion(
+            kind,
+            UnresolvedTarget(move.text, "undefined"),
+            speed=_speed(memory, kind),
+            acceleration=_acceleration(memory, kind),
+            zone=_zone(memory, kind, move.words),
+            tool=_frame(memory, "$TOOL"),
+            base=_frame(memory, "$BASE"),
+            load=given,
+            turn_speed=None if kind == "joint" else _turn_speed(memory),
+        )
         memory.kept[key] = found
     return found
 

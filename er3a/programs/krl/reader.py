@@ -16,12 +16,12 @@ from er3a.programs.krl.controller_files import ControllerFiles
 from er3a.programs.krl.dialect import HARMLESS, OF_SETTINGS, POSITION_FIELDS, POSITION_KINDS
 from er3a.programs.lexing import (
     NUMBER,
-    Lexicon,
     MisreadError,
     Names,
     ProgramText,
     Words,
     data_file_of,
+    ranked,
     read_program_text,
 )
 from er3a.programs.syntax import (
@@ -46,33 +46,20 @@ from er3a.programs.syntax import (
     Waiting,
 )
 
-KRL = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<bits>'[HhBb][0-9A-Fa-f]+')"""
-        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
-    ),
-    ranks={
-        **dict.fromkeys(("==", "<>", "<", ">", "<=", ">="), 1),
-        **dict.fromkeys(("OR", "B_OR"), 2),
-        **dict.fromkeys(("EXOR", "B_EXOR"), 3),
-        **dict.fromkeys(("AND", "B_AND"), 4),
-        **dict.fromkeys("+-", 5),
-        **dict.fromkeys("*/", 6),
-        ":": 7,
-    },
-    right=dict.fromkeys(("NOT", "B_NOT", "+", "-"), 8),
-    constants={"TRUE": True, "FALSE": False},
-    folds=True,
-    fields=POSITION_FIELDS,
-)
 BREAKS = re.compile(r"""(?P<comment>;[^\n]*)|(?P<text>"[^"\n]*")|(?P<bad>")|(?P<mark>\n)""")
 
 
 class KrlWords(Words):
     """Words of a line of KRL."""
 
-    def __init__(self, text: str, names: Names):
-        super().__init__(KRL, text, names)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<bits>'[HhBb][0-9A-Fa-f]+')"""
+        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
+    )
+    ranks = ranked("== <> < > <= >=", "OR B_OR", "EXOR B_EXOR", "AND B_AND", "+ -", "* /", ":")
+    right = dict.fromkeys(("NOT", "B_NOT", "+", "-"), 8)
+    folds = True
+    fields = POSITION_FIELDS
 
     def special(self) -> Expression | None:
         """Aggregates, enumerations; numbers by their bits, and the point that is to be taught, have no known value."""

@@ -17,27 +17,12 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, is_no_statement, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Names, ProgramText, Words, read_program_text
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked, read_program_text
 from er3a.programs.rapid import known_names
 from er3a.programs.rapid.data_types import starting
 from er3a.programs.syntax import Assign, Constant, Expression, Program, Routine, RoutineParameter, Variable, Waiting
 
 TEXT = r'"(?:[^"\n]|"")*"'
-RAPID = Lexicon(
-    re.compile(rf"""(?P<text>{TEXT})|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<mark>:=|<>|<=|>=|\S)"""),
-    ranks={
-        **dict.fromkeys(("OR", "XOR"), 1),
-        "AND": 2,
-        **dict.fromkeys(("=", "<>", "<", ">", "<=", ">="), 3),
-        **dict.fromkeys(("+", "-"), 4),
-        **dict.fromkeys(("*", "/", "DIV", "MOD"), 5),
-    },
-    right={"NOT": 2, "+": 5, "-": 5},
-    constants={"TRUE": True, "FALSE": False},
-    folds=True,
-    counts_down=True,
-)
-"""RAPID Reference Manual, 7.7 Priority between operators: NOT, OR and XOR bind least."""
 BREAKS = re.compile(
     rf"""(?i)(?P<comment>![^\n]*)|(?P<text>{TEXT})|(?P<bad>")|(?P<line>\\\w+)"""
     r"""|(?P<alone>\b(?:ELSE|ERROR|UNDO|BACKWARD|END(?:IF|FOR|WHILE|TEST|PROC|FUNC|TRAP|RECORD|MODULE))\b(?!\s*:=))"""
@@ -81,10 +66,12 @@ BLOCKS = {
 
 
 class RapidWords(Words):
-    """Words of an instruction of RAPID."""
+    """Words of an instruction of RAPID. NOT, OR and XOR bind least (RAPID Reference Manual, 7.7)."""
 
-    def __init__(self, text: str, names: Names):
-        super().__init__(RAPID, text, names)
+    pattern = re.compile(rf"""(?P<text>{TEXT})|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<mark>:=|<>|<=|>=|\S)""")
+    ranks = ranked("OR XOR", "AND", "= <> < > <= >=", "+ -", "* / DIV MOD")
+    right = {"NOT": 2, "+": 5, "-": 5}
+    folds = counts_down = True
 
     def special(self) -> Expression | None:
         """Aggregates, and the target that only the pendant shows."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from er3a.programs.code_builder import CodeBuilder, block, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, data_file_of, ranked, read_program_text
 from er3a.programs.syntax import (
     Assign,
     Constant,
@@ -26,25 +26,6 @@ from er3a.programs.syntax import (
     Waiting,
 )
 
-RPL = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
-    ),
-    ranks={
-        **dict.fromkeys(("OR", "or", "||"), 1),
-        **dict.fromkeys(("XOR", "xor"), 2),
-        **dict.fromkeys(("AND", "and", "&", "&&"), 3),
-        **dict.fromkeys(("=", "==", "<>", "!="), 4),
-        **dict.fromkeys(("<", ">", "<=", ">="), 5),
-        "+": 6,
-        "-": 6,
-        **dict.fromkeys(("*", "/", "MOD"), 7),
-        "**": 8,
-    },
-    right={"NOT": 9, "not": 9, "!": 9, "-": 9, "+": 9},
-    constants={"TRUE": True, "FALSE": False},
-)
 MOTIONS = ("MJOINT", "MLIN")
 POSITION = ("x", "y", "z", "a", "b", "c")
 JOINTS = ("j1", "j2", "j3", "j4", "j5", "j6")
@@ -61,8 +42,12 @@ FIELDS = {
 class RplWords(Words):
     """Words of a statement of RPL."""
 
-    def __init__(self, text: str):
-        super().__init__(RPL, text)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
+        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
+    )
+    ranks = ranked("OR or ||", "XOR xor", "AND and & &&", "= == <> !=", "< > <= >=", "+ -", "* / MOD", "**")
+    right = dict.fromkeys(("NOT", "not", "!", "-", "+"), 9)
 
     def special(self) -> Expression | None:
         """The taught point ``*`` of a motion."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, as_number
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, as_number, ranked
 from er3a.programs.syntax import (
     POSE_KEYS,
     Assign,
@@ -27,24 +27,6 @@ from er3a.programs.syntax import (
     Variable,
 )
 
-UR = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>==|!=|<=|>=|\S)"""
-    ),
-    ranks={
-        "or": 1,
-        "xor": 2,
-        "and": 3,
-        **dict.fromkeys(("==", "!=", "<", ">", "<=", ">="), 5),
-        "+": 6,
-        "-": 6,
-        **dict.fromkeys(("*", "/", "%"), 7),
-        "^": 8,
-    },
-    right={"not": 5, "-": 8, "+": 8},
-    constants={"TRUE": True, "FALSE": False},
-)
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
@@ -59,8 +41,12 @@ OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 class UrWords(Words):
     """Words of a statement of URScript."""
 
-    def __init__(self, text: str):
-        super().__init__(UR, text)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
+        r"""|(?P<mark>==|!=|<=|>=|\S)"""
+    )
+    ranks = ranked("or", "xor", "and", "== != < > <= >=", "+ -", "* / %", "^")
+    right = {"not": 4, "-": 7, "+": 7}
 
     def finish(self) -> None:
         """Nothing may follow but a semicolon."""
