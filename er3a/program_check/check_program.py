@@ -363,8 +363,7 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
         if not isinstance(what, ArmMotion) or not isinstance(what.target, PoseTarget):
             continue
         if not (what.tool.own and what.base.own):
-            kind: Literal["tool", "base", "both"] = "both" if not (what.tool.own or what.base.own) else "base"
-            kind = "tool" if what.base.own else kind
+            kind = "tool" if what.base.own else "base" if what.tool.own else "both"
             yield LocatedFinding("note", fact("frames_from_robot_file", kind=kind), step.place, step.calls)
             return
 

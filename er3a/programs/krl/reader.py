@@ -12,7 +12,7 @@ from pathlib import Path
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
-from er3a.programs.krl.controller_files import ControllerFiles
+from er3a.programs.krl.controller_files import ROUTINE, ControllerFiles
 from er3a.programs.krl.dialect import HARMLESS, OF_SETTINGS, POSITION_FIELDS, POSITION_KINDS
 from er3a.programs.lexing import (
     NUMBER,
@@ -295,7 +295,6 @@ HANDLERS: dict[str, Handler] = {
 
 PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 DECLARED = re.compile(r"(?im)^[ \t]*DECL[ \t]+(GLOBAL[ \t]+)?\w+[ \t]+([\w$]+)")
-ROUTINE = re.compile(r"(?im)^[ \t]*(GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+(?:\s*\[[^\]]*\])?)?[ \t]+(\w+)")
 
 
 def own_names(source: ProgramText, data: ProgramText | None) -> Names:

@@ -208,38 +208,6 @@ def load_of(value: Value | None) -> MassBody | None:
     return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), T)
 
 
-def orient_record(R: Reals) -> Record:
-    """A rotation as an orient; the inverse of the rotation of :func:`pose_matrix`.
-
-    Parameters
-    ----------
-    R : (3, 3)
-
-    Returns
-    -------
-    orient : Q1 .. Q4, Q1 the scalar, at least 0
-    """
-    T = np.eye(4)
-    T[:3, :3] = R
-    found = typed(numbers_of(T, "abb")[3:], "ORIENT")
-    assert isinstance(found, Record)
-    return found
-
-
-def pos_record(xyz: Reals) -> Record:
-    """A position as a pos of RAPID.
-
-    Parameters
-    ----------
-    xyz : (3,), m
-
-    Returns
-    -------
-    pos : X, Y, Z in mm
-    """
-    return Record("POS", tuple(zip("XYZ", (float(each) * 1000 for each in xyz))))
-
-
 def pose_record(T: Reals) -> Record:
     """A transform as a pose of RAPID; the inverse of :func:`pose_matrix`.
 
@@ -249,9 +217,12 @@ def pose_record(T: Reals) -> Record:
 
     Returns
     -------
-    pose : TRANS in mm, ROT as a quaternion
+    pose : TRANS in mm, ROT as a quaternion, its scalar first and at least 0
     """
-    return Record("POSE", (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3]))))
+    values = numbers_of(T, "abb")
+    found = typed((values[:3], values[3:]), "POSE")
+    assert isinstance(found, Record)
+    return found
 
 
 QUARTER = math.pi / 2

@@ -35,7 +35,7 @@ from er3a.programs.instructions import (
     Zone,
 )
 from er3a.programs.rapid import data_types, known_names
-from er3a.programs.rapid.data_types import NO_AXIS, orient_record, pos_record, pose_matrix
+from er3a.programs.rapid.data_types import NO_AXIS, pose_matrix, pose_record
 from er3a.programs.syntax import Record, Unclear, Value, Variable, numbers, rate_of, shown
 
 ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
@@ -343,12 +343,11 @@ def _of_position(
     base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
     seen = here.seen(tool, base, memory.cell.flange)
     if seen is None or name == "CPOS":
-        return None if seen is None else pos_record(seen[:3, 3])
+        return None if seen is None else pose_record(seen).values()[0]
     conf: Value = (AS_IT_STANDS,) * 4  # cfx is -1 where the arm's sides are not known
     if here.joints is not None and len(here.joints) == 6:
         conf = (*data_types.quarters_of(here.joints), -1)
-    parts = pos_record(seen[:3, 3]), orient_record(seen[:3, :3]), conf, (NO_AXIS,) * 6
-    return data_types.typed(parts, "ROBTARGET")
+    return data_types.typed((*pose_record(seen).values(), conf, (NO_AXIS,) * 6), "ROBTARGET")
 
 
 def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
@@ -359,9 +358,9 @@ def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -
         case "OFFS" | "RELTOOL", 4:
             return _shifted(name, values, named)
         case "POSEMULT", 2 if len(poses) == 2:
-            return data_types.pose_record(poses[0] @ poses[1])
+            return pose_record(poses[0] @ poses[1])
         case "ORIENTZYX", 3 if plain is not None:  # about z, then the new y, then the new x
-            return orient_record(transform(np.zeros(3), np.radians(plain[::-1]))[:3, :3])
+            return pose_record(transform(np.zeros(3), np.radians(plain[::-1]))).values()[1]
         case "EULERZYX", 1:
             turn = pose_matrix(((0.0, 0.0, 0.0), values[0]))
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
@@ -379,7 +378,8 @@ def _shifted(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -
     step = np.eye(4)
     step[:3, 3] = np.array(shift) / 1000
     if name == "OFFS":
-        return target.having("TRANS", pos_record(pose[:3, 3] + step[:3, 3]))
+        pose[:3, 3] += step[:3, 3]
+        return target.having("TRANS", pose_record(pose).values()[0])
     step[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-    moved = pose @ step
-    return target.having("TRANS", pos_record(moved[:3, 3])).having("ROT", orient_record(moved[:3, :3]))
+    trans, rot = pose_record(pose @ step).values()
+    return target.having("TRANS", trans).having("ROT", rot)
