@@ -28,7 +28,7 @@ from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.kept_files import from_here
 from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
-from er3a.finding import fact, is_one
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.programs import remedy
@@ -58,7 +58,6 @@ from er3a.program_check.check_program import (
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.programs.instructions import Place
 from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
-from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import program_name
 from er3a.robots.robot import Robot
@@ -595,7 +594,7 @@ class PathProgram:
     name: str
     verdict: PathVerdict
     files: Mapping[str, str] | None
-    findings: tuple[WriteFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     open: tuple[Open, ...] = ()
 
 

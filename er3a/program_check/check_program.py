@@ -35,15 +35,22 @@ from er3a.planning.commands import (
 from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRules, MotionPath
-from er3a.program_check.program_check_findings import with_touches_of
+from er3a.program_check.program_check_findings import (
+    RANKS,
+    Level,
+    NotFollowedReason,
+    gravity,
+    level_of,
+    with_touches_of,
+    worst_of,
+)
 from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
 from er3a.programs.machine import execute
-from er3a.programs.syntax import Fixed, Move, Program
+from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
 
 ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
@@ -100,8 +107,8 @@ class LocatedFinding:
     moment : s from the start of that step's motion, when it begins; None of what is about the motion as a whole
     """
 
-    level: found_in.Level
-    finding: found_in.CheckFinding
+    level: Level
+    finding: Finding
     place: Place
     calls: tuple[Place, ...] = ()
     times: int = 1
@@ -127,7 +134,7 @@ class MotionVerdict:
     line: int
     text: str
     kind: str
-    level: found_in.Level
+    level: Level
     followed: bool
     times: int
     duration_s: float | None
@@ -174,7 +181,7 @@ class ProgramCheck(ByValue):
     """
 
     execution: Execution
-    level: found_in.Level
+    level: Level
     findings: tuple[LocatedFinding, ...]
     verdicts: tuple[MotionVerdict, ...]
     motions: Mapping[int, CheckedMotion]
@@ -222,13 +229,13 @@ def check_program(program: Program, robot: Robot, options: CheckOptions | None =
     if options.measures:
         tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
         around = options.penetration_tolerance, options.assumed_margin
-        obstacles = Obstacles.around(robot, options.scene, tools, *around)
+        obstacles = Obstacles(robot, options.scene, tools, *around)
         obstacles.check(list(judge.motions.values()), options.keep_on)
         for one, other in _corners(execution, motions):
             obstacles.corner(one, other)
     located = _located(execution, robot, motions, obstacles)
     verdicts = _verdicts(program, execution, motions, located)
-    level: found_in.Level = found_in.worst_of(each.level for each in located)
+    level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
     shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
@@ -281,18 +288,18 @@ def _located(
 ) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped."""
     program, top = execution.program, Place(execution.program.file)
-    found = [LocatedFinding(found_in.level_of(each), each, _place_of(each, top)) for each in program.findings]
+    found = [LocatedFinding(level_of(each), each, _place_of(each, top)) for each in program.findings]
     named = {step.instruction.text for step in execution.steps if isinstance(step.instruction, Unknown)}
     for number, motion in motions.items():
         step = execution.steps[number]
         for finding, moment in motion.findings.items():
             # What follows from an instruction that is named at its own line is no second question.
             told = is_one(finding, "not_followed") and finding.text in named
-            level: found_in.Level = "note" if told else motion.level_of(finding)
+            level: Level = "note" if told else motion.level_of(finding)
             found.append(LocatedFinding(level, finding, step.place, step.calls, 1, number, moment))
     for step in execution.steps:
         if isinstance(what := step.instruction, Unknown):
-            reason: found_in.NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
+            reason: NotFollowedReason = "setting" if what.shapes and not what.may_move else "instruction"
             text = (
                 fact("program_not_understood", text=what.text, place=step.place)
                 if what.stops
@@ -312,24 +319,21 @@ def _located(
         found.append(LocatedFinding("caution", fact("pairs_unexamined", pairs=obstacles.bodies.in_error), top))
     found += [*_loads(execution, robot), *_not_set(execution)]
     found += [
-        LocatedFinding(found_in.level_of(each), each, step.place, step.calls)
-        for step, each in suspect_numbers(execution, robot)
+        LocatedFinding(level_of(each), each, step.place, step.calls) for step, each in suspect_numbers(execution, robot)
     ]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
         groups[each.place, each.finding.code, _which(each.finding)].append(each)
     grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
-    return tuple(
-        sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -found_in.RANKS[each.level]))
-    )
+    return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
 
 
 def _at_worst(same: list[LocatedFinding]) -> LocatedFinding:
     """One of like findings of an instruction: when and where it is so first, and how far it goes at worst."""
-    level = max((each.level for each in same), key=found_in.RANKS.__getitem__)
+    level = max((each.level for each in same), key=RANKS.__getitem__)
     grave = [each for each in same if each.level == level]
-    first, found = grave[0], max((each.finding for each in grave), key=found_in.gravity)
+    first, found = grave[0], max((each.finding for each in grave), key=gravity)
     if is_one(first.finding, "motion_collides"):
         others = [each.finding for each in same if is_one(each.finding, "motion_collides")]
         found = with_touches_of(first.finding, others)
@@ -359,19 +363,18 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
         if not isinstance(what, ArmMotion) or not isinstance(what.target, PoseTarget):
             continue
         if not (what.tool.own and what.base.own):
-            kind: Literal["tool", "base", "both"] = "both" if not (what.tool.own or what.base.own) else "base"
-            kind = "tool" if what.base.own else kind
+            kind = "tool" if what.base.own else "base" if what.tool.own else "both"
             yield LocatedFinding("note", fact("frames_from_robot_file", kind=kind), step.place, step.calls)
             return
 
 
-def _which(finding: found_in.CheckFinding) -> str:
+def _which(finding: Finding) -> str:
     """Key that distinguishes findings of one code at one instruction."""
     names = ("joint", "joints", "side", "type", "name", "text", "kind", "mass_kg", "reason")
     return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
-def _place_of(finding: found_in.CheckFinding, top: Place) -> Place:
+def _place_of(finding: Finding, top: Place) -> Place:
     """The place of a finding about the text."""
     place = getattr(finding, "place", None)
     return place if isinstance(place, Place) else top
@@ -382,20 +385,9 @@ def _unreached(execution: Execution) -> Iterator[tuple[Place, str]]:
     if not execution.complete:
         return
     met = {step.place for step in execution.steps}
-    for place, text in _motion_texts(execution.program):
+    for place, text in execution.program.motions():
         if place not in met and place.file == execution.program.file:
             yield place, text
-
-
-def _motion_texts(program: Program) -> list[tuple[Place, str]]:
-    """All motion instructions of the text."""
-    found: list[tuple[Place, str]] = []
-    for operation in program.operations():
-        if isinstance(operation, Move):
-            found.append((operation.place, operation.text))
-        elif isinstance(operation, Fixed) and isinstance(operation.instruction, ArmMotion):
-            found.append((operation.place, operation.instruction.form))
-    return list(dict.fromkeys(found))
 
 
 NOT_FOLLOWED = ("not_followed", "way_not_known", "configuration_guessed")
@@ -413,7 +405,7 @@ def _verdicts(
         step = execution.steps[number]
         done[step.place].append(motion)
         lines.setdefault(step.place, execution.own_line(step))
-    levels: dict[Place, list[found_in.Level]] = defaultdict(list)
+    levels: dict[Place, list[Level]] = defaultdict(list)
     lost: set[Place] = set()
     for each in located:
         levels[each.place].append(each.level)
@@ -421,7 +413,7 @@ def _verdicts(
             lost.add(each.place)
     nowhere = {place for place, _ in _unreached(execution)}
     found = []
-    for place, text in _motion_texts(program):
+    for place, text in program.motions():
         here = done[place]
         if not here and place.file != program.file:
             continue
@@ -434,7 +426,7 @@ def _verdicts(
                 lines.get(place, place.line),
                 " ".join(text.split()),
                 here[0].motion.kind if here else "",
-                found_in.worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
+                worst_of((*levels[place], "pass" if followed or place in nowhere else "caution")),
                 followed,
                 len(here),
                 max(durations, default=None),
@@ -577,7 +569,7 @@ def _beyond_paths(check: ProgramCheck, held: set[Place]) -> list[LocatedFinding]
     return [
         each
         for each in check.findings
-        if found_in.RANKS[each.level] >= found_in.RANKS["caution"]
+        if RANKS[each.level] >= RANKS["caution"]
         and not (each.finding.code in FOUND_OF_PATHS and (each.place in held or not each.place.line))
     ]
 

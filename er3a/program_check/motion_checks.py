@@ -23,7 +23,6 @@ from er3a.kinematics.singularity import TYPES, NearSingular, factor_of, factors_
 from er3a.numerics.arrays import Reals, runs
 from er3a.planning import motion_faults
 from er3a.planning.timing import JointLimits
-from er3a.program_check import program_check_findings as found_in
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
 from er3a.programs.solving import WIDE_STEP, joints_along, way_of
 from er3a.robots.joint_limits import joint_shown
@@ -370,7 +369,7 @@ def _parts(length: float, turned: float) -> int:
     return int(np.clip(np.ceil(max(length / POINTS_APART_M, turned / POINTS_APART_RAD)), MIN_PARTS, MAX_PARTS))
 
 
-Shares = dict[found_in.CheckFinding, float]
+Shares = dict[Finding, float]
 """Findings with the share of the way at which each begins."""
 
 
@@ -384,7 +383,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     found: Shares = {}
     if path.stop is not None and target is not None:
         found[_stopped(path, target)] = float(path.share[-1])  # where the arm still is
-    found |= _limits(path)
+    found |= limit_findings(path.arm, path.share, path.q)
     if path.stop is None and len(path.share) > 1:  # towards the end of reach rates grow without bound
         found |= _too_fast(path, rules.limits)
         if not rules.limits.acceleration_assumed:
@@ -392,7 +391,7 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     return found
 
 
-def _stopped(path: MotionPath, target: Reals) -> found_in.CheckFinding:
+def _stopped(path: MotionPath, target: Reals) -> Finding:
     """Why a line or arc can't be followed on."""
     assert path.stop is not None
     arm, last, at_mm = path.arm, path.q[-1], path.along_mm(float(path.share[-1]))
@@ -419,40 +418,27 @@ def _proper(T: Reals) -> Reals:
     return found
 
 
-def limit_findings(arm: Robot, q: Reals) -> tuple[motion_faults.LimitCause, ...]:
+def limit_findings(arm: Robot, share: Reals, q: Reals) -> Shares:
     """Joints, and sums of joints, that are beyond a limit.
 
     Parameters
     ----------
-    q : (n,), rad or m
+    share : (N,), of the way; q : (N, n), rad or m, there
 
     Returns
     -------
-    causes : one for each side of a limit that is exceeded by more than ``LIMIT_TOLERANCE``
+    findings : one for each side of a limit that is exceeded by more than ``LIMIT_TOLERANCE``, as it is where it is so
+        most, with the share from which it is so
     """
-    sides = motion_faults.limit_sides(arm)
-    return tuple(
-        side.cause(float(side.of(q))) for side in sides if float(side.of(q)) > side.sign * side.limit + LIMIT_TOLERANCE
-    )
-
-
-def _limits(path: MotionPath) -> Shares:
-    """Limits that a way exceeds where it does so most, from where it does."""
-    if (
-        path.arm.combined
-        or (path.q < path.arm.lower - LIMIT_TOLERANCE).any()
-        or (path.q > path.arm.upper + LIMIT_TOLERANCE).any()
-    ):
-        found: Shares = {}
-        for side in motion_faults.limit_sides(path.arm):
-            values = np.asarray(side.of(path.q), float)
-            beyond = np.flatnonzero(values > side.sign * side.limit + LIMIT_TOLERANCE)
-            if beyond.size:
-                found[side.cause(float(values.max()))] = _crossing(
-                    path.share, values - side.sign * side.limit, beyond[0]
-                )
-        return found
-    return {}
+    found: Shares = {}
+    inside = (q >= arm.lower - LIMIT_TOLERANCE).all() and (q <= arm.upper + LIMIT_TOLERANCE).all()
+    for side in motion_faults.limit_sides(arm) if arm.combined or not inside else ():
+        over = np.asarray(side.of(q), float) - side.sign * side.limit
+        beyond = np.flatnonzero(over > LIMIT_TOLERANCE)
+        if beyond.size:
+            cause = side.cause(float(np.asarray(side.of(q)).max()))
+            found[cause] = _crossing(share, over, beyond[0])
+    return found
 
 
 def _crossing(share: Reals, values: Reals, first: int) -> float:
@@ -505,7 +491,7 @@ def _accelerates(path: MotionPath, able: Reals) -> Shares:
     return _beyond_rates(path, 2, needed, able, lambda j, first: float(share[first]))
 
 
-def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
+def far_turns(path: MotionPath) -> list[Finding]:
     """Joints that turn further than the motion needs.
 
     Returns
@@ -515,7 +501,7 @@ def far_turns(path: MotionPath) -> list[found_in.CheckFinding]:
         limits is shorter.
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
-    found: list[found_in.CheckFinding] = []
+    found: list[Finding] = []
     turned = np.where(arm.slides, 0.0, np.abs(step))
     lead = int(np.argmax(turned))
     if turned[lead] > FAR_TURN and path.length < NEAR_MOVE:
@@ -570,7 +556,7 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
     return found
 
 
-def arrives_otherwise(path: MotionPath, given: Reals) -> found_in.CheckFinding | None:
+def arrives_otherwise(path: MotionPath, given: Reals) -> Finding | None:
     """Whether a line or arc to given joints ends in other joints than these.
 
     Parameters

@@ -21,7 +21,6 @@ NotFollowedReason = Literal[
     "base",
     "turns_with_path",
     "external_axes",
-    "arc_angle",
     "half_turn",
     "redundant",
     "operations",
@@ -31,24 +30,15 @@ NotFollowedReason = Literal[
 ]
 
 
-def is_certain(touch: Finding) -> bool:
-    """Whether two bodies overlap by more than their shapes are too large.
-
-    Parameters
-    ----------
-    touch : ``bodies_touch``: of ``pair``, from a time (``t_s``) of the motion on, and a place of a line (``at_mm``);
-        ``depth_mm`` at most. ``at_target``: whether they overlap at the motion's end. ``enlarged_mm``: by how much
-        their shapes are larger than the meshes in them; an overlap by less is no contact for sure
-    """
-    return bool(touch.depth_mm > touch.enlarged_mm)
-
-
 def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     """A collision, together with what was found for other ways to the same motion.
 
     Parameters
     ----------
-    found : ``motion_collides``: ``touches`` in the order of first contact; ``assumed``: by shapes of the arm that no
+    found : ``motion_collides``: ``touches`` in the order of first contact, each ``bodies_touch``: of ``pair``, from a
+        time (``t_s``) of the motion on, and a place of a line (``at_mm``); ``depth_mm`` at most; ``at_target``: whether
+        they overlap at the motion's end; ``enlarged_mm``: by how much their shapes are larger than the meshes in them,
+        so that an overlap by less is no contact for sure; ``assumed``: by shapes of the arm that no
         document gives, and by none of what is carried
     others : findings of the same instruction
 
@@ -64,8 +54,6 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     return found.but(touches=tuple(deepest.values()))
 
 
-CheckFinding = Finding
-
 FAILS = frozenset(
     (
         *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
@@ -77,7 +65,7 @@ WRONG = frozenset(("not_understood", "not_finite", "too_far", "too_many_joints")
 """Why a target is none: the program gives it, but not as a target of its motion or of the arm."""
 
 
-def level_of(finding: CheckFinding) -> Level:
+def level_of(finding: Finding) -> Level:
     """Severity of a finding: ``fail`` where the program can't be executed as written, never on a guess.
 
     Parameters
@@ -98,13 +86,13 @@ def level_of(finding: CheckFinding) -> Level:
         case Finding(code="suspect_number", kind="impossible_speed" | "mm" | "mm/s"):
             return "fail"
         case Finding(code="motion_collides", touches=touches, assumed=assumed):
-            return "fail" if not assumed and any(map(is_certain, touches)) else "caution"
+            return "fail" if not assumed and any(touch.depth_mm > touch.enlarged_mm for touch in touches) else "caution"
     if finding.code in FAILS:
         return "caution" if getattr(finding, "basis", "") == "assumed" else "fail"
     return "note" if finding.code in NOTES else "caution"
 
 
-def gravity(finding: CheckFinding) -> float:
+def gravity(finding: Finding) -> float:
     """How far a finding goes, to choose the worst of like ones.
 
     Parameters

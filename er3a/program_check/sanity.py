@@ -84,9 +84,7 @@ def _value(rate: Rate | None, unit: str) -> float | None:
     """A speed in a unit, also of one that the controller does not take."""
     if rate is None or rate.unit != unit:
         return None
-    number = rate.text.rpartition("=")[2]
-    refused = rate.value <= 0 and number.lstrip("+-").replace(".", "", 1).isdecimal()
-    return float(number) if refused else rate.value
+    return rate.value if rate.refused is None else rate.refused
 
 
 def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[Suspect]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import Pair, names_of
+from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes, enlarged_by
 from er3a.errors import PoseError
@@ -45,7 +45,8 @@ from er3a.program_check.motion_checks import (
     singular_findings,
     tool_path,
 )
-from er3a.programs import instructions
+from er3a.program_check.program_check_findings import Level
+from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
 from er3a.programs.solving import solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
@@ -74,18 +75,18 @@ class CheckedMotion(ByValue):
     guessed : whether its start was taken among several solutions of an earlier target, so that nothing is certain
     """
 
-    motion: instructions.ArmMotion
+    motion: ArmMotion
     arm: Robot
     base: Reals | None
     start: Reals | None
     end: Reals | None = None
     path: MotionPath | None = None
     stays: bool = False
-    findings: dict[found_in.CheckFinding, float | None] = field(default_factory=dict)
+    findings: dict[Finding, float | None] = field(default_factory=dict)
     clearance: float | None = None
     guessed: bool = False
 
-    def add(self, *findings: found_in.CheckFinding) -> None:
+    def add(self, *findings: Finding) -> None:
         """Add findings about the motion as a whole.
 
         Parameters
@@ -107,7 +108,7 @@ class CheckedMotion(ByValue):
             for each, share in found.items():
                 self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
 
-    def level_of(self, finding: found_in.CheckFinding) -> found_in.Level:
+    def level_of(self, finding: Finding) -> Level:
         """How severe one of the motion's findings is.
 
         Parameters
@@ -122,7 +123,7 @@ class CheckedMotion(ByValue):
         return "caution" if self.guessed and level == "fail" else level
 
     @property
-    def level(self) -> found_in.Level:
+    def level(self) -> Level:
         """The worst of its findings."""
         return found_in.worst_of(map(self.level_of, self.findings))
 
@@ -136,19 +137,19 @@ class Judge:
         self._arms: dict[bytes, Robot] = {robot.tool.tobytes(): robot}
         self._guessed: set[bytes] = set()  # joints at which the arm stands if what was guessed is right
 
-    def __call__(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
+    def __call__(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         """A motion from joints (n,), None where they are not known."""
         key = pickle.dumps(motion), _rounded(before)  # equal bytes are equal motions; hashes of arrays are crude
         if key not in self.motions:
             self.motions[key] = checked = self._checked(motion, before)
             checked.guessed = before is not None and _rounded(before) in self._guessed
-            chosen = motion.kind != "joint" or isinstance(motion.target, instructions.PoseTarget)
+            chosen = motion.kind != "joint" or isinstance(motion.target, PoseTarget)
             first = any(is_one(each, "configuration_guessed") for each in checked.findings)
             if checked.end is not None and (first or (checked.guessed and chosen)):
                 self._guessed.add(_rounded(checked.end))
         return self.motions[key]
 
-    def _arm(self, tool: instructions.NamedFrame) -> Robot | None:
+    def _arm(self, tool: NamedFrame) -> Robot | None:
         """The robot with a tool; None where the tool is not known."""
         if tool.pose is None and tool.name and tool.name != FLANGE:
             return None
@@ -156,22 +157,22 @@ class Judge:
         pose = pose if tool.pose is None else tool.pose
         return self._arms.setdefault(pose.tobytes(), self.robot.replace(tool=pose))
 
-    def _checked(self, motion: instructions.ArmMotion, before: Reals | None) -> CheckedMotion:
+    def _checked(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         arm, base = self._arm(motion.tool), motion.base.pose
         if base is None and not motion.base.name:
             base = np.eye(4)
         placed = None if base is None else self.robot.base @ base
         checked = CheckedMotion(motion, arm or self.robot, placed, before)
         target, of_tool = motion.target, motion.kind != "joint"
-        if isinstance(target, instructions.UnresolvedTarget):
+        if isinstance(target, UnresolvedTarget):
             by_tool = target.reason == "position_unknown" and arm is None
             text, reason = (motion.tool.name, "tool") if by_tool else (target.text, target.reason)
             checked.add(fact("not_followed", text=text, reason=reason))
             return checked
         _say_of(checked)
-        if arm is None and (of_tool or isinstance(target, instructions.PoseTarget)):
+        if arm is None and (of_tool or isinstance(target, PoseTarget)):
             checked.add(fact("not_followed", text=motion.tool.name, reason="tool"))
-        elif placed is None and isinstance(target, instructions.PoseTarget):
+        elif placed is None and isinstance(target, PoseTarget):
             checked.add(fact("not_followed", text=motion.base.name, reason="base"))
         elif of_tool:
             self._along_tool_path(checked, target)
@@ -180,18 +181,17 @@ class Judge:
         if checked.path is not None and not is_given(motion):
             assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
             speed = Amount(assumed.tool_speed, "m/s") if of_tool else Amount(100 * assumed.joint_share, "%")
-            number = word.rpartition("=")[2]
-            refused = number.lstrip("+-").replace(".", "", 1).isdecimal()  # known, and beyond what a controller takes
+            refused = motion.speed is not None and motion.speed.refused is not None
             checked.add(fact("speed_not_given", assumed=speed, word=word, refused=refused))
         return checked
 
-    def _to_joints(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> None:
+    def _to_joints(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> None:
         """A joint move."""
         goal = self._goal(checked, target)
         if goal is None:
             return
         if checked.start is None:
-            checked.add(fact("way_not_known"), *limit_findings(checked.arm, goal))
+            checked.add(fact("way_not_known"), *limit_findings(checked.arm, np.zeros(1), goal[None]))
             checked.end = goal
             return
         checked.path = joint_path(checked.arm, checked.motion, checked.start, goal, self.rules)
@@ -200,25 +200,20 @@ class Judge:
         checked.end = goal if beyond < MOST_TURNS else None
         if checked.path is not None:
             checked.add_on_way(path_findings(checked.path, self.rules, None))
-            if isinstance(target, instructions.JointTarget) or target.branch is None:  # no configuration that is meant
+            if isinstance(target, JointTarget) or target.branch is None:  # no configuration that is meant
                 checked.add_on_way(dict.fromkeys(far_turns(checked.path), 0.0))
 
-    def _along_tool_path(
-        self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget
-    ) -> None:
+    def _along_tool_path(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> None:
         """A line or an arc."""
         motion, arm = checked.motion, checked.arm
-        if motion.angle is not None:  # which ends elsewhere than at its target
-            checked.add(fact("not_followed", text="CA", reason="arc_angle"))
-            return
-        given = target.joints if isinstance(target, instructions.JointTarget) else None
+        given = target.joints if isinstance(target, JointTarget) else None
         if given is not None and np.isnan(given).any():
             checked.add(fact("not_followed", text=motion.form, reason="position_unknown"))
             return
         if given is not None:
             end = forward(arm, given)
         else:
-            assert isinstance(target, instructions.PoseTarget)
+            assert isinstance(target, PoseTarget)
             assert checked.base is not None
             end = checked.base @ target.pose
         if checked.start is None:
@@ -241,33 +236,28 @@ class Judge:
         checked.add_on_way(singular_findings(found, self.rules.near))
         if given is not None and (other := arrives_otherwise(found, given)) is not None:
             checked.add(other)
-        branch = target.branch if isinstance(target, instructions.PoseTarget) else None
+        branch = target.branch if isinstance(target, PoseTarget) else None
         if branch is not None and found.end is not None and not solutions_meant(branch, arm, found.end[None])[0]:
             checked.add(fact("configuration_not_met", text=_configuration(target)))
 
     def _via(self, checked: CheckedMotion) -> Reals | None:
         """The arc's point: T_world_tool (4, 4), m."""
         via = checked.motion.via
-        if isinstance(via, instructions.PoseTarget) and checked.base is not None:
+        if isinstance(via, PoseTarget) and checked.base is not None:
             pose: Reals = checked.base @ via.pose
             return pose
-        if isinstance(via, instructions.JointTarget) and not np.isnan(via.joints).any():
+        if isinstance(via, JointTarget) and not np.isnan(via.joints).any():
             return forward(checked.arm, via.joints)
         return None
 
-    def _goal(self, checked: CheckedMotion, target: instructions.JointTarget | instructions.PoseTarget) -> Reals | None:
+    def _goal(self, checked: CheckedMotion, target: JointTarget | PoseTarget) -> Reals | None:
         """Joints (n,) of a target, of several solutions the nearest within the limits; None where unknown."""
         before = checked.start
-        if isinstance(target, instructions.JointTarget):
+        if isinstance(target, JointTarget):
             open_ = np.isnan(target.joints)
             if before is None and open_.any():
-                checked.add(
-                    *(
-                        ()
-                        if open_.all()
-                        else (fact("not_followed", text=checked.motion.form, reason="position_unknown"),)
-                    )
-                )
+                if not open_.all():
+                    checked.add(fact("not_followed", text=checked.motion.form, reason="position_unknown"))
                 return None
             return target.joints if before is None else np.where(open_, before, target.joints)
         assert checked.base is not None
@@ -302,8 +292,8 @@ def _rounded(joints: Reals | None) -> bytes:
     return b"" if joints is None else (np.round(joints, SAME_DIGITS) + 0.0).tobytes()
 
 
-def _configuration(target: instructions.Target) -> str:
-    given = target.configuration if isinstance(target, instructions.PoseTarget) else ()
+def _configuration(target: Target) -> str:
+    given = target.configuration if isinstance(target, PoseTarget) else ()
     return ", ".join(f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in given)
 
 
@@ -317,36 +307,26 @@ def _say_of(checked: CheckedMotion) -> None:
         checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
 
 
-@dataclass(frozen=True, eq=False)
-class Obstacles(ByValue):
-    """The bodies that the arm must not touch.
+class Obstacles:
+    """The bodies that an arm must not touch, itself among it.
 
-    Attributes
+    What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``tools``
+    (4, 4), the first of them that is no bare flange: it stays there whatever tool a motion names.
+
+    Parameters
     ----------
     tolerance : m, of an overlap that may go unnoticed
-    assumed_margin : m, within which of the arm's shapes nothing is settled; 0 where a document gives them
+    assumed_margin : m, within which of the arm's shapes nothing is settled, unless a document gives them
     """
 
-    robot: Robot
-    scene: Scene | None
-    bodies: Bodies
-    tolerance: float
-    assumed_margin: float
-
-    @classmethod
-    def around(
-        cls, robot: Robot, scene: Scene | None, tools: Iterable[Reals], tolerance: float, assumed_margin: float
-    ) -> Obstacles:
-        """What a robot must not meet, itself among it.
-
-        What is carried hangs at the flange, where the robot's own tool puts it, or if it has none the one of ``tools``
-        (4, 4), the first of them that is no bare flange: it stays there whatever tool a motion names.
-        """
+    def __init__(
+        self, robot: Robot, scene: Scene | None, tools: Iterable[Reals], tolerance: float, assumed_margin: float
+    ):
         bare = np.array_equal(robot.tool, np.eye(4))
         carrier = next((each for each in tools if bare and not np.array_equal(each, np.eye(4))), robot.tool)
-        holding = robot if scene is None or not scene.carried else robot.replace(tool=carrier)
-        margin = assumed_margin if arm_shapes(robot).assumed else 0.0
-        return cls(holding, scene, Bodies(holding, scene), tolerance, margin)
+        self.robot = robot if scene is None or not scene.carried else robot.replace(tool=carrier)
+        self.scene, self.bodies, self.tolerance = scene, Bodies(self.robot, scene), tolerance
+        self.assumed_margin = assumed_margin if arm_shapes(robot).assumed else 0.0
 
     def check(self, motions: list[CheckedMotion], keep_on: Callable[[], bool]) -> None:
         """Measure the clearance of motions, and find what touches on them; both are added to the motions.
@@ -433,24 +413,27 @@ class Obstacles(ByValue):
             touches_there = self.bodies.min_distance(path.at(np.array([middle])))[0][0] < 0
             clear, first = (clear, middle) if touches_there else (middle, first)
         every = np.arange(len(self.bodies.pairs))
-        touches: dict[Pair, Finding] = {}
         shares = np.linspace(first, share[int(rows[-1])], MOST_TOUCHING)
-        for at, joints in zip(shares.tolist(), path.at(shares)):
-            depths = -1000 * self.bodies.distances(joints, every)
-            for k in np.flatnonzero(depths > 0).tolist():
-                name = self.bodies.pairs[k]
-                when, where = float(path.law.times(np.array(at))), path.along_mm(at) if path.of_tool else None
-                enlarged = 1000 * enlarged_by(self.robot, self.scene, names_of(name))
-                touch = {"pair": name, "t_s": when, "at_mm": where, "enlarged_mm": enlarged}
-                before = touches.get(name, fact("bodies_touch", depth_mm=0.0, **touch))
-                depth = max(before.depth_mm, float(depths[k]))
-                touches[name] = before.but(depth_mm=depth, at_target=at > 1 - 1e-9)
+        depths = np.array([-1000 * self.bodies.distances(joints, every) for joints in path.at(shares)])
+        touches = []
+        for i, k in sorted((int(np.argmax(depths[:, k] > 0)), k) for k in every.tolist() if (depths[:, k] > 0).any()):
+            name, at = self.bodies.pairs[k], float(shares[i])
+            touch = fact(
+                "bodies_touch",
+                depth_mm=float(depths[:, k].max()),
+                pair=name,
+                t_s=float(path.law.times(np.array(at))),
+                at_mm=path.along_mm(at) if path.of_tool else None,
+                enlarged_mm=1000 * enlarged_by(self.robot, self.scene, names_of(name)),
+                at_target=bool(depths[-1, k] > 0 and shares[-1] > 1 - 1e-9),
+            )
+            touches.append(touch)
         if not touches:
             return {}
-        given = any(is_one(each.pair, "carried_and_solid") for each in touches.values())  # by the scene, not the arm
+        given = any(is_one(each.pair, "carried_and_solid") for each in touches)  # by the scene, not the arm
         assumed = arm_shapes(self.robot).assumed and not given
-        hit = fact("motion_collides", touches=tuple(touches.values()), assumed=assumed)
-        return {hit: float(first)}
+        hit = fact("motion_collides", touches=(), assumed=assumed)
+        return {found_in.with_touches_of(hit, [hit.but(touches=tuple(touches))]): float(first)}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
         """Find what the corner between two motions touches that a zone rounds; what is found is added to the first.
@@ -491,7 +474,7 @@ class Obstacles(ByValue):
             )
 
 
-def zone_share(zone: instructions.Zone, path: MotionPath) -> float:
+def zone_share(zone: Zone, path: MotionPath) -> float:
     """The share of a motion's way that its zone may take.
 
     Parameters

@@ -16,6 +16,21 @@ from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.instructions import Aside, Place, Remark, Unknown
 from er3a.programs.lexing import MisreadError, ProgramText, Words
+from er3a.programs.syntax import (
+    Assign,
+    Binary,
+    Branch,
+    Call,
+    Constant,
+    Doing,
+    Expression,
+    Fixed,
+    GoTo,
+    Operation,
+    Return,
+    Routine,
+    Variable,
+)
 
 MAX_NESTED = 200
 ASSIGNED = re.compile(r"(?:(?:global|local)\s+)?([A-Za-z_$][\w$]*+)[^=\"'(]*+=(?!=)")
@@ -30,10 +45,9 @@ class Block:
     start: int
     exits: list[int] = field(default_factory=list)  # jumps past the block
     skips: list[int] = field(default_factory=list)  # branches or jumps to the next arm, or to the next round
-    subject: syntax.Expression | None = None
-    step: syntax.Expression | None = None
+    subject: Expression | None = None
+    step: Expression | None = None
     text: str = ""  # its first line, of a switch
-    word: str = ""  # what it is called in the text
 
 
 LOOPS = ("loop", "while", "for", "repeat")
@@ -60,13 +74,13 @@ class CodeBuilder:
 
     def __init__(self, name: str, parameters: tuple[syntax.RoutineParameter, ...], place: Place, thread: bool = False):
         self.name, self.parameters, self.place, self.thread = name, parameters, place, thread
-        self.code: list[syntax.Operation] = []
+        self.code: list[Operation] = []
         self.blocks: list[Block] = []
         self._labels: dict[str, int] = {}
         self._gotos: list[tuple[int, str]] = []
         self._hidden = 0
 
-    def add(self, operation: syntax.Operation) -> None:
+    def add(self, operation: Operation) -> None:
         """Add one operation at the end of the code.
 
         Parameters
@@ -83,7 +97,7 @@ class CodeBuilder:
         place : where it was read
         text : without the language's own signs of a comment
         """
-        self.add(syntax.Fixed(place, Remark(text)))
+        self.add(Fixed(place, Remark(text)))
 
     def aside(self, place: Place, text: str) -> None:
         """Add an instruction that is known to move nothing.
@@ -93,7 +107,7 @@ class CodeBuilder:
         place : where it was read
         text : as it was read; writers of the same language repeat it
         """
-        self.add(syntax.Fixed(place, Aside(text)))
+        self.add(Fixed(place, Aside(text)))
 
     def unknown(self, place: Place, text: str, may_move: bool = True, stops: bool = False) -> None:
         """Add an instruction that is not understood, or not followed.
@@ -104,7 +118,7 @@ class CodeBuilder:
         may_move : whether it may move the arm, for all that is known
         stops : whether the controller stops here, as at a text that is no statement
         """
-        self.add(syntax.Fixed(place, Unknown(text, may_move, stops=stops)))
+        self.add(Fixed(place, Unknown(text, may_move, stops=stops)))
 
     def unread(self, place: Place, text: str, may_move: bool = True, folds: bool = False) -> None:
         """A statement that is not understood; what it assigns something to has no known value from here.
@@ -117,9 +131,9 @@ class CodeBuilder:
         assigned = ASSIGNED.match(text)
         if assigned is not None:
             name = assigned[1].upper() if folds else assigned[1]
-            self.unclear(place, syntax.Variable(name), text)
+            self.unclear(place, Variable(name), text)
 
-    def unclear(self, place: Place, target: syntax.Expression | None, text: str) -> None:
+    def unclear(self, place: Place, target: Expression | None, text: str) -> None:
         """Make a variable, field or element unclear, because nothing is known of it from here.
 
         Parameters
@@ -127,8 +141,8 @@ class CodeBuilder:
         target : what is assigned to; anything else than a variable, field or element is left out
         text : what the value was read from, for messages
         """
-        if isinstance(target, syntax.Variable | syntax.Member | syntax.Element):
-            self.add(syntax.Assign(place, target, syntax.Opaque(text), text))
+        if isinstance(target, Variable | syntax.Member | syntax.Element):
+            self.add(Assign(place, target, syntax.Opaque(text), text))
 
     def inside(self, *kinds: str) -> bool:
         """Whether the innermost open block is one of some kinds.
@@ -143,82 +157,68 @@ class CodeBuilder:
         """
         return bool(self.blocks) and self.blocks[-1].kind in kinds
 
-    def open_if(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """Begin ``IF condition``: the code goes on to the next part where the condition does not hold.
+    def open(
+        self,
+        kind: str,
+        place: Place,
+        condition: Expression | None = None,
+        text: str = "",
+        *,
+        counted: bool = False,
+    ) -> None:
+        """Begin a loop or a branch.
 
         Parameters
         ----------
+        kind : ``if``, ``loop``, ``repeat``, ``while``, ``for`` or ``switch``
+        condition : without which the code goes on behind the block, or at its next part; a ``while`` of one that is
+            always true is a loop for ever
+        text : the line, for messages
+        counted : whether the condition is that of a counter
+
+        Raises
+        ------
+        InputError
+            if too many blocks are nested
+        """
+        if len(self.blocks) >= MAX_NESTED:
+            raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
+        if kind in LOOPS:
+            self.add(syntax.Enter(place))
+        self.blocks.append(Block(kind, place, len(self.code)))
+        for_ever = kind == "while" and isinstance(condition, Constant) and condition.value is True
+        if condition is not None and not for_ever:
+            self._test(place, condition, text, counted)
+
+    def next_part(self, kind: str, place: Place, condition: Expression | None = None, text: str = "") -> None:
+        """End a part of a branch, if one is open, and begin the next: ``ELSE``, ``ELSEIF``, ``CASE``.
+
+        Parameters
+        ----------
+        kind : ``if`` or ``switch``
+        condition : None of ``ELSE`` and ``DEFAULT``
         text : the line, for messages
 
         Raises
         ------
         InputError
-            if too many blocks are nested
+            if the innermost block is another one
         """
-        self._open("if", place)
-        self._test(place, condition, text)
-
-    def next_arm(self, place: Place, condition: syntax.Expression | None, text: str) -> None:
-        """Go on with ``ELSE``, or ``ELSEIF`` with its condition.
-
-        Parameters
-        ----------
-        condition : None of ``ELSE``
-        text : the line, for messages
-
-        Raises
-        ------
-        InputError
-            if the innermost block is no IF
-        """
-        self._next_part(self._innermost("if", place), place, condition, text)
-
-    def open_while(self, place: Place, condition: syntax.Expression, text: str) -> None:
-        """Begin ``WHILE condition``, which is tested before each round.
-
-        Parameters
-        ----------
-        condition : one that is always true makes a loop for ever
-        text : the line, for messages
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        if isinstance(condition, syntax.Constant) and condition.value is True:
-            self._open("loop", place, "while")
-            return
-        self._open("while", place)
-        self._test(place, condition, text)
-
-    def open_loop(self, place: Place) -> None:
-        """Begin ``LOOP``, which goes on until something leaves it.
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        self._open("loop", place)
-
-    def open_repeat(self, place: Place) -> None:
-        """Begin ``REPEAT``, whose condition is tested after each round (:meth:`close`).
-
-        Raises
-        ------
-        InputError
-            if too many blocks are nested
-        """
-        self._open("repeat", place)
+        block = self._innermost(kind, place)
+        if block.skips or block.exits:
+            block.exits.append(self._jump(place))
+        self._patch(block.skips)
+        block.skips = []
+        if condition is not None:
+            self._test(place, condition, text)
 
     def open_for(
         self,
         place: Place,
         name: str,
-        first: syntax.Expression,
-        last: syntax.Expression,
-        step: syntax.Expression | None,
+        first: Expression,
+        last: Expression,
+        step: Expression | None,
         text: str,
     ) -> None:
         """Begin ``FOR name = first TO last STEP step``.
@@ -235,18 +235,17 @@ class CodeBuilder:
         step is not below 0, so that steps can be negative.
         """
         self._hidden += 1
-        limit, by = (syntax.Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
-        counter = syntax.Variable(name)
-        self.add(syntax.Assign(place, counter, first, text))
-        self.add(syntax.Assign(place, limit, last, text, local=True))
-        self.add(syntax.Assign(place, by, syntax.Constant(1) if step is None else step, text, local=True))
-        self._open("for", place)
-        self.blocks[-1].subject, self.blocks[-1].step = counter, by
+        limit, by = (Variable(f"%{part}{self._hidden}") for part in ("last", "step"))
+        counter = Variable(name)
+        self.add(Assign(place, counter, first, text))
+        self.add(Assign(place, limit, last, text, local=True))
+        self.add(Assign(place, by, Constant(1) if step is None else step, text, local=True))
         # One test for steps of either sign: until the last value is passed, what is left and the step have one sign.
-        span = syntax.Binary("*", syntax.Binary("-", limit, counter), by)
-        self._test(place, syntax.Binary(">=", span, syntax.Constant(0)), text, counted=True)
+        span = Binary("*", Binary("-", limit, counter), by)
+        self.open("for", place, Binary(">=", span, Constant(0)), text, counted=True)
+        self.blocks[-1].subject, self.blocks[-1].step = counter, by
 
-    def open_switch(self, place: Place, subject: syntax.Expression, text: str) -> None:
+    def open_switch(self, place: Place, subject: Expression, text: str) -> None:
         """Begin ``SWITCH subject``; cases follow.
 
         Parameters
@@ -260,17 +259,17 @@ class CodeBuilder:
             if too many blocks are nested
         """
         self._hidden += 1
-        value = syntax.Variable(f"%subject{self._hidden}")
-        self.add(syntax.Assign(place, value, subject, text, local=True))
-        self._open("switch", place)
+        value = Variable(f"%subject{self._hidden}")
+        self.add(Assign(place, value, subject, text, local=True))
+        self.open("switch", place)
         self.blocks[-1].subject, self.blocks[-1].text = value, text
 
-    def case(self, place: Place, values: list[syntax.Expression] | None, text: str) -> None:
-        """Begin ``CASE values``, or ``DEFAULT``.
+    def case(self, place: Place, values: list[Expression], text: str) -> None:
+        """Begin ``CASE values``.
 
         Parameters
         ----------
-        values : the case is taken where the subject is one of them; None of ``DEFAULT``
+        values : the case is taken where the subject is one of them
         text : the line, for messages
 
         Raises
@@ -280,22 +279,13 @@ class CodeBuilder:
         """
         block = self._innermost("switch", place)
         assert block.subject is not None
-        condition: syntax.Expression | None = None
-        for value in values or ():
-            test = syntax.Binary("==", block.subject, value)
-            condition = test if condition is None else syntax.Binary("OR", condition, test)
-        self._next_part(block, place, condition, f"{block.text} {text}")
+        condition: Expression | None = None
+        for value in values:
+            test = Binary("==", block.subject, value)
+            condition = test if condition is None else Binary("OR", condition, test)
+        self.next_part("switch", place, condition, f"{block.text} {text}")
 
-    def _next_part(self, block: Block, place: Place, condition: syntax.Expression | None, text: str) -> None:
-        """The end of a part of a branch, if one is open, and the beginning of the next."""
-        if block.skips or block.exits:
-            block.exits.append(self._jump(place))
-        self._patch(block.skips)
-        block.skips = []
-        if condition is not None:
-            self._test(place, condition, text)
-
-    def close(self, kind: str, place: Place, until: syntax.Expression | None = None, text: str = "") -> None:
+    def close(self, kind: str, place: Place, until: Expression | None = None, text: str = "") -> None:
         """End the innermost block, which must be of this kind; its open jumps lead here.
 
         Parameters
@@ -313,43 +303,33 @@ class CodeBuilder:
             assert until is not None
             # A ``continue`` goes on at the condition, not after the loop.
             self._patch(block.skips)
-            self.add(syntax.Branch(place, until, block.start, text))
-        elif block.kind in LOOPS:
-            if block.kind == "for":
-                self._count(block, place)
-            self.add(syntax.GoTo(place, block.start))
-        if kind != "repeat":
+            self.add(Branch(place, until, block.start, text))
+        else:
+            if kind in LOOPS:
+                self._again(block, place)
             self._patch(block.skips)
         self._patch(block.exits)
         self.blocks.pop()
 
-    def leave_loop(self, place: Place) -> None:
-        """Go on after the innermost loop: ``EXIT``, ``break``.
+    def leave_loop(self, place: Place, goes_on: bool = False) -> None:
+        """Go on after the innermost loop (``EXIT``, ``break``), or with its next round (``continue``).
+
+        Parameters
+        ----------
+        goes_on : with the next round; a counter is advanced first, and a REPEAT goes on at its condition
 
         Raises
         ------
         InputError
             if no loop is open
         """
-        self._loop(place).exits.append(self._jump(place))
-
-    def next_round(self, place: Place) -> None:
-        """Go on with the next round of the innermost loop: ``continue``.
-
-        A counter is advanced first; a REPEAT goes on at its condition.
-
-        Raises
-        ------
-        InputError
-            if no loop is open
-        """
-        loop = self._loop(place)
-        if loop.kind == "repeat":
-            loop.skips.append(self._jump(place))
-            return
-        if loop.kind == "for":
-            self._count(loop, place)
-        self.add(syntax.GoTo(place, loop.start))
+        loop = next((block for block in reversed(self.blocks) if block.kind in LOOPS), None)
+        if loop is None:
+            raise fault(place, "leaves a loop, but none is open", "Remove it")
+        if goes_on and loop.kind != "repeat":
+            self._again(loop, place)
+        else:
+            (loop.skips if goes_on else loop.exits).append(self._jump(place))
 
     def label(self, name: str) -> None:
         """Name the next operation, so that :meth:`goto` can lead to it.
@@ -369,7 +349,7 @@ class CodeBuilder:
         """
         self._gotos.append((self._jump(place), name))
 
-    def routine(self, end: Place) -> syntax.Routine:
+    def routine(self, end: Place) -> Routine:
         """The finished routine.
 
         Raises
@@ -379,55 +359,45 @@ class CodeBuilder:
         """
         if self.blocks:
             block = self.blocks[-1]
-            raise fault(block.place, f"the {block.word.upper()} that begins here has no end", "Close it")
+            raise fault(block.place, f"the {block.kind.upper()} that begins here has no end", "Close it")
         for at, name in self._gotos:
             place = self.code[at].place
             if name not in self._labels:
                 raise fault(place, f"there is no label '{name}'", "Name a label of this routine")
-            self.code[at] = syntax.GoTo(place, self._labels[name])
-        code = (*self.code, syntax.Return(end))
-        return syntax.Routine(self.name, self.parameters, code, self.place, self.thread)
+            self.code[at] = GoTo(place, self._labels[name])
+        code = (*self.code, Return(end))
+        return Routine(self.name, self.parameters, code, self.place, self.thread)
 
-    def _open(self, kind: str, place: Place, word: str = "") -> None:
-        if len(self.blocks) >= MAX_NESTED:
-            raise fault(place, f"more than {MAX_NESTED} blocks within each other", "Nest fewer")
-        if kind in LOOPS:
-            self.add(syntax.Enter(place))
-        self.blocks.append(Block(kind, place, len(self.code), word=word or kind))
-
-    def _innermost(self, word: str, place: Place) -> Block:
-        if not self.blocks or self.blocks[-1].word != word:
-            opened = f"the {self.blocks[-1].word.upper()} of line {self.blocks[-1].place.line}" if self.blocks else None
-            problem = f"ends or continues a {word.upper()}, but {opened or 'none'} is open"
+    def _innermost(self, kind: str, place: Place) -> Block:
+        if not self.inside(kind):
+            opened = f"the {self.blocks[-1].kind.upper()} of line {self.blocks[-1].place.line}" if self.blocks else None
+            problem = f"ends or continues a {kind.upper()}, but {opened or 'none'} is open"
             raise fault(place, problem, "Close blocks in the order in which they were opened")
         return self.blocks[-1]
 
-    def _count(self, block: Block, place: Place) -> None:
-        assert block.subject is not None
-        assert block.step is not None
-        self.add(syntax.Assign(place, block.subject, syntax.Binary("+", block.subject, block.step), ""))
+    def _again(self, loop: Block, place: Place) -> None:
+        """Go on with a loop's next round, its counter advanced."""
+        if loop.subject is not None and loop.step is not None:
+            self.add(Assign(place, loop.subject, Binary("+", loop.subject, loop.step), ""))
+        self.add(GoTo(place, loop.start))
 
-    def _loop(self, place: Place) -> Block:
-        for block in reversed(self.blocks):
-            if block.kind in LOOPS:
-                return block
-        raise fault(place, "leaves a loop, but none is open", "Remove it")
-
-    def _test(self, place: Place, condition: syntax.Expression, text: str, counted: bool = False) -> None:
+    def _test(self, place: Place, condition: Expression, text: str, counted: bool = False) -> None:
         self.blocks[-1].skips.append(len(self.code))
-        self.add(syntax.Branch(place, condition, -1, text, counted))
+        self.add(Branch(place, condition, -1, text, counted))
 
     def _jump(self, place: Place) -> int:
-        self.add(syntax.GoTo(place, -1))
+        self.add(GoTo(place, -1))
         return len(self.code) - 1
 
     def _patch(self, places: list[int]) -> None:
+        """Let jumps lead to what comes next."""
         for at in places:
-            operation = self.code[at]
-            if isinstance(operation, syntax.Branch):
-                self.code[at] = replace(operation, otherwise=len(self.code))
-            elif isinstance(operation, syntax.GoTo):
-                self.code[at] = replace(operation, to=len(self.code))
+            self.code[at] = led_to(self.code[at], len(self.code))
+
+
+def led_to(operation: Operation, to: int) -> Operation:
+    """A jump that leads to an operation of another number; one that jumps nowhere is returned as it is."""
+    return replace(operation, to=to) if isinstance(operation, GoTo | Branch) else operation
 
 
 Blocks = Mapping[str, tuple[str, str]]
@@ -451,12 +421,10 @@ def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: B
         return False
     words.take()
     match action:
-        case "if":
-            builder.open_if(place, words.condition(needs), text)
+        case "if" | "while":
+            builder.open(action, place, words.condition(needs), text)
         case "elif":
-            builder.next_arm(place, words.condition(needs), text)
-        case "while":
-            builder.open_while(place, words.condition(needs), text)
+            builder.next_part("if", place, words.condition(needs), text)
         case "until":
             builder.close("repeat", place, words.condition(needs), text)
         case "switch":
@@ -470,7 +438,7 @@ def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: B
         case "return":
             value = None if words.kind == "end" else words.expression()
             words.finish()
-            builder.add(syntax.Return(place, value))
+            builder.add(Return(place, value))
         case "label":
             builder.label(words.name())
         case "goto":
@@ -485,20 +453,14 @@ def block(builder: CodeBuilder, words: Words, place: Place, text: str, blocks: B
 def _simple(builder: CodeBuilder, place: Place, action: str) -> None:
     """A word that stands alone."""
     match action:
-        case "else" if not builder.inside("switch"):
-            builder.next_arm(place, None, "")
         case "else" | "default":
-            builder.case(place, None, "")
-        case "loop":
-            builder.open_loop(place)
-        case "repeat":
-            builder.open_repeat(place)
-        case "leave":
-            builder.leave_loop(place)
-        case "next":
-            builder.next_round(place)
+            builder.next_part("if" if action == "else" and not builder.inside("switch") else "switch", place)
+        case "loop" | "repeat":
+            builder.open(action, place)
+        case "leave" | "next":
+            builder.leave_loop(place, goes_on=action == "next")
         case "end":
-            builder.add(syntax.Return(place, ends=True))
+            builder.add(Return(place, ends=True))
         case kind if kind.startswith("close "):
             builder.close(kind.removeprefix("close "), place)
 
@@ -514,11 +476,11 @@ def _counted(builder: CodeBuilder, words: Words, place: Place, text: str, needs:
     step = words.expression() if words.accept(by) else None
     words.accept("".join(end))
     words.finish()
-    if isinstance(step, syntax.Constant) and step.value == 0:
+    if isinstance(step, Constant) and step.value == 0:
         raise MisreadError(f"{by} 0")
-    if words.lexicon.counts_down and isinstance(first, syntax.Constant) and isinstance(last, syntax.Constant):
+    if words.counts_down and isinstance(first, Constant) and isinstance(last, Constant):
         ends = syntax.numbers((first.value, last.value))
-        step = syntax.Constant(-1) if step is None and ends and ends[0] > ends[1] else step
+        step = Constant(-1) if step is None and ends and ends[0] > ends[1] else step
     builder.open_for(place, name, first, last, step, text)
 
 
@@ -614,13 +576,13 @@ def _in_one_line(text: str) -> str:
     return " ".join(text.split()) if "\n" in text.strip() else text.strip()
 
 
-def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
+def linked(routines: Iterable[Routine]) -> dict[str, Routine]:
     """The routines by name, with calls of each other taken out of expressions.
 
     Of two routines with one name the later one counts; the other is kept under a name that nothing calls. A function in
     an expression that is not the program's is carried out before, for what it may do.
     """
-    by_name: dict[str, syntax.Routine] = {}
+    by_name: dict[str, Routine] = {}
     for routine in routines:
         if routine.name in by_name:
             hidden = f"{routine.name}@{len(by_name)}"
@@ -629,17 +591,17 @@ def linked(routines: Iterable[syntax.Routine]) -> dict[str, syntax.Routine]:
     return {name: replace(each, code=_linked(each.code, by_name)) for name, each in by_name.items()}
 
 
-def _plain(operation: syntax.Operation) -> bool:
+def _plain(operation: Operation) -> bool:
     """Whether an operation is a motion to values and names alone, as most lines of long programs are."""
     return (
         type(operation) is syntax.Move
-        and all(type(each) is syntax.Constant for _, each in operation.settings)
-        and all(type(each) is syntax.Constant or type(each) is syntax.Variable for each in operation.arguments)
+        and all(type(each) is Constant for _, each in operation.settings)
+        and all(type(each) is Constant or type(each) is Variable for each in operation.arguments)
     )
 
 
-def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple[syntax.Operation, ...]:
-    code: list[syntax.Operation] = []
+def _linked(given: tuple[Operation, ...], known: Container[str]) -> tuple[Operation, ...]:
+    code: list[Operation] = []
     starts: list[int] = []
     for operation in given:
         starts.append(len(code))
@@ -648,30 +610,24 @@ def _linked(given: tuple[syntax.Operation, ...], known: Container[str]) -> tuple
             continue
         calls = _Calls(known, operation)
         last = syntax.mapped(operation, calls.out)
-        if isinstance(last, syntax.Doing) and last.what.function in known:
+        if isinstance(last, Doing) and last.what.function in known:
             call = last.what
-            last = syntax.Call(last.place, call.function, call.arguments, call.keywords, last.text)
+            last = Call(last.place, call.function, call.arguments, call.keywords, last.text)
         code += [*calls.found, last]
     starts.append(len(code))
-    return tuple(_moved(operation, starts) for operation in code) if len(code) > len(given) else tuple(code)
-
-
-def _moved(operation: syntax.Operation, starts: list[int]) -> syntax.Operation:
-    if isinstance(operation, syntax.GoTo):
-        return replace(operation, to=starts[operation.to])
-    if isinstance(operation, syntax.Branch):
-        return replace(operation, otherwise=starts[operation.otherwise])
-    return operation
+    if len(code) > len(given):
+        code = [led_to(each, starts[each.to]) if isinstance(each, GoTo | Branch) else each for each in code]
+    return tuple(code)
 
 
 class _Calls:
     """Takes calls out of the expressions of an operation, the innermost first."""
 
-    def __init__(self, known: Container[str], operation: syntax.Operation):
+    def __init__(self, known: Container[str], operation: Operation):
         self.known, self.place = known, operation.place
-        self.found: list[syntax.Operation] = []
+        self.found: list[Operation] = []
 
-    def out(self, expression: syntax.Expression) -> syntax.Expression:
+    def out(self, expression: Expression) -> Expression:
         """An expression without calls: each is done before, and its value read from a hidden variable.
 
         Returns
@@ -679,7 +635,7 @@ class _Calls:
         expression : calls of the program's own routines are replaced. Calls of other functions stay where they are, and
             are also done before, for what they may change.
         """
-        if isinstance(expression, syntax.Constant | syntax.Variable):
+        if isinstance(expression, Constant | Variable):
             return expression
         expression = syntax.within(expression, self.out)
         if not isinstance(expression, syntax.Invocation):
@@ -687,8 +643,8 @@ class _Calls:
         name = expression.function
         if name in self.known:
             result = f"%value{len(self.found) + 1}"
-            self.found.append(syntax.Call(self.place, name, expression.arguments, expression.keywords, name, result))
-            return syntax.Variable(result)
+            self.found.append(Call(self.place, name, expression.arguments, expression.keywords, name, result))
+            return Variable(result)
         if name[0] != "%":
-            self.found.append(syntax.Doing(self.place, expression, f"{name}(...)", within=True))
+            self.found.append(Doing(self.place, expression, f"{name}(...)", within=True))
         return expression

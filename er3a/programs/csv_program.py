@@ -14,7 +14,7 @@ import csv
 import math
 import re
 import warnings
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,12 +23,9 @@ from er3a.finding import fact
 from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import may_be_radians
-from er3a.programs.code_builder import CodeBuilder
+from er3a.programs.code_builder import CodeBuilder, fault
 from er3a.programs.instructions import ArmMotion, JointTarget, Place, Rate
 from er3a.programs.lexing import ProgramText
-from er3a.programs.program_findings import ProgramFinding
-from er3a.programs.program_language import Language
-from er3a.programs.rpl.dialect import RplDialect
 from er3a.programs.syntax import Fixed, Program
 
 TIME = "t_s"
@@ -89,51 +86,41 @@ def read_csv_program(source: ProgramText) -> Program:
     rows = [_cells(source, number, line, mark) for number, line in kept]
     if mark != ",":
         rows = _with_points(source, rows)
-    head = [name.strip() for name in rows[0]]
-    twice = next((name for name in head if head.count(name) > 1), None)
+    head, at_head = [name.strip() for name in rows[0]], Place(source.path, kept[0][0])
     units = {int(match[1]): match[2] for name in head if (match := JOINT_COLUMN.match(name))}
-    names = tuple(f"q{i}_{units.get(i, 'deg')}" for i in range(1, max(units, default=1) + 1))
-    slides = np.array([name.endswith("_mm") for name in names])
-    missing = next((name for name in names if name not in head), None)
     if not units:
         problem = f"no joint is named by the first row ({', '.join(head)[:40]})"
-        raise InputError(source.path, f"line {kept[0][0]}", problem, "Give a header of columns q1_deg, q2_deg ...")
-    if twice or missing:
-        problem = f"the column {twice or missing} is {'there twice' if twice else 'missing'}"
-        raise InputError(source.path, f"line {kept[0][0]}", problem, f"Give {', '.join(names)} once each")
-    columns = [head.index(name) for name in names]
-    timed = head.index(TIME) if TIME in head else None
-    table = [
-        _numbers(source, number, row, columns + ([] if timed is None else [timed]), head)
-        for (number, _), row in zip(kept[1:], rows[1:])
-    ]
-    if timed is not None:
-        for i, (before, after) in enumerate(pairwise(table)):
-            if not after[-1] > before[-1]:
-                problem = f"t_s is {after[-1]:g} after {before[-1]:g}"
-                raise InputError(source.path, f"line {kept[i + 2][0]}", problem, "Times must rise")
-    builder = CodeBuilder("MAIN", (), Place(source.path, 1))
-    for i, values in enumerate(table):
-        place = Place(source.path, kept[i + 1][0])
-        speed = Rate(values[-1] - table[i - 1][-1], "s") if timed is not None and i else None
+        raise fault(at_head, problem, "Give a header of columns q1_deg, q2_deg ...")
+    names = [f"q{i}_{units.get(i, 'deg')}" for i in range(1, max(units) + 1)]
+    columns = [*names, *(name for name in (TIME,) if name in head)]
+    for name in (*columns, *head):
+        if head.count(name) != 1:
+            problem = f"the column {name} is {'there twice' if name in head else 'missing'}"
+            raise fault(at_head, problem, f"Give {', '.join(names)} once each")
+    table = [_numbers(Place(source.path, number), row, columns, head) for (number, _), row in zip(kept[1:], rows[1:])]
+    slides = np.array([name.endswith("_mm") for name in names])
+    builder, before = CodeBuilder("MAIN", (), Place(source.path, 1)), math.nan
+    for (number, _), values in zip(kept[1:], table):
+        place, t = Place(source.path, number), values[-1] if TIME in columns else math.nan
+        if t <= before:
+            raise fault(place, f"t_s is {t:g} after {before:g}", "Times must rise")
         given = np.array(values[: len(names)])
         target = JointTarget(np.where(slides, given / 1000, np.radians(given)))
+        speed = None if math.isnan(t - before) else Rate(t - before, "s")
         builder.add(Fixed(place, ArmMotion("joint", target, "row", speed=speed)))
-    if table and not _units_checked(head, rows[1:]):
+        before = t
+    checked = head.index(UNITS_CHECKED) if UNITS_CHECKED in head else len(head)
+    if any(row[checked : checked + 1] != ["yes"] for row in rows[1:]):
         _doubt_radians(source, np.array([values[: len(names)] for values in table])[:, ~slides], kept[1:])
-    other = [name for name in head if name not in (*names, TIME, *POSE_COLUMNS, UNITS_CHECKED)]
-    unread = [
-        fact("program_not_understood", text=f"the column {name[:40]}", place=Place(source.path, kept[0][0]))
-        for name in other
+    findings = [
+        fact("program_not_understood", text=f"the column {name[:40]}", place=at_head)
+        for name in head
+        if name not in (*columns, *POSE_COLUMNS, UNITS_CHECKED)
     ]
-    findings: tuple[ProgramFinding, ...] = (
-        *unread,
-        *(() if table else (fact("program_nothing_moves"),)),
-    )
     routine = builder.routine(Place(source.path, len(source.lines)))
     return Program(
         *("csv", source.path.stem, source.path, {"MAIN": routine}, "MAIN"),
-        findings=findings,
+        findings=tuple(findings),
         slides=tuple(slides.tolist()),
         lines=source.lines,
     )
@@ -147,12 +134,6 @@ def _cells(source: ProgramText, number: int, line: str, mark: str) -> list[str]:
         raise InputError(source.path, f"line {number}", f"not valid CSV ({error})", "Correct this line") from None
 
 
-def _units_checked(head: list[str], rows: list[list[str]]) -> bool:
-    """Whether each row says that its small angles are degrees although they look like radians."""
-    at = head.index(UNITS_CHECKED) if UNITS_CHECKED in head else None
-    return at is not None and all(row[at : at + 1] == ["yes"] for row in rows)
-
-
 def _doubt_radians(source: ProgramText, degrees: Reals, lines: list[tuple[int, str]]) -> None:
     """Warn of angles (n, k) that look like radians, judged by the row with the largest: others may well be small."""
     if not degrees.size:
@@ -161,8 +142,8 @@ def _doubt_radians(source: ProgramText, degrees: Reals, lines: list[tuple[int, s
     angles = degrees[row].tolist()
     if may_be_radians(angles):
         shown = ", ".join(f"{value:g}" for value in angles)
-        told = DoubtfulUnit(f"line {lines[row][0]}", f"[{shown}] deg", "radians", file=source.path)
-        warnings.warn(told, stacklevel=4)
+        doubt = DoubtfulUnit(f"line {lines[row][0]}", f"[{shown}] deg", "radians", file=source.path)
+        warnings.warn(doubt, stacklevel=4)
 
 
 def _with_points(source: ProgramText, rows: list[list[str]]) -> list[list[str]]:
@@ -174,27 +155,21 @@ def _with_points(source: ProgramText, rows: list[list[str]]) -> list[list[str]]:
     return [[text.replace(",", ".") for text in row] for row in rows]
 
 
-def _numbers(source: ProgramText, line: int, row: list[str], columns: list[int], head: list[str]) -> list[float]:
+def _numbers(place: Place, row: list[str], columns: list[str], head: list[str]) -> list[float]:
+    """The numbers in some columns of a row."""
     if any(text.strip() for text in row[len(head) :]):
-        raise InputError(
-            source.path,
-            f"line {line}",
-            f"the row has {len(row)} cells under {len(head)} headings",
-            "Write decimals with a point, and a heading for each column",
-        )
+        problem = f"the row has {len(row)} cells under {len(head)} headings"
+        raise fault(place, problem, "Write decimals with a point, and a heading for each column")
+    cells = dict(zip(head, row))
     found = []
-    for column in columns:
-        text = row[column].strip() if column < len(row) else ""
+    for name in columns:
+        text = cells.get(name, "").strip()
         try:
             value = float(text) if text.isascii() and "_" not in text else math.nan
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
             problem = f"'{text[:40]}' is not a finite number" if text else "a value is missing"
-            raise InputError(source.path, f"line {line}, column {head[column]}", problem, "Write a number")
+            raise fault(replace(place, element=f"column {name}"), problem, "Write a number")
         found.append(value)
     return found
-
-
-SIGN = re.compile(r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*[,;\t]")
-CSV = Language("CSV", (".csv",), SIGN, read_csv_program, RplDialect, writer=None, joints=None)

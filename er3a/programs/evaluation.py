@@ -28,6 +28,18 @@ from er3a.programs.instructions import (
     Unknown,
     UnresolvedTarget,
 )
+from er3a.programs.syntax import (
+    Binary,
+    Element,
+    Expression,
+    Invocation,
+    Member,
+    Record,
+    Unclear,
+    Unset,
+    Value,
+    Variable,
+)
 
 NO_FRAME = NamedFrame()
 MAX_ROBOT_AXES = 6
@@ -83,11 +95,9 @@ class Position:
 
         Returns
         -------
-        position : of which nothing is known after a target that is not known, or a motion by an angle
+        position : of which nothing is known after a target that is not known
         """
         target, ends = motion.target, (motion.tool, motion.base, motion.zone.kind != "fine")
-        if motion.angle is not None:  # which is not followed
-            return Position()
         if isinstance(target, PoseTarget):
             return Position(target.joints, target.pose, *ends)
         if not isinstance(target, JointTarget):
@@ -212,6 +222,7 @@ class Dialect(ABC):
     harmless : functions outside of programs that neither move the arm nor set what motions use
     reading : of these, those that leave their arguments as they are
     by_reference : whether a function outside of the program may set what it is given
+    running : variables that the controller changes after the program has set them, such as timers
     """
 
     modal: frozenset[str] = frozenset()
@@ -223,19 +234,7 @@ class Dialect(ABC):
     harmless: frozenset[str] = frozenset()
     reading: frozenset[str] = frozenset()
     by_reference: bool = False
-
-    def reads_back(self, name: str) -> bool:
-        """Whether reading a variable gives the value that the program set last.
-
-        Parameters
-        ----------
-        name : full, with fields and indices
-
-        Returns
-        -------
-        same : False for those that the controller changes meanwhile, such as timers
-        """
-        return True
+    running: tuple[str, ...] = ()
 
     def is_followed(self, name: str) -> bool:
         """Whether it is followed how setting a variable changes motions.
@@ -250,7 +249,7 @@ class Dialect(ABC):
         """
         return True
 
-    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+    def typed(self, kind: str, value: Value) -> Value:
         """What a variable holds after a value is assigned to it, by its declared type.
 
         Parameters
@@ -264,7 +263,7 @@ class Dialect(ABC):
         """
         return value
 
-    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """The value of a predefined name, such as a frame or the arm's position.
 
         Parameters
@@ -278,7 +277,7 @@ class Dialect(ABC):
         """
         return None
 
-    def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
         """The value of a list in brackets, ``[...]`` or ``p[...]``.
 
         Parameters
@@ -292,7 +291,7 @@ class Dialect(ABC):
         """
         return values
 
-    def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
+    def combined(self, sign: str, left: Value, right: Value) -> Value | None:
         """A sum, product or the like of values that are no numbers, such as frames.
 
         Parameters
@@ -307,7 +306,7 @@ class Dialect(ABC):
         return None
 
     @abstractmethod
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function that the program does not define.
 
         Parameters
@@ -367,8 +366,8 @@ class ProgramMemory:
     def __init__(self, functions: Dialect, cell: Cell):
         self.functions, self.cell = functions, cell
         self.here = Position(cell.start)
-        self.shared: dict[str, syntax.Value] = {}
-        self.local: dict[str, syntax.Value] = {}
+        self.shared: dict[str, Value] = {}
+        self.local: dict[str, Value] = {}
         self.types: dict[str, str] = {}
         self.kept: dict[object, object] = {}
         self.outside = ""
@@ -394,10 +393,10 @@ class ProgramMemory:
         """
         self.here = Position()
         for frame in self.functions.frames:
-            self.write(frame, syntax.Unclear(text))
+            self.write(frame, Unclear(text))
             self.shared.pop(f"{frame}%name", None)
 
-    def read(self, name: str) -> syntax.Value | None:
+    def read(self, name: str) -> Value | None:
         """The value of a full name.
 
         Parameters
@@ -415,7 +414,7 @@ class ProgramMemory:
         value = self.shared.get(name)
         return self.functions.constant(self, name) if value is None else value
 
-    def write(self, name: str, value: syntax.Value, local: bool = False) -> None:
+    def write(self, name: str, value: Value, local: bool = False) -> None:
         """Set the value of a full name, without conversion.
 
         Parameters
@@ -425,8 +424,8 @@ class ProgramMemory:
         """
         self.kept.clear()
         if name in WITH_FIELDS:
-            unknown = tuple((field, syntax.Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
-            parts = value.items if isinstance(value, syntax.Record) else unknown
+            unknown = tuple((field, Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
+            parts = value.items if isinstance(value, Record) else unknown
             self.shared.update({f"{name}.{field}": part for field, part in parts})
         if local or (self.local and root(name) in self.local):
             self.local[name] = value
@@ -451,7 +450,7 @@ class ProgramMemory:
         if name in self.local:
             self.local[name] = self.typed(name, self.local[name])
 
-    def assign(self, target: syntax.Expression, value: syntax.Value, local: bool = False) -> None:
+    def assign(self, target: Expression, value: Value, local: bool = False) -> None:
         """Assign a value to a variable, field or element, converted to its type.
 
         Parameters
@@ -459,7 +458,7 @@ class ProgramMemory:
         target : where an index is not known, the whole variable becomes unclear
         local : whether the variable is the routine's own
         """
-        if isinstance(target, syntax.Member | syntax.Element):
+        if isinstance(target, Member | Element):
             of = self.value(target.of)
             changed = self._changed(of, target, value)
             if changed is not None:
@@ -469,7 +468,7 @@ class ProgramMemory:
         if key is None or key.endswith("[]"):  # an element, but which one is not known, or all of them
             self.forget(variable_of(target))
             return
-        if isinstance(target, syntax.Variable) and isinstance(value, syntax.Unclear):
+        if isinstance(target, Variable) and isinstance(value, Unclear):
             self.forget(key)
         self.write(key, self.typed(key, value, local), local)
 
@@ -483,39 +482,37 @@ class ProgramMemory:
         self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
-                values[name] = syntax.Unclear(name)
+                values[name] = Unclear(name)
         if not any(root(name) == variable for name in (*self.local, *self.shared)):
-            self.shared[variable] = syntax.Unclear(variable)
+            self.shared[variable] = Unclear(variable)
 
-    def _changed(
-        self, of: syntax.Value, target: syntax.Member | syntax.Element, value: syntax.Value
-    ) -> syntax.Value | None:
+    def _changed(self, of: Value, target: Member | Element, value: Value) -> Value | None:
         """A record or list with one part changed; None if that part is kept under its own full name."""
-        if isinstance(target, syntax.Member):
-            if isinstance(of, syntax.Record):
+        if isinstance(target, Member):
+            if isinstance(of, Record):
                 return of.having(target.name, value)
-            unset = isinstance(self.read(self.key(target.of) or ""), syntax.Unset)
+            unset = isinstance(self.read(self.key(target.of) or ""), Unset)
             if unset:
-                return syntax.Record("", ((target.name, value),))
-            nested = isinstance(target.of, syntax.Member) and isinstance(self.value(target.of.of), syntax.Record)
+                return Record("", ((target.name, value),))
+            nested = isinstance(target.of, Member) and isinstance(self.value(target.of.of), Record)
             kept = self.read(self.key(target.of) or "") is not None
-            return syntax.Unclear(f"{self.shown(target.of)}, partly changed") if nested or kept else None
-        if not isinstance(of, (tuple, syntax.Record)):
+            return Unclear(f"{self.shown(target.of)}, partly changed") if nested or kept else None
+        if not isinstance(of, (tuple, Record)):
             return None
         place, values = self._place(target), _parts(of) or ()
         if place is None or place >= len(values):  # where a controller stops
-            return syntax.Unclear(f"{self.shown(target.of)}, an element of it changed")
-        if isinstance(of, syntax.Record):
+            return Unclear(f"{self.shown(target.of)}, an element of it changed")
+        if isinstance(of, Record):
             return of.having(of.items[place][0], value)
         return (*values[:place], value, *values[place + 1 :])
 
-    def _place(self, target: syntax.Element) -> int | None:
+    def _place(self, target: Element) -> int | None:
         """The place of an element in its list, from 0; None where the index is none or not known."""
         at = syntax.number(self.value(target.indices[0])) if len(target.indices) == 1 else None
         place = None if at is None else at - self.functions.first_index
         return None if place is None or place % 1 or place < 0 else int(place)
 
-    def key(self, target: syntax.Expression) -> str | None:
+    def key(self, target: Expression) -> str | None:
         """The full name of a variable, field or element, as values are kept under it.
 
         Parameters
@@ -528,12 +525,12 @@ class ProgramMemory:
             declaration
         """
         match target:
-            case syntax.Variable(name=name):
+            case Variable(name=name):
                 return name
-            case syntax.Member(of=of, name=name):
+            case Member(of=of, name=name):
                 start = self.key(of)
                 return None if start is None else f"{start}.{name}"
-            case syntax.Element(of=of, indices=indices):
+            case Element(of=of, indices=indices):
                 start = self.key(of)
                 found = [syntax.number(self.value(each)) for each in indices]
                 if start is None or None in found:
@@ -544,7 +541,7 @@ class ProgramMemory:
                 return f"{start}[{','.join(f'{each:g}' for each in found)}]"
         return None
 
-    def _is_outside(self, name: str, indices: Sequence[float | None], sizes: tuple[syntax.Value, ...]) -> bool:
+    def _is_outside(self, name: str, indices: Sequence[float | None], sizes: tuple[Value, ...]) -> bool:
         """Whether a list has no such element by its declaration; then the controller stops (:attr:`outside`).
 
         Indices count from 1. One whose frame is given to the check counts as declared.
@@ -557,7 +554,7 @@ class ProgramMemory:
             self.outside = f"{element} of {name}[{','.join(map(syntax.shown, sizes))}]"
         return element not in self.cell.frames
 
-    def value(self, expression: syntax.Expression) -> syntax.Value:
+    def value(self, expression: Expression) -> Value:
         """The value of an expression, in the language's own units.
 
         Parameters
@@ -571,38 +568,39 @@ class ProgramMemory:
         match expression:
             case syntax.Constant(value=value):
                 return value
-            case syntax.Variable(name=name):
-                return known(self.read(name), name)
-            case syntax.Member() | syntax.Element():
+            case Variable(name=name):
+                found = self.read(name)
+                return Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
+            case Member() | Element():
                 return self._part(expression)
             case syntax.Unary(operator=sign, of=of):
                 return _unary(sign, self.value(of))
-            case syntax.Binary():
+            case Binary():
                 return self._binary(expression)
-            case syntax.Invocation(function=function):
+            case Invocation(function=function):
                 return self.functions.function(self, function, expression)
             case syntax.Aggregate(kind=kind, items=items):
-                return syntax.Record(kind, tuple((name, self.value(each)) for name, each in items))
+                return Record(kind, tuple((name, self.value(each)) for name, each in items))
             case syntax.Listed(kind=kind, items=listed):
                 return self.functions.listed(kind, tuple(map(self.value, listed)))
             case syntax.Opaque(text=text):
-                return syntax.Unclear(text)
+                return Unclear(text)
 
-    def _part(self, expression: syntax.Member | syntax.Element) -> syntax.Value:
+    def _part(self, expression: Member | Element) -> Value:
         of = self.value(expression.of)
-        if isinstance(of, syntax.Record) and isinstance(expression, syntax.Member):
+        if isinstance(of, Record) and isinstance(expression, Member):
             found = of.get(expression.name)
-        elif isinstance(expression, syntax.Element) and (values := _parts(of)) is not None:
+        elif isinstance(expression, Element) and (values := _parts(of)) is not None:
             place = self._place(expression)
             found = values[place] if place is not None and place < len(values) else None
         else:
             key = self.key(expression)
             found = None if key is None else self.read(key)
-            if found is None and isinstance(of, syntax.Unclear):
-                return syntax.Unclear(key or self.outside or of.text)
-        return syntax.Unclear(self.shown(expression)) if found is None else found
+            if found is None and isinstance(of, Unclear):
+                return Unclear(key or self.outside or of.text)
+        return Unclear(self.shown(expression)) if found is None else found
 
-    def shown(self, target: syntax.Expression) -> str:
+    def shown(self, target: Expression) -> str:
         """A variable, field or element as text, for messages.
 
         Parameters
@@ -614,17 +612,17 @@ class ProgramMemory:
         text : ``?`` for other expressions
         """
         match target:
-            case syntax.Variable(name=name):
+            case Variable(name=name):
                 return name
-            case syntax.Member(of=of, name=name):
+            case Member(of=of, name=name):
                 return f"{self.shown(of)}.{name}"
-            case syntax.Element(of=of, indices=indices):
+            case Element(of=of, indices=indices):
                 numbers = [syntax.number(self.value(each)) for each in indices]
                 shown = (self.shown(i) if n is None else f"{n:g}" for i, n in zip(indices, numbers))
                 return f"{self.shown(of)}[{','.join(shown)}]"
         return "?"
 
-    def typed(self, key: str, value: syntax.Value, local: bool = False) -> syntax.Value:
+    def typed(self, key: str, value: Value, local: bool = False) -> Value:
         """A value as the type of the variable is that it is assigned to.
 
         Parameters
@@ -647,11 +645,11 @@ class ProgramMemory:
             return float(value)
         if kind in ("INT", "DINT", "SINT", "LINT") and isinstance(value, float):
             if (value % 1 and self.functions.whole_division is None) or not abs(value) < LARGEST_WHOLE:
-                return syntax.Unclear(f"{value:g}, whose conversion to a whole number is not documented")
+                return Unclear(f"{value:g}, whose conversion to a whole number is not documented")
             return int(math.copysign(math.floor(abs(value) + 0.5), value))  # KRL: from x.5 on it is x + 1
         return value
 
-    def _binary(self, expression: syntax.Binary) -> syntax.Value:
+    def _binary(self, expression: Binary) -> Value:
         sign, left = expression.operator, self.value(expression.left)
         decides = LOGIC.get(sign)
         if decides is not None and left is decides:
@@ -661,32 +659,32 @@ class ProgramMemory:
             return right if right is decides else left
         if sign in EQUAL or sign in UNEQUAL:
             same = _equal(left, right)
-            return same if isinstance(same, syntax.Unclear) else same == (sign in EQUAL)
+            return same if isinstance(same, Unclear) else same == (sign in EQUAL)
         for side in (left, right):
-            if isinstance(side, syntax.Unclear):
+            if isinstance(side, Unclear):
                 return side
         if sign in EXCLUSIVE and isinstance(left, bool) and isinstance(right, bool):
             return left != right
         a, b = syntax.number(left), syntax.number(right)
         if a is None or b is None:
             found = self.functions.combined(sign, left, right)
-            return syntax.Unclear(f"... {sign} ...") if found is None else found
+            return Unclear(f"... {sign} ...") if found is None else found
         if sign in COMPARISONS:
             return COMPARISONS[sign](a, b)
         try:
             return self._computed(sign, a, b, isinstance(left, int) and isinstance(right, int))
         except (ZeroDivisionError, OverflowError, ValueError, KeyError):
-            return syntax.Unclear("a division by zero, an overflow, or a root of a negative number")
+            return Unclear("a division by zero, an overflow, or a root of a negative number")
 
-    def _computed(self, sign: str, a: float, b: float, whole: bool) -> syntax.Value:
+    def _computed(self, sign: str, a: float, b: float, whole: bool) -> Value:
         if sign == "/":
             if not whole or self.functions.whole_division is False:
                 return a / b
             if self.functions.whole_division is None and a % b:
-                return syntax.Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
+                return Unclear(f"{a:.0f}/{b:.0f}: whether such a quotient is a whole number is not documented")
             return int(a / b)
         if sign in ("%", "MOD", "DIV") and ((min(a, b) < 0 and a % b) or (sign != "%" and (a % 1 or b % 1))):
-            return syntax.Unclear(f"{a:g} {sign} {b:g}, whose value is not documented")
+            return Unclear(f"{a:g} {sign} {b:g}, whose value is not documented")
         found = ARITHMETIC[sign](a, b)
         return int(found) if whole and not found % 1 else found
 
@@ -694,7 +692,7 @@ class ProgramMemory:
 NOT_NUMBERS = ("NAN", "INF", "INFINITY")
 
 
-def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | None]) -> syntax.Value | None:
+def evaluated(function: Callable[..., float], values: Sequence[Value | None]) -> Value | None:
     """A mathematical function of numbers.
 
     Parameters
@@ -712,7 +710,7 @@ def evaluated(function: Callable[..., float], values: Sequence[syntax.Value | No
         return None
 
 
-def external_axes(value: syntax.Record, keys: Sequence[str]) -> tuple[tuple[str, float], ...]:
+def external_axes(value: Record, keys: Sequence[str]) -> tuple[tuple[str, float], ...]:
     """Axes beside the arm that a target moves.
 
     Parameters
@@ -725,11 +723,32 @@ def external_axes(value: syntax.Record, keys: Sequence[str]) -> tuple[tuple[str,
     axes : pairs of name and value, as the controller has it, of those that are given and not 0; NaN where not known
     """
     given = ((key, value.get(key)) for key in keys)
-    known = ((key, math.nan if isinstance(each, syntax.Unclear) else syntax.number(each)) for key, each in given)
+    known = ((key, math.nan if isinstance(each, Unclear) else syntax.number(each)) for key, each in given)
     return tuple((key, each) for key, each in known if each)
 
 
-def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
+def target_numbers(parts: Sequence[Value | None], text: str) -> tuple[float, ...] | UnresolvedTarget:
+    """The numbers of a target.
+
+    Parameters
+    ----------
+    parts : its components; None for one that is missing
+    text : of the line
+
+    Returns
+    -------
+    numbers : or why it is no target: a part is unclear, is no number, or not finite
+    """
+    unclear = next((each for each in parts if isinstance(each, Unclear)), None)
+    if unclear is not None:
+        return unresolved(unclear, text)
+    plain = syntax.numbers(tuple(parts))
+    if plain is None:
+        return UnresolvedTarget(text, "not_understood")
+    return plain if syntax.finite(plain) else UnresolvedTarget(text, "not_finite")
+
+
+def unresolved(value: Unclear, text: str = "") -> UnresolvedTarget:
     """A target that is made of an unclear value.
 
     Parameters
@@ -742,21 +761,6 @@ def unresolved(value: syntax.Unclear, text: str = "") -> UnresolvedTarget:
     """
     is_number = value.text.upper().lstrip("+-") in NOT_NUMBERS
     return UnresolvedTarget(value.text or text, "not_finite" if is_number else "undefined")
-
-
-def known(found: syntax.Value | None, name: str) -> syntax.Value:
-    """The value that was found for a name, or an unclear one.
-
-    Parameters
-    ----------
-    found : None, or :class:`Unset`, where nothing was assigned to it
-    name : for messages
-
-    Returns
-    -------
-    value : unclear by this name where nothing was found
-    """
-    return syntax.Unclear(name) if found is None or isinstance(found, syntax.Unset) else found
 
 
 @cache
@@ -776,42 +780,42 @@ def root(name: str) -> str:
     return name[: min(ends)] if ends else name
 
 
-def _equal(left: syntax.Value, right: syntax.Value) -> bool | syntax.Unclear:
+def _equal(left: Value, right: Value) -> bool | Unclear:
     """Whether two values are equal; unclear if that rests on a part which is unclear."""
     for side in (left, right):
-        if isinstance(side, syntax.Unclear):
+        if isinstance(side, Unclear):
             return side
     one, other = _parts(left), _parts(right)
     if one is None or other is None or len(one) != len(other):
         alike = _sort(left) is _sort(right)  # others languages refuse, or convert
-        return left == right if alike else syntax.Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
+        return left == right if alike else Unclear(f"{syntax.shown(left)} == {syntax.shown(right)}")
     found = [_equal(*pair) for pair in zip(one, other)]
-    return False if False in found else next((each for each in found if isinstance(each, syntax.Unclear)), True)
+    return False if False in found else next((each for each in found if isinstance(each, Unclear)), True)
 
 
-def _sort(value: syntax.Value) -> type:
+def _sort(value: Value) -> type:
     """The type of a value; whole numbers and others are one."""
     return float if syntax.number(value) is not None else type(value)
 
 
-def _parts(value: syntax.Value) -> tuple[syntax.Value, ...] | None:
+def _parts(value: Value) -> tuple[Value, ...] | None:
     """The parts of a list or record, in their order; None of other values."""
-    if isinstance(value, syntax.Record):
+    if isinstance(value, Record):
         return value.values()
     return value if isinstance(value, tuple) else None
 
 
-def _unary(sign: str, value: syntax.Value) -> syntax.Value:
-    if isinstance(value, syntax.Unclear):
+def _unary(sign: str, value: Value) -> Value:
+    if isinstance(value, Unclear):
         return value
     if sign in ("NOT", "not", "!"):
-        return not value if isinstance(value, bool) else syntax.Unclear(f"{sign} ...")
+        return not value if isinstance(value, bool) else Unclear(f"{sign} ...")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return syntax.Unclear(f"{sign} ...")
+        return Unclear(f"{sign} ...")
     return -value if sign == "-" else value
 
 
-def variable_of(target: syntax.Expression | None) -> str:
+def variable_of(target: Expression | None) -> str:
     """The variable that an assignment changes.
 
     Parameters
@@ -822,6 +826,6 @@ def variable_of(target: syntax.Expression | None) -> str:
     -------
     name : empty for any other expression
     """
-    while isinstance(target, (syntax.Member, syntax.Element)):
+    while isinstance(target, (Member, Element)):
         target = target.of
-    return target.name if isinstance(target, syntax.Variable) else ""
+    return target.name if isinstance(target, Variable) else ""

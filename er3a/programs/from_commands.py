@@ -7,20 +7,32 @@ from itertools import pairwise
 from typing import assert_never
 
 import numpy as np
-import scipy
 
-from er3a.finding import fact
+from er3a.finding import Finding, fact
+from er3a.geometry.transforms import rotation_angle
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.planning import commands
 from er3a.planning.moves import line, rotation_between
 from er3a.planning.profiles import LegTimes, Times
 from er3a.planning.sequences import TURN_LENGTH, arc
-from er3a.programs import instructions
-from er3a.programs.program_findings import WriteFinding
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Instruction,
+    JointTarget,
+    Listing,
+    Load,
+    MotionKind,
+    NamedFrame,
+    Pause,
+    PoseTarget,
+    Rate,
+    Zone,
+)
 from er3a.robots.robot import Robot
 
-TO_START = instructions.Rate(0.1, "share")
+TO_START = Rate(0.1, "share")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +44,9 @@ class PathListing:
     start : (n,), rad, its first target
     """
 
-    listing: instructions.Listing
+    listing: Listing
     start: Reals
-    findings: tuple[WriteFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 def listing_of(
@@ -45,7 +57,7 @@ def listing_of(
     title: str = "",
     *,
     ends: Reals | None = None,
-    load: instructions.Load | None = None,
+    load: Load | None = None,
 ) -> PathListing:
     """A path's command as a sequence that begins with a joint motion to its start.
 
@@ -59,19 +71,15 @@ def listing_of(
     making = _Making(robot, start, load)
     match command:
         case commands.JointMoveCommand():
-            making.joints(command.end[None], np.array([command.duration]), [instructions.FINE])
+            making.joints(command.end[None], np.array([command.duration]), [FINE])
         case commands.JointSequenceCommand():
             points = command.points[1:]
-            zones = [instructions.Zone("angle", command.blend)] * (len(points) - 1) + [instructions.FINE]
+            zones = [Zone("angle", command.blend)] * (len(points) - 1) + [FINE]
             making.joints(points, _shared(_joint_sizes(command.points), command.duration), _plain(zones))
         case commands.JointTableCommand():
             points = command.points[1:]
-            zone = (
-                instructions.Zone("angle", command.blend)
-                if command.blend is not None
-                else instructions.Zone("named", 0.0, "half")
-            )
-            zones = [zone] * (len(points) - 1) + [instructions.FINE]
+            zone = Zone("angle", command.blend) if command.blend is not None else Zone("named", 0.0, "half")
+            zones = [zone] * (len(points) - 1) + [FINE]
             making.halts = _halts(command.timing, len(points))
             making.joints(points, _row_times(command.timing, _joint_sizes(command.points)), _plain(zones))
         case commands.ToolMoveCommand():
@@ -92,27 +100,25 @@ def listing_of(
         case _:
             assert_never(command)
     findings = (fact("written_half_turns_split", lines=making.split),) if making.split else ()
-    return PathListing(instructions.Listing(name, tuple(making.found), title), start, findings)
+    return PathListing(Listing(name, tuple(making.found), title), start, findings)
 
 
 class _Making:
     """Puts the instructions of a path together."""
 
-    def __init__(self, robot: Robot, start: Reals, load: instructions.Load | None):
+    def __init__(self, robot: Robot, start: Reals, load: Load | None):
         self.tool, self.base, self.load = (
-            instructions.NamedFrame("", robot.tool),
-            instructions.NamedFrame("", np.eye(4)),
+            NamedFrame("", robot.tool),
+            NamedFrame("", np.eye(4)),
             load,
         )
         self.to_robot = np.linalg.inv(robot.base)
         self.pose: Reals = self.to_robot @ forward(robot, start)
-        self.found: list[instructions.Instruction] = [
-            self._motion("joint", instructions.JointTarget(start), TO_START, instructions.FINE)
-        ]
+        self.found: list[Instruction] = [self._motion("joint", JointTarget(start), TO_START, FINE)]
         self.split = 0
         self.halts: dict[int, float] = {}
 
-    def joints(self, points: Reals, times: Reals, zones: list[instructions.Zone]) -> None:
+    def joints(self, points: Reals, times: Reals, zones: list[Zone]) -> None:
         """Add joint motions to points.
 
         Parameters
@@ -122,10 +128,8 @@ class _Making:
         zones : (k) of them; a point at which a timed table rests is a stop
         """
         for i, (point, seconds, zone) in enumerate(zip(points, times, zones)):
-            blend = instructions.FINE if i in self.halts else zone
-            self.found.append(
-                self._motion("joint", instructions.JointTarget(point), instructions.Rate(float(seconds), "s"), blend)
-            )
+            blend = FINE if i in self.halts else zone
+            self.found.append(self._motion("joint", JointTarget(point), Rate(float(seconds), "s"), blend))
             self._rest(i)
 
     def sizes(self, parts: tuple[commands.SegmentCommand, ...]) -> Reals:
@@ -142,7 +146,7 @@ class _Making:
         found, pose = [], self.pose
         for part in parts:
             end = self.to_robot @ part.end
-            turn = float(np.linalg.norm(_turn(pose, end)))
+            turn = float(rotation_angle(pose[:3, :3], end[:3, :3]))
             found.append(max(float(np.linalg.norm(end[:3, 3] - pose[:3, 3])), TURN_LENGTH * turn))
             pose = end
         return np.array(found)
@@ -161,21 +165,17 @@ class _Making:
         times = timing if isinstance(timing, np.ndarray) else _shared(self.sizes(parts), timing)
         for i, part in enumerate(parts):
             end = self.to_robot @ part.end
-            zone = (
-                instructions.Zone("distance", part.blend)
-                if part.blend > 0 and i not in self.halts
-                else instructions.FINE
-            )
+            zone = Zone("distance", part.blend) if part.blend > 0 and i not in self.halts else FINE
             self._segment(part, end, float(times[i]), zone, None if ends is None else ends[i])
             self.pose = end
             self._rest(i)
 
     def _rest(self, number: int) -> None:
         if number in self.halts:
-            self.found.append(instructions.Pause(self.halts[number]))
+            self.found.append(Pause(self.halts[number]))
 
     def _segment(
-        self, part: commands.SegmentCommand, end: Reals, seconds: float, zone: instructions.Zone, joints: Reals | None
+        self, part: commands.SegmentCommand, end: Reals, seconds: float, zone: Zone, joints: Reals | None
     ) -> None:
         """A line or an arc; one with half a turn as two halves of it, so that its sense is fixed."""
         here, halves = np.linalg.inv(self.to_robot) @ self.pose, [(1.0, end, zone, joints)]
@@ -184,26 +184,24 @@ class _Making:
         shape = line(here, part.end, 1.0, axis) if part.via is None else arc(here, part.via, part.end, 1.0, axis)
         if half_turn:
             self.split += 1
-            halves = [(0.5, self.to_robot @ shape.poses(np.array(0.5)), instructions.FINE, None), (0.5, *halves[0][1:])]
+            halves = [(0.5, self.to_robot @ shape.poses(np.array(0.5)), FINE, None), (0.5, *halves[0][1:])]
         for k, (share, target, stop, known) in enumerate(halves):
             via = None
             if part.via is not None:
                 at = part.via if not half_turn else shape.points(np.array(0.25 + 0.5 * k))
-                via = instructions.PoseTarget(_moved_to(target, (self.to_robot @ np.append(at, 1.0))[:3]))
-            goal, rate = instructions.PoseTarget(target, joints=known), instructions.Rate(share * seconds, "s")
+                via = PoseTarget(_moved_to(target, (self.to_robot @ np.append(at, 1.0))[:3]))
+            goal, rate = PoseTarget(target, joints=known), Rate(share * seconds, "s")
             self.found.append(self._motion("line" if via is None else "arc", goal, rate, stop, via))
 
     def _motion(
         self,
-        kind: instructions.MotionKind,
-        target: instructions.JointTarget | instructions.PoseTarget,
-        speed: instructions.Rate,
-        zone: instructions.Zone,
-        via: instructions.PoseTarget | None = None,
-    ) -> instructions.ArmMotion:
-        return instructions.ArmMotion(
-            kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load
-        )
+        kind: MotionKind,
+        target: JointTarget | PoseTarget,
+        speed: Rate,
+        zone: Zone,
+        via: PoseTarget | None = None,
+    ) -> ArmMotion:
+        return ArmMotion(kind, target, via=via, speed=speed, zone=zone, tool=self.tool, base=self.base, load=self.load)
 
 
 def _moved_to(pose: Reals, point: Reals) -> Reals:
@@ -213,9 +211,9 @@ def _moved_to(pose: Reals, point: Reals) -> Reals:
     return found
 
 
-def _plain(zones: list[instructions.Zone]) -> list[instructions.Zone]:
+def _plain(zones: list[Zone]) -> list[Zone]:
     """Zones of no size are stops."""
-    return [instructions.FINE if zone.kind == "angle" and zone.value <= 0 else zone for zone in zones]
+    return [FINE if zone.kind == "angle" and zone.value <= 0 else zone for zone in zones]
 
 
 def _joint_sizes(points: Reals) -> Reals:
@@ -246,8 +244,3 @@ def _halts(timing: float | Times, count: int) -> dict[int, float]:
         return {}
     rests = {i: float(np.ptp(timing.times[timing.corner == i + 1])) for i in range(count)}
     return {i: seconds for i, seconds in rests.items() if seconds > 0}
-
-
-def _turn(start: Reals, end: Reals) -> Reals:
-    found: Reals = scipy.spatial.transform.Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-    return found

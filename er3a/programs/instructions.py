@@ -45,6 +45,7 @@ Unresolved = Literal[
     "external_tool",
     "not_understood",
     "too_many_joints",
+    "arc_angle",
 ]
 
 
@@ -83,6 +84,13 @@ class Rate:
     value: float
     unit: RateUnit
     text: str = ""
+
+    @property
+    def refused(self) -> float | None:
+        """The number that the program gives and no controller takes, in the program's unit; None if there is none."""
+        number = self.text.rpartition("=")[2]
+        known = self.value <= 0 and number.lstrip("+-").replace(".", "", 1).isdecimal()
+        return float(number) if known else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +219,6 @@ class ArmMotion(ByValue):
     kind : how the arm gets to the target: joints together, straight line, arc through ``via``
     form : the language's own word: ``PTP``, ``SLIN``, ``movep``, ``MJOINT``
     via : point on the arc
-    angle : rad, by which the arc goes on (KRL's CA); None if it ends at the target
     speed, acceleration : None where the program keeps the controller's values
     turn_speed : rad/s, at most, of the tool's turn on a line or arc; None if the program gives none: then turns count
         as lengths do
@@ -226,7 +233,6 @@ class ArmMotion(ByValue):
     target: Target
     form: str = ""
     via: Target | None = None
-    angle: float | None = None
     speed: Rate | None = None
     acceleration: Rate | None = None
     zone: Zone = FINE
@@ -262,13 +268,6 @@ class Remark:
 
 
 @dataclass(frozen=True, slots=True)
-class Disabled:
-    """An instruction that is switched off; it does nothing."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Aside:
     """An instruction that is known to move nothing, such as a message or a load."""
 
@@ -294,7 +293,7 @@ class Decision:
     taken: bool
 
 
-Instruction = ArmMotion | Pause | Output | Remark | Disabled | Aside | Unknown | Decision
+Instruction = ArmMotion | Pause | Output | Remark | Aside | Unknown | Decision
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,32 +6,102 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.finding import fact, is_one
-from er3a.programs.csv_program import CSV
-from er3a.programs.instructions import ArmMotion, JointTarget, Listing
-from er3a.programs.krl.language import KRL
+from er3a.programs.csv_program import read_csv_program
+from er3a.programs.evaluation import MAX_ROBOT_AXES, Dialect
+from er3a.programs.instructions import JointTarget, Listing
+from er3a.programs.krl.dialect import KrlDialect
+from er3a.programs.krl.reader import companions as krl_files
+from er3a.programs.krl.reader import read_krl
+from er3a.programs.krl.writer import KrlWriter
 from er3a.programs.lexing import ProgramText, read_program_text
-from er3a.programs.program_language import Language
 from er3a.programs.program_names import LanguageName
-from er3a.programs.rapid.language import RAPID
-from er3a.programs.rpl.language import RPL, XPL
-from er3a.programs.syntax import Fixed, Move, Program
-from er3a.programs.urscript.language import URSCRIPT
-from er3a.programs.writing import WriteOptions, WrittenProgram
+from er3a.programs.rapid.dialect import RapidDialect
+from er3a.programs.rapid.reader import SUFFIXES as RAPID_SUFFIXES
+from er3a.programs.rapid.reader import modules_of, read_rapid
+from er3a.programs.rapid.writer import RapidWriter
+from er3a.programs.rpl.dialect import RplDialect
+from er3a.programs.rpl.reader import companions as rpl_files
+from er3a.programs.rpl.reader import read_rpl
+from er3a.programs.rpl.writer import RplWriter, XplWriter
+from er3a.programs.rpl.xml_reader import read_xpl
+from er3a.programs.syntax import Program
+from er3a.programs.urscript.dialect import UrScriptDialect
+from er3a.programs.urscript.reader import read_urscript
+from er3a.programs.urscript.writer import UrScriptWriter
+from er3a.programs.writing import WriteOptions, Writer, WrittenProgram
 from er3a.robots.robot import Robot
 
+
+@dataclass(frozen=True)
+class Language:
+    """A language of robot programs.
+
+    Attributes
+    ----------
+    title : what it is called
+    suffixes : of its files, the usual one first, in small letters
+    sign : a regular expression that texts of the language match; empty where the opening alone decides
+    opening : with what all its texts begin, and those of no other language
+    dialect : the meaning of its expressions, motions and functions when a program runs
+    writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
+    joints : how many joint angles a target can have; None for any number, of prismatic joints too
+    points : suffix of the file with a program's points, where they stand in one of their own
+    contents : suffix of a file that only lists a program's modules
+    companions : what finds the files that belong to a program: modules that it calls, points, the controller's data
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    sign: str
+    reader: Callable[[ProgramText], Program]
+    dialect: Callable[[], Dialect]
+    writer: Callable[[Listing, WriteOptions], Writer] | None
+    joints: range | None
+    opening: str = ""
+    points: str = ""
+    contents: str = ""
+    companions: Callable[[Path], tuple[Path, ...]] = lambda path: ()
+
+
+KRL_SIGN = r"(?im)^\s*(?:&ACCESS|(?:GLOBAL\s+)?DEF(?:FCT)?\s+[\w$\[\]\s]*\([^)]*\)\s*(?:;.*)?$|(?:S?PTP|S?LIN)\s+[{X])"
+UR_SIGN = r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()"
+RPL_SIGN = r"(?m)\bM(?:JOINT|LIN)\s*\(|:=|^\s*END_\w+\s*;"
+RAPID_SIGN = r"(?im)^\s*(?:%%%\s*$|MODULE\s+\w+|(?:LOCAL\s+)?PROC\s+\w+\s*\(|(?:CONST|PERS|VAR)\s+\w+\s+\w+.*:=\s*\[)"
+CSV_SIGN = r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*[,;\t]"
+SIX = range(6, 7)
+UP_TO_SIX = range(1, MAX_ROBOT_AXES + 1)  # A1 to A6; E1 to E6 are axes beside the arm
 LANGUAGES: dict[LanguageName, Language] = {
-    "krl": KRL,
-    "urscript": URSCRIPT,
-    "rpl": RPL,
-    "xpl": XPL,
-    "rapid": RAPID,
-    "csv": CSV,
+    "krl": Language(
+        "KRL",
+        (".src", ".sub"),
+        KRL_SIGN,
+        read_krl,
+        KrlDialect,
+        KrlWriter,
+        UP_TO_SIX,
+        points=".dat",
+        companions=krl_files,
+    ),
+    "urscript": Language(
+        "URScript", (".script", ".urscript"), UR_SIGN, read_urscript, UrScriptDialect, UrScriptWriter, SIX
+    ),
+    "rpl": Language(
+        "RPL", (".pgm",), RPL_SIGN, read_rpl, RplDialect, RplWriter, SIX, points=".var", companions=rpl_files
+    ),
+    "xpl": Language("XPL", (".xpl",), "", read_xpl, RplDialect, XplWriter, SIX, opening="<"),
+    "rapid": Language(
+        *("RAPID", RAPID_SUFFIXES, RAPID_SIGN, read_rapid, RapidDialect, RapidWriter, SIX),
+        contents=".pgf",
+        companions=modules_of,
+    ),
+    "csv": Language("CSV", (".csv",), CSV_SIGN, read_csv_program, RplDialect, None, None),
 }
 """Languages by name, in the order in which their signs are looked for."""
 SUFFIXES: dict[str, LanguageName] = {suffix: name for name, each in LANGUAGES.items() for suffix in each.suffixes}
@@ -54,8 +124,11 @@ def read_program(path: str | Path) -> Program:
             remedy = f"Give its {each.suffixes[0]} file"
             raise InputError(path, None, f"{held} of a program, not the program", remedy)
     source = read_program_text(path)
-    program = LANGUAGES[language_of(source)].reader(source)
-    if not _moves(program) and not any(is_one(each, "program_nothing_moves") for each in program.findings):
+    try:
+        program = LANGUAGES[language_of(source)].reader(source)
+    except RecursionError:
+        raise InputError(path, None, "is nested too deeply", "Split its longest lines") from None
+    if not program.motions() and not any(is_one(each, "program_nothing_moves") for each in program.findings):
         program = replace(program, findings=(*program.findings, fact("program_nothing_moves")))
     return program
 
@@ -74,8 +147,8 @@ def language_of(source: ProgramText) -> LanguageName:
     opened = next((name for name, each in LANGUAGES.items() if each.opening and text.startswith(each.opening)), None)
     if opened is not None:
         return opened
-    shown = [name for name, each in LANGUAGES.items() if each.sign and each.sign.search(source.text)]
-    if named is not None and (named in shown or not shown or LANGUAGES[named].sign is None):
+    shown = [name for name, each in LANGUAGES.items() if each.sign and re.search(each.sign, source.text)]
+    if named is not None and (named in shown or not shown or not LANGUAGES[named].sign):
         return named
     if not shown:
         raise InputError(source.path, None, "is not a known robot program", f"Give one in {KNOWN}")
@@ -97,13 +170,6 @@ def files_of(path: Path) -> tuple[Path, ...]:
         return (path, *LANGUAGES[language_of(read_program_text(path))].companions(path))
     except InputError:
         return (path,)
-
-
-def _moves(program: Program) -> bool:
-    return any(
-        isinstance(each, Move) or (isinstance(each, Fixed) and isinstance(each.instruction, ArmMotion))
-        for each in program.operations()
-    )
 
 
 def write_program(listing: Listing, language: LanguageName, options: WriteOptions | None = None) -> WrittenProgram:

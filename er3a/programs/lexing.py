@@ -26,36 +26,14 @@ class MisreadError(Exception):
     """A statement that does not follow the grammar; it never leaves this package."""
 
 
-class MoreError(MisreadError):
-    """Another statement follows on the line."""
+def ranked(*levels: str) -> dict[str, int]:
+    """Ranks of operators, from 1.
 
-    def __init__(self, at: int):
-        super().__init__("another statement follows")
-        self.at = at
-
-
-@dataclass(frozen=True)
-class Lexicon:
-    """How a language is spelled.
-
-    Attributes
+    Parameters
     ----------
-    pattern : with the groups ``number``, ``text``, ``name`` and ``mark``; what lies between words is skipped
-    ranks : of operators of two operands, from 1; the higher binds tighter
-    right : operators that stand before one operand, with the rank of what they take
-    constants : names that are values, in capital letters
-    folds : whether ``a`` and ``A`` are one name
-    fields : names that are never a module's own, such as those of coordinates
-    counts_down : whether a loop counts down by itself where its first value is the greater one
+    levels : operators with blanks between them; those of a later level bind tighter
     """
-
-    pattern: re.Pattern[str]
-    ranks: Mapping[str, int]
-    right: Mapping[str, int]
-    constants: Mapping[str, bool]
-    folds: bool = False
-    fields: frozenset[str] = frozenset()
-    counts_down: bool = False
+    return {sign: rank for rank, level in enumerate(levels, 1) for sign in level.split()}
 
 
 Names = Mapping[str, str]
@@ -64,34 +42,49 @@ NO_NAMES: Names = {}
 
 
 class Words:
-    """The words of a statement, read one after another.
+    """The words of a statement, read one after another; a language says how it is spelled.
 
     Parameters
     ----------
     names : other names that the program has for some
+
+    Attributes
+    ----------
+    pattern : with the groups ``number``, ``text``, ``name`` and ``mark``; what lies between words is skipped
+    ranks : of operators of two operands, from 1; the higher binds tighter
+    right : operators that stand before one operand, with the rank of what they take
+    folds : whether ``a`` and ``A`` are one name
+    fields : names that are never a module's own, such as those of coordinates
+    counts_down : whether a loop counts down by itself where its first value is the greater one
     """
 
-    def __init__(self, lexicon: Lexicon, text: str, names: Names = NO_NAMES):
-        self.lexicon, self.text = lexicon, text
+    pattern: re.Pattern[str]
+    ranks: Mapping[str, int]
+    right: Mapping[str, int]
+    folds = False
+    fields: frozenset[str] = frozenset()
+    counts_down = False
+
+    def __init__(self, text: str, names: Names = NO_NAMES):
+        self.text = text
         self.kinds: list[str] = []
         self.texts: list[str] = []
         self.at, self._depth, self._length = 0, 0, 0
-        folds = lexicon.folds
-        for match in lexicon.pattern.finditer(text):
+        for match in self.pattern.finditer(text):
             kind = match.lastgroup or ""
             self.kinds.append(kind)
-            self.texts.append(match.group().upper() if folds and kind == "name" else match.group())
+            self.texts.append(match.group().upper() if self.folds and kind == "name" else match.group())
         self.kinds.append("end")
         self.texts.append("")
         if names:
             self.texts = [
-                word if before in (".", "\\") or word in lexicon.fields else names.get(word, word)
+                word if before in (".", "\\") or word in self.fields else names.get(word, word)
                 for before, word in zip(("", *self.texts), self.texts)
             ]
 
     def offset(self) -> int:
         """Where in the text the next word begins."""
-        return [match.start() for match in self.lexicon.pattern.finditer(self.text)][self.at]
+        return [match.start() for match in self.pattern.finditer(self.text)][self.at]
 
     @property
     def kind(self) -> str:
@@ -174,19 +167,12 @@ class Words:
         Returns
         -------
         condition : :class:`Opaque` with its text if it is not understood
-
-        Raises
-        ------
-        MoreError
-            if another statement follows on the line
         """
         start = self.at
         try:
             found = self.expression()
             self.accept(end)
             self.finish()
-        except MoreError:
-            raise
         except MisreadError:
             texts = self.texts[start:-1]
             return Opaque(" ".join(texts[:-1] if texts and texts[-1] == end else texts))
@@ -212,7 +198,7 @@ class Words:
         if self._depth > DEEPEST:
             raise MisreadError("nested too deeply")
         found = self._unary()
-        ranks = self.lexicon.ranks
+        ranks = self.ranks
         while (binds := ranks.get(self.texts[self.at], 0)) >= rank and self.kinds[self.at] != "text":
             self._length += 1
             if self._length > LONGEST:
@@ -242,7 +228,7 @@ class Words:
         """
         placed: list[Expression | None] = []
         named: list[tuple[str, Expression]] = []
-        named_next = "=" not in self.lexicon.ranks
+        named_next = "=" not in self.ranks
         while not self.accept(close):
             if self.kind == "end":
                 raise MisreadError(f"'{close}' is missing")
@@ -271,8 +257,8 @@ class Words:
     def reference(self) -> Expression:
         """A name with the fields, indices and arguments after it."""
         name = self.take()
-        value = self.lexicon.constants.get(name.upper())
-        return self.parts_of(Variable(name)) if value is None else Constant(value)
+        value = name.upper()
+        return Constant(value == "TRUE") if value in ("TRUE", "FALSE") else self.parts_of(Variable(name))
 
     def parts_of(self, found: Expression) -> Expression:
         """An expression with the fields, indices and arguments after it.
@@ -306,9 +292,9 @@ class Words:
 
     def _unary(self) -> Expression:
         operator = self.texts[self.at]
-        if operator in self.lexicon.right and self.kinds[self.at] != "text":
+        if operator in self.right and self.kinds[self.at] != "text":
             self.take()
-            of = self.expression(self.lexicon.right[operator])
+            of = self.expression(self.right[operator])
             if operator in "+-" and isinstance(of, Constant) and isinstance(of.value, (int, float)):
                 return Constant(-of.value if operator == "-" else of.value)
             return Unary(operator, of)
@@ -458,7 +444,7 @@ def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Pa
 
 
 def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
-    """Text and encoding: by its mark, as UTF-8, as UTF-16 without a mark, as GBK, or as Windows-1252.
+    """Text and encoding: by its mark, as UTF-8, as GBK, or as Windows-1252.
 
     Raises
     ------
@@ -478,12 +464,6 @@ def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
         text = ""
     if text and "\x00" not in text:
         return text, "utf-8"
-    for encoding, zeros in (("utf-16-le", raw[1::2]), ("utf-16-be", raw[::2])):
-        if len(raw) % 2 == 0 and zeros.count(0) * 4 > len(raw):
-            try:
-                return raw.decode(encoding), encoding
-            except UnicodeDecodeError:
-                continue
     if text or not raw:
         return text, "utf-8"
     if all(len(run) % 2 == 0 for run in HIGH_RUNS.findall(raw)):

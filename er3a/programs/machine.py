@@ -19,10 +19,29 @@ from er3a.errors import InputError, ShapeError
 from er3a.geometry.transforms import check_poses
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, syntax
+from er3a.programs import syntax
 from er3a.programs.evaluation import Cell, Dialect, Position, ProgramMemory, root, variable_of
 from er3a.programs.execution import Ending, EndKind, Execution, Mover, RunLimits, Step
+from er3a.programs.instructions import ArmMotion, Aside, Decision, Instruction, Output, Pause, Place, Unknown
 from er3a.programs.languages import LANGUAGES, not_written
+from er3a.programs.syntax import (
+    Assign,
+    Branch,
+    Call,
+    Doing,
+    Expression,
+    GoTo,
+    Operation,
+    Program,
+    Return,
+    Routine,
+    RoutineParameter,
+    Unclear,
+    Unset,
+    Value,
+    Variable,
+    Waiting,
+)
 from er3a.robots.robot import Robot
 
 IN_ONE_PLACE = 8  # ways, before what differs between them becomes unknown
@@ -31,19 +50,19 @@ OTHERWISE = "%otherwise"  # what makes motions go otherwise, and is not followed
 UNKNOWN_ROUNDS = 12  # of a loop that only something unknown ends, before what it changes becomes unknown
 
 Where = tuple[tuple[str, int], ...]
-Values = dict[str, syntax.Value]
+Values = dict[str, Value]
 
 
 @dataclass(slots=True)
 class Frame:
     """A routine that runs."""
 
-    routine: syntax.Routine
+    routine: Routine
     at: int = 0
     local: Values = field(default_factory=dict)
-    calls: tuple[instructions.Place, ...] = ()
+    calls: tuple[Place, ...] = ()
     result: str = ""
-    outs: tuple[tuple[str, syntax.Expression], ...] = ()
+    outs: tuple[tuple[str, Expression], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +121,7 @@ class Way:
         for own, other in zip(self.values, others):
             for name in own.keys() | other.keys():
                 if name not in own or name not in other or own[name] != other[name]:
-                    own[name] = syntax.Unclear(name)
+                    own[name] = Unclear(name)
         if self.memory.here.key() != here:
             self.memory.here = Position()
 
@@ -115,9 +134,7 @@ class Machine:
     mover : solves motions, so that it is known where each leaves the arm; None to know what the program says alone
     """
 
-    def __init__(
-        self, program: syntax.Program, dialect: Dialect, cell: Cell, limits: RunLimits, mover: Mover | None = None
-    ):
+    def __init__(self, program: Program, dialect: Dialect, cell: Cell, limits: RunLimits, mover: Mover | None = None):
         self.program, self.dialect, self.cell, self.limits, self.mover = program, dialect, cell, limits, mover
         self.steps: list[Step] = []
         self.endings: list[Ending] = []
@@ -170,7 +187,7 @@ class Machine:
             for each in routines.values()
             if each.place.file == file and not each.thread and "@" not in each.name
         ]
-        called = {op.routine for each in own for op in routines[each].code if isinstance(op, syntax.Call)}
+        called = {op.routine for each in own for op in routines[each].code if isinstance(op, Call)}
         for name in (*(each for each in own if each not in called), *own):
             if name not in self.entered:
                 yield name
@@ -213,7 +230,7 @@ class Machine:
                 return
             self.budget -= 1
             operation = frame.routine.code[frame.at]
-            counts = isinstance(operation, syntax.Branch) and operation.counted
+            counts = isinstance(operation, Branch) and operation.counted
             # Ways meet where jumps lead to. One in a state in which another has been would only repeat that one.
             if frame.at in self.labels[frame.routine.name] and not (counts and self._is_known(way, operation)):
                 self.budget -= STATE_COST
@@ -228,7 +245,7 @@ class Machine:
             begun = True
             goes_on = self._step(way)
             if way.memory.outside:  # where the controller stops
-                beyond = instructions.Unknown(way.memory.outside, may_move=False, stops=True)
+                beyond = Unknown(way.memory.outside, may_move=False, stops=True)
                 self._note(way, operation.place, beyond)
                 way.memory.outside = ""
             if not goes_on:
@@ -243,36 +260,36 @@ class Machine:
         match operation:
             case syntax.Enter():
                 way.visits.pop(way.where, None)
-            case syntax.GoTo(to=to):
+            case GoTo(to=to):
                 frame.at = to
                 if to <= at:
                     self._round(way, at)
-            case syntax.Branch():
+            case Branch():
                 return self._branch(way, frame, operation, at)
-            case syntax.Call():
+            case Call():
                 if len(way.frames) > self.limits.depth:
                     self._end(way, "depth", operation.place)
                     return False
                 self._call(way, operation)
-            case syntax.Return(ends=False) if len(way.frames) > 1:
+            case Return(ends=False) if len(way.frames) > 1:
                 self._return(way, operation)
-            case syntax.Return():
+            case Return():
                 self._end(way, "end")
                 return False
             case _:
                 self._carry_out(way, operation)
         return True
 
-    def _is_known(self, way: Way, operation: syntax.Operation) -> bool:
+    def _is_known(self, way: Way, operation: Operation) -> bool:
         """Whether it is known which side of a branch is taken."""
-        return isinstance(operation, syntax.Branch) and isinstance(way.memory.value(operation.condition), bool)
+        return isinstance(operation, Branch) and isinstance(way.memory.value(operation.condition), bool)
 
     def _round(self, way: Way, end: int) -> None:
         """A loop's next round, whose last operation is number ``end``: after too many what it changes is unknown, but
         not while the loop's own condition is known."""
         frame = way.frames[-1]
         head = frame.routine.code[frame.at]
-        if isinstance(head, syntax.Branch) and head.otherwise > end and self._is_known(way, head):
+        if isinstance(head, Branch) and head.to > end and self._is_known(way, head):
             return
         last = way.visits.get(way.where)
         rounds, unknown = (last.rounds, last.unknown) if last else (0, 0)
@@ -282,37 +299,37 @@ class Machine:
         values = tuple(dict(each) for each in way.values)
         way.visits[way.where] = Visit(rounds + 1, unknown, way.decisions, values, way.memory.here.key())
 
-    def _carry_out(self, way: Way, operation: syntax.Operation) -> None:
+    def _carry_out(self, way: Way, operation: Operation) -> None:
         memory = way.memory
-        done: instructions.Instruction | None = None
+        done: Instruction | None = None
         match operation:
             case syntax.Move():
                 self._move(way, operation.place, self.dialect.motion(memory, operation))
             case syntax.Fixed(instruction=instruction):
-                if isinstance(instruction, instructions.ArmMotion):
+                if isinstance(instruction, ArmMotion):
                     self._move(way, operation.place, instruction)
                 else:
                     done = instruction
-            case syntax.Assign():
+            case Assign():
                 done = self._assign(memory, operation)
-            case syntax.Waiting():
+            case Waiting():
                 done = _pause(memory, operation)
-            case syntax.Doing():
+            case Doing():
                 done = self._do(memory, operation)
-                done = None if operation.within and isinstance(done, instructions.Aside) else done
+                done = None if operation.within and isinstance(done, Aside) else done
         if done is None:
             return
         self._note(way, operation.place, done)
-        if isinstance(done, instructions.Unknown) and done.may_move:
+        if isinstance(done, Unknown) and done.may_move:
             memory.lost(done.text)
-        if isinstance(done, instructions.Unknown) and done.shapes:
+        if isinstance(done, Unknown) and done.shapes:
             memory.shared[OTHERWISE] = done.text
 
-    def _do(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
+    def _do(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """A call of a function that is not in the program; what it is given by reference has no known value then."""
         name = doing.what.function
         if any(fnmatchcase(name.lower(), pattern.lower()) for pattern in self.limits.assumed):
-            return instructions.Aside(doing.text)
+            return Aside(doing.text)
         done = self.dialect.carry_out(memory, doing)
         if self.dialect.by_reference and name not in self.dialect.reading and name[0] != "%":
             for each in doing.what.arguments:
@@ -320,7 +337,7 @@ class Machine:
                     memory.forget(variable)
         return done
 
-    def _move(self, way: Way, place: instructions.Place, motion: instructions.ArmMotion) -> None:
+    def _move(self, way: Way, place: Place, motion: ArmMotion) -> None:
         """Carry a motion out: where it leaves the arm is what the program says, or what solving it says."""
         memory = way.memory
         if (otherwise := memory.shared.get(OTHERWISE)) is not None:
@@ -332,56 +349,52 @@ class Machine:
             known = moved.end is not None
             memory.here = replace(memory.here, joints=moved.end, pose=memory.here.pose if known else None)
 
-    def _note(
-        self, way: Way, place: instructions.Place, instruction: instructions.Instruction, moved: object = None
-    ) -> None:
+    def _note(self, way: Way, place: Place, instruction: Instruction, moved: object = None) -> None:
         self.steps.append(Step(instruction, place, way.frames[-1].calls, way.step, way.entry, moved))
         way.step = len(self.steps) - 1
 
-    def _end(
-        self, way: Way, kind: EndKind, place: instructions.Place | None = None, follows: int | None = None
-    ) -> None:
+    def _end(self, way: Way, kind: EndKind, place: Place | None = None, follows: int | None = None) -> None:
         """``follows``: the step after which another way goes on as this one does."""
         code, at = way.frames[-1].routine.code, way.frames[-1].at
         self.endings.append(Ending(kind, way.step, place or code[min(at, len(code) - 1)].place, follows, way.entry))
 
-    def _assign(self, memory: ProgramMemory, each: syntax.Assign) -> instructions.Instruction | None:
-        if each.type_name and isinstance(each.target, syntax.Variable):
+    def _assign(self, memory: ProgramMemory, each: Assign) -> Instruction | None:
+        if each.type_name and isinstance(each.target, Variable):
             memory.declare(each.target.name, each.type_name, each.local, each.sizes)
         if each.value is None:
-            if isinstance(each.target, syntax.Variable) and each.target.name not in memory.local:
-                memory.write(each.target.name, syntax.Unset(each.target.name), each.local)
+            if isinstance(each.target, Variable) and each.target.name not in memory.local:
+                memory.write(each.target.name, Unset(each.target.name), each.local)
             return None
         value = memory.value(each.value)
         key = memory.key(each.target)
         name = key or memory.shown(each.target)
         if name.startswith(self.dialect.signals):  # which others may set too
-            return instructions.Output(name, syntax.shown(value))
+            return Output(name, syntax.shown(value))
         if key is None and memory.outside:  # where the controller stops: nothing is set
             return None
-        if not self.dialect.reads_back(name):
-            memory.write(name, syntax.Unclear(name))
+        if root(name) in self.dialect.running:
+            memory.write(name, Unclear(name))
         else:
             declared = each.type_name == "global" or not self.dialect.local_by_default
             memory.assign(each.target, value, each.local or (not declared and _is_new(memory, name)))
         if name in self.dialect.frames:
             of = memory.key(each.value) if isinstance(each.value, syntax.Element) else None
             memory.write(name + "%name", of or each.text.partition("=")[2].strip())
-        return None if self.dialect.is_followed(name) else instructions.Unknown(each.text, False, shapes=True)
+        return None if self.dialect.is_followed(name) else Unknown(each.text, False, shapes=True)
 
-    def _branch(self, way: Way, frame: Frame, branch: syntax.Branch, at: int) -> bool:
+    def _branch(self, way: Way, frame: Frame, branch: Branch, at: int) -> bool:
         """Go on, on the side that the condition chooses, or on both."""
         holds = way.memory.value(branch.condition)
         if isinstance(holds, bool):
             if not holds:
-                frame.at = branch.otherwise
+                frame.at = branch.to
             return True
         way.decisions += 1
         other = way.fork()
-        other.frames[-1].at = branch.otherwise
-        self._note(way, branch.place, instructions.Decision(branch.text, True))
-        self._note(other, branch.place, instructions.Decision(branch.text, False))
-        if branch.otherwise <= at:
+        other.frames[-1].at = branch.to
+        self._note(way, branch.place, Decision(branch.text, True))
+        self._note(other, branch.place, Decision(branch.text, False))
+        if branch.to <= at:
             self._round(other, at)
         if len(self.pending) + 1 >= self.limits.ways:
             by_place: dict[Where, list[Way]] = {}
@@ -394,7 +407,7 @@ class Machine:
             self._end(other, "ways", branch.place)
         return True
 
-    def _call(self, way: Way, call: syntax.Call) -> None:
+    def _call(self, way: Way, call: Call) -> None:
         routine, memory = self.program.routines[call.routine], way.memory
         given = _given(routine, call)
         local = self._locals(routine, given, memory)
@@ -405,28 +418,28 @@ class Machine:
         memory.local = local
         memory.kept.clear()
 
-    def _return(self, way: Way, operation: syntax.Return) -> None:
+    def _return(self, way: Way, operation: Return) -> None:
         memory, frame = way.memory, way.frames.pop()
-        value: syntax.Value = syntax.Unclear(f"{frame.routine.name}(), which returns nothing")
+        value: Value = Unclear(f"{frame.routine.name}(), which returns nothing")
         if operation.value is not None:
             value = memory.typed(syntax.RETURNED, memory.value(operation.value))
         memory.local = way.frames[-1].local
         memory.kept.clear()
         for name, target in frame.outs:
-            memory.assign(target, frame.local.get(name, syntax.Unclear(name)))
+            memory.assign(target, frame.local.get(name, Unclear(name)))
         if frame.result:
             memory.write(frame.result, value, local=True)
 
     def _locals(
         self,
-        routine: syntax.Routine,
-        given: list[tuple[syntax.RoutineParameter, syntax.Expression]],
+        routine: Routine,
+        given: list[tuple[RoutineParameter, Expression]],
         memory: ProgramMemory,
     ) -> Values:
         """Variables of a routine that begins."""
         values = {parameter.name: memory.value(each) for parameter, each in reversed(given)}
         for each in routine.parameters:
-            usual = syntax.Unset(each.name) if each.default is None else memory.value(each.default)
+            usual = Unset(each.name) if each.default is None else memory.value(each.default)
             values.setdefault(each.name, usual)
         return {"%inside": True, **values}
 
@@ -437,39 +450,37 @@ class Machine:
         return tuple(values), way.memory.here.key()
 
 
-def _labels(routine: syntax.Routine) -> frozenset[int]:
+def _labels(routine: Routine) -> frozenset[int]:
     """Where jumps of a routine lead to."""
-    jumps = (each.to for each in routine.code if isinstance(each, syntax.GoTo))
-    branches = (each.otherwise for each in routine.code if isinstance(each, syntax.Branch))
-    return frozenset((*jumps, *branches))
+    return frozenset(each.to for each in routine.code if isinstance(each, GoTo | Branch))
 
 
-def _counts(program: syntax.Program) -> set[str]:
+def _counts(program: Program) -> set[str]:
     """Variables that are computed from themselves, and on which nothing else depends, such as counts of parts."""
     found: set[str] = set()
     read = {parameter.name for routine in program.routines.values() for parameter in routine.parameters}
     for operation in program.operations():
-        own = variable_of(operation.target) if isinstance(operation, syntax.Assign) else ""
-        inside = syntax.parts(operation.value if isinstance(operation, syntax.Assign) and own else operation)
-        names = {root(each.name) for each in inside if isinstance(each, syntax.Variable)}
+        own = variable_of(operation.target) if isinstance(operation, Assign) else ""
+        inside = syntax.parts(operation.value if isinstance(operation, Assign) and own else operation)
+        names = {root(each.name) for each in inside if isinstance(each, Variable)}
         found |= names & {own}
         read |= names - {own}
     return found - read
 
 
-def _changed(program: syntax.Program) -> Iterator[syntax.Expression]:
+def _changed(program: Program) -> Iterator[Expression]:
     """What the program's routines assign to, or give to others to set."""
     for operation in program.operations():
-        if isinstance(operation, syntax.Assign):
+        if isinstance(operation, Assign):
             yield operation.target
-        elif isinstance(operation, syntax.Call):
+        elif isinstance(operation, Call):
             given = _given(program.routines[operation.routine], operation)
             yield from (each for parameter, each in given if parameter.out)
-        elif isinstance(operation, syntax.Doing):
+        elif isinstance(operation, Doing):
             yield from (each for each in operation.what.arguments if each is not None)
 
 
-def _given(routine: syntax.Routine, call: syntax.Call) -> list[tuple[syntax.RoutineParameter, syntax.Expression]]:
+def _given(routine: Routine, call: Call) -> list[tuple[RoutineParameter, Expression]]:
     """Parameters of a routine with their arguments, those by place first."""
     places = [each for each in routine.parameters if not each.named]
     by_name = {each.name: each for each in routine.parameters}
@@ -483,17 +494,17 @@ def _is_new(memory: ProgramMemory, name: str) -> bool:
     return start not in memory.shared and start not in memory.local and memory.local.get("%inside") is True
 
 
-def _pause(memory: ProgramMemory, waiting: syntax.Waiting) -> instructions.Pause:
+def _pause(memory: ProgramMemory, waiting: Waiting) -> Pause:
     if waiting.kind == "operator":
-        return instructions.Pause()
+        return Pause()
     seconds = syntax.number(memory.value(waiting.of)) if waiting.kind == "seconds" and waiting.of else None
     if seconds is not None and seconds >= 0:
-        return instructions.Pause(seconds)
-    return instructions.Pause(condition=waiting.text)
+        return Pause(seconds)
+    return Pause(condition=waiting.text)
 
 
 def execute(
-    program: syntax.Program,
+    program: Program,
     robot: Robot | None = None,
     start: Reals | None = None,
     frames: Mapping[str, Reals] | None = None,
@@ -536,7 +547,7 @@ def execute(
     return Machine(program, dialect, cell, limits or RunLimits(), mover).run()
 
 
-def _not_meant(program: syntax.Program, robot: Robot) -> str:
+def _not_meant(program: Program, robot: Robot) -> str:
     """Why a program is none of an arm's; empty if it is."""
     if not program.slides:
         return not_written(program.language, robot)

@@ -14,8 +14,8 @@ from er3a.kinematics.singularity import factors_where_defined
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.moves import Segment, line
 from er3a.planning.sequences import arc
-from er3a.programs import instructions
 from er3a.programs.evaluation import Position
+from er3a.programs.instructions import ArmMotion, JointTarget, MeantSolution, NamedFrame, PoseTarget, UnresolvedTarget
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 
@@ -25,7 +25,7 @@ WIDE_STEP = 0.15  # rad or m, of a joint from one pose to the next, which are ne
 ON_POSE = 1e-6  # m, and of the elements of a rotation matrix
 AT_A_CHANGE = math.radians(1.0)
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
-Frames = tuple[instructions.NamedFrame, instructions.NamedFrame]
+Frames = tuple[NamedFrame, NamedFrame]
 
 
 def way_of(start: Reals, via: Reals | None, end: Reals) -> Segment | None:
@@ -90,7 +90,7 @@ def _nearest(robot: Robot, solutions: Reals, q: Reals) -> Reals | None:
     return found
 
 
-def solutions_meant(branch: instructions.MeantSolution, robot: Robot, rows: Reals) -> Flags:
+def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
     """Which of joint vectors (k, n) in rad, solutions of one target, are meant: (k,).
 
     Where none is exactly, joints within ``AT_A_CHANGE`` of where their sign or quarter changes belong to both sides:
@@ -130,10 +130,10 @@ class Resolver:
         arm = self.arm
         self.flange = None if arm is None else lambda joints: forward(arm, joints)
         self.start, self.here = start, Position(start)
-        self.motions: list[tuple[instructions.ArmMotion, Reals | None]] = []  # with the pose before
+        self.motions: list[tuple[ArmMotion, Reals | None]] = []  # with the pose before
         self._solved: list[Reals | None] = []
 
-    def ready(self, motion: instructions.ArmMotion) -> tuple[Reals | None, Reals | None, Reals | None]:
+    def ready(self, motion: ArmMotion) -> tuple[Reals | None, Reals | None, Reals | None]:
         """The start, the end and the point of a motion; the arm is at its end then.
 
         Parameters
@@ -148,11 +148,11 @@ class Resolver:
         before = self.here.seen(*frames, self.flange)
         self.motions.append((motion, before))
         here = self.here.after(motion)
-        if isinstance(motion.target, instructions.JointTarget) and motion.angle is None:
+        if isinstance(motion.target, JointTarget):
             here = Position(self.joints_after(len(self.motions) - 1), None, *frames)
-        target = motion.target.pose if isinstance(motion.target, instructions.PoseTarget) else None
-        via = motion.via.pose if isinstance(motion.via, instructions.PoseTarget) else None
-        if isinstance(motion.via, instructions.JointTarget):
+        target = motion.target.pose if isinstance(motion.target, PoseTarget) else None
+        via = motion.via.pose if isinstance(motion.via, PoseTarget) else None
+        if isinstance(motion.via, JointTarget):
             via = Position(motion.via.joints).seen(*frames, self.flange)
         self.here = here
         return before, here.seen(*frames, self.flange) if target is None else target, via
@@ -173,7 +173,7 @@ class Resolver:
             return self.start
         motion, _ = self.motions[number]
         target = motion.target
-        if isinstance(target, instructions.JointTarget) and motion.angle is None and not np.isnan(target.joints).any():
+        if isinstance(target, JointTarget) and not np.isnan(target.joints).any():
             return target.joints
         while len(self._solved) <= number:
             before = self.joints_after(len(self._solved) - 1)
@@ -198,9 +198,7 @@ class Resolver:
         q = joints_along(self.arm, base.pose @ poses @ np.linalg.inv(tool.pose), start)
         return q if len(q) == len(poses) and within(self.arm, q).all() else None
 
-    def _goal(
-        self, pose: Reals, frames: Frames, near: Reals | None, branch: instructions.MeantSolution | None
-    ) -> Reals | None:
+    def _goal(self, pose: Reals, frames: Frames, near: Reals | None, branch: MeantSolution | None) -> Reals | None:
         """The solution of a pose within the limits that is meant, or of several the nearest."""
         tool, base = frames
         if self.arm is None or tool.pose is None or base.pose is None:
@@ -215,12 +213,12 @@ class Resolver:
             rows = rows[met]
         return rows[int(np.abs(rows - reference).max(axis=1).argmin())] if len(rows) else None
 
-    def _end(self, motion: instructions.ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:
+    def _end(self, motion: ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:
         """Joints (n,) in rad at a motion's end; those of a line or arc come from following its way."""
         target = motion.target
-        if motion.angle is not None or isinstance(target, instructions.UnresolvedTarget):
+        if isinstance(target, UnresolvedTarget):
             return None
-        if isinstance(target, instructions.JointTarget):
+        if isinstance(target, JointTarget):
             return None if before is None else np.where(np.isnan(target.joints), before, target.joints)
         if target.joints is not None:
             return target.joints
@@ -228,7 +226,7 @@ class Resolver:
         if motion.kind == "joint" or before is None or pose_before is None:
             branch = target.branch if motion.kind == "joint" else None
             return self._goal(target.pose, frames, before if target.near is None else target.near, branch)
-        via = motion.via.pose if motion.kind == "arc" and isinstance(motion.via, instructions.PoseTarget) else None
+        via = motion.via.pose if motion.kind == "arc" and isinstance(motion.via, PoseTarget) else None
         way = way_of(pose_before, via, target.pose)
         if way is None:
             return None

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from er3a.by_value import ByValue
-from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
-from er3a.programs.program_findings import ProgramFinding
+from er3a.finding import Finding
+from er3a.programs.instructions import ArmMotion, Instruction, Place, Rate, RateUnit
 from er3a.programs.program_names import LanguageName
 
 POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -298,11 +298,11 @@ class GoTo:
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Go on if the condition holds, else at ``otherwise``; ``counted``: at the head of a loop that counts."""
+    """Go on if the condition holds, else at ``to``; ``counted``: at the head of a loop that counts."""
 
     place: Place
     condition: Expression
-    otherwise: int
+    to: int
     text: str
     counted: bool = False
 
@@ -430,7 +430,7 @@ class Program(ByValue):
     routines: Mapping[str, Routine]
     entry: str
     data: tuple[Assign, ...] = ()
-    findings: tuple[ProgramFinding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
     slides: tuple[bool, ...] = ()
     constants: frozenset[str] = frozenset()
@@ -439,6 +439,16 @@ class Program(ByValue):
         """All that the text holds, whether it is ever reached or not."""
         for routine in self.routines.values():
             yield from routine.code
+
+    def motions(self) -> list[tuple[Place, str]]:
+        """The places and texts of all motion instructions, each once."""
+        found = [(each.place, each.text) for each in self.operations() if isinstance(each, Move)]
+        found += [
+            (each.place, each.instruction.form)
+            for each in self.operations()
+            if isinstance(each, Fixed) and isinstance(each.instruction, ArmMotion)
+        ]
+        return list(dict.fromkeys(found))
 
 
 Each = Callable[[Expression], Expression]

@@ -12,9 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.finding import fact
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, program_findings
+from er3a.programs.instructions import (
+    ArmMotion,
+    Aside,
+    Decision,
+    Instruction,
+    Listing,
+    Load,
+    NamedFrame,
+    Output,
+    Pause,
+    Remark,
+    UnclearLoad,
+    Unknown,
+)
 from er3a.programs.solving import Resolver, way_of
 from er3a.robots.masses import MassBody
 from er3a.robots.robot import Robot
@@ -30,7 +43,7 @@ class ReadyMotion:
     pose, pose_before, via : (4, 4), m, in its base for its tool; None where unknown
     """
 
-    motion: instructions.ArmMotion
+    motion: ArmMotion
     resolver: Resolver
     number: int
     pose: Reals | None
@@ -56,7 +69,7 @@ class ReadyMotion:
         return None if way is None else way.length
 
 
-def with_default_frames(instruction: instructions.Instruction, robot: Robot | None) -> instructions.Instruction:
+def with_default_frames(instruction: Instruction, robot: Robot | None) -> Instruction:
     """A motion whose tool or base is not given at all, with the robot's own tool and base.
 
     Parameters
@@ -68,18 +81,18 @@ def with_default_frames(instruction: instructions.Instruction, robot: Robot | No
     -------
     instruction : the base that is filled in is the robot's own, T_robot_base the identity
     """
-    if not isinstance(instruction, instructions.ArmMotion) or robot is None:
+    if not isinstance(instruction, ArmMotion) or robot is None:
         return instruction
     tool, base = instruction.tool, instruction.base
     if not tool.name and tool.pose is None:
-        tool = instructions.NamedFrame("", robot.tool)
+        tool = NamedFrame("", robot.tool)
     if not base.name and base.pose is None:
-        base = instructions.NamedFrame("", np.eye(4))
+        base = NamedFrame("", np.eye(4))
     return replace(instruction, tool=tool, base=base)
 
 
 HEAD = "er3a: "
-AGAIN = instructions.UnclearLoad("again")
+AGAIN = UnclearLoad("again")
 """Load at the start of what is done for ever: the one at its end, or the one before."""
 RESERVED = frozenset(
     word
@@ -109,7 +122,7 @@ class WrittenProgram(ByValue):
 
     name: str
     files: Mapping[str, str]
-    findings: tuple[program_findings.WriteFinding, ...]
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +141,7 @@ class WriteOptions(ByValue):
     robot: Robot | None = None
     start: Reals | None = None
     arc_deviation: float = ARC_DEVIATION
-    notes: tuple[program_findings.WriteFinding, ...] = ()
+    notes: tuple[Finding, ...] = ()
     head: tuple[str, ...] = ()
     assumed_speed: Reals | None = None
 
@@ -150,7 +163,7 @@ class Writer(ABC):
     loop = ("", "")
     wait = ("{}", "", "{}")
 
-    def __init__(self, listing: instructions.Listing, options: WriteOptions):
+    def __init__(self, listing: Listing, options: WriteOptions):
         self.listing, self.options, self.robot = listing, options, options.robot
         self.resolver = Resolver(options.robot, options.start)
         self.name = program_name(listing.name, self.longest_name)
@@ -160,7 +173,7 @@ class Writer(ABC):
         self.lines: list[str] = []
         self.settings: dict[str, str] = {}
         self.said: list[str] = []
-        self.load: instructions.Load | None = None
+        self.load: Load | None = None
         self.own = listing.language in self.languages
 
     def write(self) -> WrittenProgram:
@@ -172,7 +185,7 @@ class Writer(ABC):
             too.
         """
         framed = [with_default_frames(each, self.robot) for each in self.listing.instructions]
-        ready = [self._ready(each) if isinstance(each, instructions.ArmMotion) else each for each in framed]
+        ready = [self._ready(each) if isinstance(each, ArmMotion) else each for each in framed]
         for i, instruction in enumerate(ready):
             if i == self.listing.repeats_from:
                 self.begin_loop()
@@ -185,7 +198,7 @@ class Writer(ABC):
         head = list(dict.fromkeys((*self.said, *lines)))
         return WrittenProgram(self.name, self.files(head), findings)
 
-    def _ready(self, motion: instructions.ArmMotion) -> ReadyMotion:
+    def _ready(self, motion: ArmMotion) -> ReadyMotion:
         number = len(self.resolver.motions)
         before, pose, via = self.resolver.ready(motion)
         return ReadyMotion(motion, self.resolver, number, pose, before, via)
@@ -214,7 +227,7 @@ class Writer(ABC):
         """
 
     @abstractmethod
-    def output(self, output: instructions.Output) -> None:
+    def output(self, output: Output) -> None:
         """Write that a signal is set.
 
         Parameters
@@ -264,7 +277,7 @@ class Writer(ABC):
         """
         self.line(f"{self.remark} {ascii_text(text)}")
 
-    def pause(self, pause: instructions.Pause) -> None:
+    def pause(self, pause: Pause) -> None:
         """Write a wait: for a time, for the operator, or for a condition.
 
         Parameters
@@ -299,7 +312,7 @@ class Writer(ABC):
         if load is not None:
             self.name_tool(f"a load of {load.mass:g} kg")
 
-    def omit(self, motion: instructions.ArmMotion) -> None:
+    def omit(self, motion: ArmMotion) -> None:
         """Leave out a motion whose target can't be written; a comment names it, and it is counted for a finding.
 
         Parameters
@@ -336,7 +349,7 @@ class Writer(ABC):
         moved = _moved(ready)
         if speed.unit == "rad/s":
             return speed.value / self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
-        seconds = duration(ready)
+        seconds = by_length(ready, "s")
         if seconds is None or moved is None or not (seconds > 0 and moved.any()):
             return None
         lead = int(np.argmax(moved / [self._speed_of(j)[0] for j in range(len(moved))]))
@@ -388,27 +401,25 @@ class Writer(ABC):
         if name not in self.tools:
             self.tools.append(name)
 
-    def _add(self, instruction: instructions.Instruction | ReadyMotion) -> None:
+    def _add(self, instruction: Instruction | ReadyMotion) -> None:
         match instruction:
             case ReadyMotion():
                 self._add_motion(instruction)
-            case instructions.Remark(text=text):
+            case Remark(text=text):
                 self._remark(text)
-            case instructions.Disabled(text=text):
-                self.comment(f"disabled: {text}")
-            case instructions.Aside(text=text) | instructions.Unknown(text=text):
+            case Aside(text=text) | Unknown(text=text):
                 self._foreign(text, self.own)
-            case instructions.Pause(condition=condition):
+            case Pause(condition=condition):
                 if condition is None or self.own:
                     self.pause(instruction)
                 else:
                     self._foreign(f"wait for {condition}", False)
-            case instructions.Output():
+            case Output():
                 if self.own:
                     self.output(instruction)
                 else:
                     self._foreign(f"{instruction.name} = {instruction.value}", False)
-            case instructions.Decision():
+            case Decision():
                 pass
 
     def _add_motion(self, ready: ReadyMotion) -> None:
@@ -418,7 +429,7 @@ class Writer(ABC):
         self.count["external"] += any(getattr(each, "external", ()) for each in (motion.target, motion.via))
         if motion.load != self.load:
             self.load = motion.load
-            if isinstance(motion.load, instructions.UnclearLoad):
+            if isinstance(motion.load, UnclearLoad):
                 self.name_tool(f"the load {motion.load.text}")
             else:
                 self.set_load(motion.load)
@@ -438,9 +449,9 @@ class Writer(ABC):
             self.count["foreign"] += 1
             self.comment(f"not translated: {' '.join(text.split())}")
 
-    def _findings(self) -> tuple[program_findings.WriteFinding, ...]:
+    def _findings(self) -> tuple[Finding, ...]:
         count = self.count
-        found: list[program_findings.WriteFinding] = []
+        found: list[Finding] = []
         if count["arcs"]:
             found.append(
                 fact(
@@ -505,7 +516,7 @@ HEADS = {
 """What the head of a file says of findings: files are read by controllers, so this is plain ASCII."""
 
 
-def head_line(finding: program_findings.WriteFinding) -> str:
+def head_line(finding: Finding) -> str:
     """A finding as a line of a file's head, which a controller reads.
 
     Parameters
@@ -641,29 +652,17 @@ LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
 ASSUMED_JOINT_SPEED, ASSUMED_SLIDE_SPEED = math.radians(100), 0.5  # rad/s, m/s, where nobody states a joint's greatest
 
 
-def tool_speed(ready: ReadyMotion) -> float | None:
-    """The speed of a line or arc.
+def by_length(ready: ReadyMotion, unit: str) -> float | None:
+    """A program's speed of the tool, or its time, in one of both units: the other one by the length of the way.
+
+    Parameters
+    ----------
+    unit : ``m/s`` or ``s``
 
     Returns
     -------
-    speed : m/s, by the length of the way if the program gives a time; None if it is not known
+    rate : None if the program gives neither, or the length is not known; ramps are not counted
     """
-    return _by_length(ready, "m/s")
-
-
-def duration(ready: ReadyMotion) -> float | None:
-    """How long a motion takes.
-
-    Returns
-    -------
-    seconds : as the program gives it, or by its tool speed and the length of the way; None if neither is known. Ramps
-        are not counted.
-    """
-    return _by_length(ready, "s")
-
-
-def _by_length(ready: ReadyMotion, unit: str) -> float | None:
-    """A program's speed (m/s) or time (s) in one of both units, the other one by the length of the way."""
     speed = ready.motion.speed
     if speed is None or speed.value <= 0 or speed.unit not in ("m/s", "s"):
         return None

@@ -80,7 +80,7 @@ def test_a_file_that_is_no_text_or_is_not_there(tmp_path):
         read_program(tmp_path)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "gbk"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "gbk"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_encodings_and_line_ends(encoding, end, tmp_path):
     text = f"DEF a( ){end}; 取料点 上方{end}PTP {{A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}}{end}END{end}"

@@ -14,7 +14,7 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.instructions import ArmMotion, Aside, Disabled, Output, Pause, Unknown
+from er3a.programs.instructions import ArmMotion, Aside, Output, Pause, Remark, Unknown
 from er3a.programs.languages import files_of, read_program
 from er3a.programs.machine import execute
 
@@ -34,7 +34,7 @@ def test_every_line_that_moves_has_a_verdict_or_a_finding(name):
     program = read_program(STYLES / name)
     check = check_program(program, ROBOT, CheckOptions(measures=False))
     told = {verdict.place.line for verdict in check.verdicts} | {each.place.line for each in check.findings}
-    told |= {step.place.line for step in check.execution.steps if isinstance(step.instruction, Disabled)}
+    told |= {step.place.line for step in check.execution.steps if isinstance(step.instruction, Remark)}
     comment = 0
     for number, line in enumerate(program.lines, 1):
         comment += line.count("(*") - line.count("*)")

@@ -26,7 +26,7 @@ from er3a.pipeline.messages.say import (
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
 from er3a.planning.motion_faults import RateCause, rate_ratio
-from er3a.program_check.program_check_findings import RANKS, CheckFinding, Level, NotFollowedReason
+from er3a.program_check.program_check_findings import RANKS, Level, NotFollowedReason
 
 LEVELS: dict[Level, str] = {
     "pass": N_("pass"),
@@ -255,11 +255,11 @@ def singular_cause(found: Finding) -> str:
     return sentence("path.cause", event=found, pose=singular_pose(found.type))
 
 
-def remedies(findings: Sequence[CheckFinding | FindingAt]) -> list[str]:
+def remedies(findings: Sequence[Finding | FindingAt]) -> list[str]:
     """What to do about findings at one line, each thing once: about those that weigh most; of speeds the slowest."""
     located = [each for each in findings if isinstance(each, FindingAt)]
     worst = max((RANKS[each.level] for each in located), default=0)
-    kept: list[CheckFinding] = [each for each in findings if not isinstance(each, FindingAt)]
+    kept: list[Finding] = [each for each in findings if not isinstance(each, FindingAt)]
     kept += [each.finding for each in located if RANKS[each.level] == worst]
     fast = [each for each in kept if is_one(each, "too_fast")]
     slowest = max(fast, key=rate_ratio, default=None)

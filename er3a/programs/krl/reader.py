@@ -9,66 +9,72 @@ import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from er3a.errors import InputError
-from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
-from er3a.programs.krl.controller_files import ControllerFiles
+from er3a.programs.krl.controller_files import ROUTINE, ControllerFiles
 from er3a.programs.krl.dialect import HARMLESS, OF_SETTINGS, POSITION_FIELDS, POSITION_KINDS
 from er3a.programs.lexing import (
     NUMBER,
-    Lexicon,
     MisreadError,
     Names,
     ProgramText,
     Words,
     data_file_of,
+    ranked,
     read_program_text,
 )
-
-KRL = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<bits>'[HhBb][0-9A-Fa-f]+')"""
-        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
-    ),
-    ranks={
-        **dict.fromkeys(("==", "<>", "<", ">", "<=", ">="), 1),
-        **dict.fromkeys(("OR", "B_OR"), 2),
-        **dict.fromkeys(("EXOR", "B_EXOR"), 3),
-        **dict.fromkeys(("AND", "B_AND"), 4),
-        **dict.fromkeys("+-", 5),
-        **dict.fromkeys("*/", 6),
-        ":": 7,
-    },
-    right=dict.fromkeys(("NOT", "B_NOT", "+", "-"), 8),
-    constants={"TRUE": True, "FALSE": False},
-    folds=True,
-    fields=POSITION_FIELDS,
+from er3a.programs.syntax import (
+    RETURNED,
+    Aggregate,
+    Assign,
+    Constant,
+    Doing,
+    Element,
+    Expression,
+    Fixed,
+    Invocation,
+    Move,
+    Opaque,
+    Operation,
+    Program,
+    Record,
+    Routine,
+    RoutineParameter,
+    Unclear,
+    Variable,
+    Waiting,
 )
+
 BREAKS = re.compile(r"""(?P<comment>;[^\n]*)|(?P<text>"[^"\n]*")|(?P<bad>")|(?P<mark>\n)""")
 
 
 class KrlWords(Words):
     """Words of a line of KRL."""
 
-    def __init__(self, text: str, names: Names):
-        super().__init__(KRL, text, names)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*")|(?P<number>{NUMBER})|(?P<enum>\#\s*[A-Za-z_]\w*)|(?P<bits>'[HhBb][0-9A-Fa-f]+')"""
+        r"""|(?P<name>[A-Za-z_$][\w$]*)|(?P<mark>==|<>|<=|>=|\.\.|\S)"""
+    )
+    ranks = ranked("== <> < > <= >=", "OR B_OR", "EXOR B_EXOR", "AND B_AND", "+ -", "* /", ":")
+    right = dict.fromkeys(("NOT", "B_NOT", "+", "-"), 8)
+    folds = True
+    fields = POSITION_FIELDS
 
-    def special(self) -> syntax.Expression | None:
+    def special(self) -> Expression | None:
         """Aggregates, enumerations; numbers by their bits, and the point that is to be taught, have no known value."""
         if self.kind == "enum":
-            return syntax.Constant("#" + self.take()[1:].strip().upper())
+            return Constant("#" + self.take()[1:].strip().upper())
         if self.accept("{"):
             return self._aggregate()
-        return syntax.Opaque(self.take()) if self.next in ("?", "!") or self.kind == "bits" else None
+        return Opaque(self.take()) if self.next in ("?", "!") or self.kind == "bits" else None
 
-    def _aggregate(self) -> syntax.Expression:
+    def _aggregate(self) -> Expression:
         kind = ""
         if self.kind == "name" and self.texts[self.at + 1] == ":":
             kind = self.take()
             self.take()
-        items: list[tuple[str, syntax.Expression]] = []
+        items: list[tuple[str, Expression]] = []
         more = not self.accept("}")
         while more:
             name = self.name()
@@ -80,10 +86,10 @@ class KrlWords(Words):
             more = self.accept(",")
             if not more:
                 self.expect("}")
-        values = tuple((name, each.value) for name, each in items if isinstance(each, syntax.Constant))
+        values = tuple((name, each.value) for name, each in items if isinstance(each, Constant))
         if len(values) == len(items):
-            return syntax.Constant(syntax.Record(kind, values))
-        return syntax.Aggregate(kind, tuple(items))
+            return Constant(Record(kind, values))
+        return Aggregate(kind, tuple(items))
 
 
 WORDS_OF_MOTIONS = """
@@ -108,13 +114,9 @@ class _Statement:
             self._read()
         except MisreadError:
             builder.unread(place, text, not inside_data, folds=True)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
     def _read(self) -> None:
         words, first = self.words, self.words.next
-        if words.kind == "end":
-            raise MisreadError("no words")
         given = words.texts[words.at + 1] == "="
         if first in MOTIONS:
             words.take()
@@ -154,8 +156,8 @@ class _Statement:
         if words.accept("SIGNAL"):
             name, signal = words.name(), words.expression()
             if words.accept("TO"):  # several, of which it is not known what each has when they are set as a number
-                one_of_them = syntax.Constant(syntax.Unclear(name))
-                signal = syntax.Element(syntax.Variable(variable_of(signal)), (one_of_them,))
+                one_of_them = Constant(Unclear(name))
+                signal = Element(Variable(variable_of(signal)), (one_of_them,))
             self.signals[name] = signal
             self.builder.aside(self.place, self.text)
             return
@@ -163,11 +165,11 @@ class _Statement:
         if words.accept("["):
             words.arguments("]")
         while True:
-            target: syntax.Expression = syntax.Variable(words.name())
+            target: Expression = Variable(words.name())
             sizes = _sizes(words.arguments("]")[0]) if words.accept("[") else ()
             value = words.expression() if words.accept("=") else None
             local = not self.inside_data
-            self.builder.add(syntax.Assign(self.place, target, value, self.text, kind, local, sizes))
+            self.builder.add(Assign(self.place, target, value, self.text, kind, local, sizes))
             if not words.accept(","):
                 break
         words.finish()
@@ -178,19 +180,19 @@ class _Statement:
         if words.accept("="):
             value = words.expression()
             words.finish()
-            if isinstance(left, syntax.Variable):
+            if isinstance(left, Variable):
                 left = self.signals.get(left.name, left)
-            self.builder.add(syntax.Assign(self.place, left, value, self.text))
+            self.builder.add(Assign(self.place, left, value, self.text))
             return
         words.finish()
-        if not isinstance(left, syntax.Invocation):
+        if not isinstance(left, Invocation):
             raise MisreadError("neither an assignment nor a call")
-        self.builder.add(syntax.Doing(self.place, left, self.text))
+        self.builder.add(Doing(self.place, left, self.text))
 
     def _motion(self, form: str) -> None:
         words = self.words
-        arguments: list[syntax.Expression | None] = [words.expression()]
-        settings: list[tuple[str, syntax.Expression]] = []
+        arguments: list[Expression | None] = [words.expression()]
+        settings: list[tuple[str, Expression]] = []
         flags: list[str] = []
         while words.kind != "end":
             if words.accept("CA") or (words.accept(",") and words.accept("CA")):
@@ -205,9 +207,9 @@ class _Statement:
                 flags.append(words.take())
             else:
                 raise MisreadError(f"'{words.next}' not expected")
-        self.builder.add(syntax.Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
+        self.builder.add(Move(self.place, form, tuple(arguments), self.text, tuple(flags), tuple(settings)))
 
-    def _with_settings(self) -> list[tuple[str, syntax.Expression]]:
+    def _with_settings(self) -> list[tuple[str, Expression]]:
         settings = []
         while True:
             first = self.words.at
@@ -219,16 +221,16 @@ class _Statement:
                 return settings
 
 
-def _sizes(given: Iterable[syntax.Expression | None]) -> tuple[int, ...]:
+def _sizes(given: Iterable[Expression | None]) -> tuple[int, ...]:
     """The sizes of a declared list; none where they are no numbers."""
-    found = [each.value if isinstance(each, syntax.Constant) else None for each in given]
+    found = [each.value if isinstance(each, Constant) else None for each in given]
     whole = tuple(each for each in found if isinstance(each, int))
     return whole if len(whole) == len(found) else ()
 
 
-def _acts(operation: syntax.Operation) -> bool:
+def _acts(operation: Operation) -> bool:
     """Whether an operation is more than a declaration."""
-    return not isinstance(operation, syntax.Fixed) and not (isinstance(operation, syntax.Assign) and operation.local)
+    return not isinstance(operation, Fixed) and not (isinstance(operation, Assign) and operation.local)
 
 
 def _wait(reading: _Statement) -> None:
@@ -236,11 +238,11 @@ def _wait(reading: _Statement) -> None:
     if words.accept("SEC"):
         seconds = words.expression()
         words.finish()
-        reading.builder.add(syntax.Waiting(reading.place, "seconds", seconds, reading.text))
+        reading.builder.add(Waiting(reading.place, "seconds", seconds, reading.text))
         return
     words.expect("FOR")
     text = re.sub(r"(?i)^WAIT\s+FOR\s*", "", reading.text)
-    reading.builder.add(syntax.Waiting(reading.place, "condition", reading.words.condition(), text))
+    reading.builder.add(Waiting(reading.place, "condition", reading.words.condition(), text))
 
 
 def _interrupt(reading: _Statement) -> None:
@@ -257,7 +259,7 @@ def _do(reading: _Statement) -> None:
     while words.kind != "end" and not words.accept("DO"):
         words.take()
     what = words.expression()
-    call = what.function if isinstance(what, syntax.Invocation) else ""
+    call = what.function if isinstance(what, Invocation) else ""
     if call in HARMLESS or variable_of(reading.signals.get(variable_of(what), what)) in ("$OUT", "$ANOUT", "$FLAG"):
         reading.builder.aside(reading.place, reading.text)
         return
@@ -284,7 +286,7 @@ BLOCKS = {
     **{f"END{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR", "LOOP", "SWITCH")},
 }
 HANDLERS: dict[str, Handler] = {
-    "HALT": lambda reading: reading.builder.add(syntax.Waiting(reading.place, "operator", None, "HALT")),
+    "HALT": lambda reading: reading.builder.add(Waiting(reading.place, "operator", None, "HALT")),
     "WAIT": _wait,
     "INTERRUPT": _interrupt,
     "TRIGGER": _do,
@@ -293,7 +295,6 @@ HANDLERS: dict[str, Handler] = {
 
 PUBLIC = re.compile(r"(?im)^[ \t]*DEFDAT[ \t]+\S+[ \t]+PUBLIC\b")
 DECLARED = re.compile(r"(?im)^[ \t]*DECL[ \t]+(GLOBAL[ \t]+)?\w+[ \t]+([\w$]+)")
-ROUTINE = re.compile(r"(?im)^[ \t]*(GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+(?:\s*\[[^\]]*\])?)?[ \t]+(\w+)")
 
 
 def own_names(source: ProgramText, data: ProgramText | None) -> Names:
@@ -315,7 +316,7 @@ KNOWN = frozenset(("BAS", *HARMLESS, *OF_SETTINGS))
 HEAD = re.compile(r"(?i)\s*(?:GLOBAL\s+)?(DEF|DEFFCT)\s+(.*)")
 
 
-def read_krl(source: ProgramText) -> syntax.Program:
+def read_krl(source: ProgramText) -> Program:
     """The program of a .src file; its first routine is the one that is started.
 
     Raises
@@ -329,7 +330,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
         if file is not None:
             reader.read_data(read_program_text(file))
     routines = reader.read_routines()
-    called: list[syntax.Routine] = []
+    called: list[Routine] = []
     for file in files.modules:
         text, points = read_program_text(file), data_file_of(file, ".dat")
         data = None if points is None else read_program_text(points)
@@ -339,7 +340,7 @@ def read_krl(source: ProgramText) -> syntax.Program:
         called += module.read_routines()
         reader.data += module.data
     by_name, declared = linked([*called, *routines]), tuple(reader.data)
-    return syntax.Program("krl", source.path.stem, source.path, by_name, routines[0].name, declared, lines=source.lines)
+    return Program("krl", source.path.stem, source.path, by_name, routines[0].name, declared, lines=source.lines)
 
 
 class _KrlReader:
@@ -347,8 +348,8 @@ class _KrlReader:
 
     def __init__(self, source: ProgramText, names: Names):
         self.source, self.names = source, names
-        self.data: list[syntax.Assign] = []
-        self.signals: dict[str, syntax.Expression] = {}
+        self.data: list[Assign] = []
+        self.signals: dict[str, Expression] = {}
 
     def read_data(self, source: ProgramText) -> None:
         """Read the declarations of a .dat file, which are carried out before the routines.
@@ -367,11 +368,11 @@ class _KrlReader:
             first = text.split(None, 1)[0].upper() if text else ""
             if not is_comment and first not in ("DEFDAT", "ENDDAT") and not text.startswith("&"):
                 _Statement(builder, place, text, self, inside_data=True)
-        self.data += [each for each in builder.code if isinstance(each, syntax.Assign)]
+        self.data += [each for each in builder.code if isinstance(each, Assign)]
 
-    def read_routines(self) -> list[syntax.Routine]:
+    def read_routines(self) -> list[Routine]:
         """All routines of the .src file."""
-        routines: list[syntax.Routine] = []
+        routines: list[Routine] = []
         builder: CodeBuilder | None = None
         source, end = self.source, "END"
         for place, text, is_comment in statements(source, BREAKS, _at_each_line):
@@ -407,14 +408,14 @@ class _KrlReader:
                 if words.accept("["):
                     words.arguments("]")
             name = words.name()
-            parameters: list[syntax.RoutineParameter] = []
+            parameters: list[RoutineParameter] = []
             words.expect("(")
             while not words.accept(")"):
                 parameter = words.name()
                 if words.accept("["):
                     words.arguments("]")
                 out = not (words.accept(":") and words.name() == "IN")
-                parameters.append(syntax.RoutineParameter(parameter, out))
+                parameters.append(RoutineParameter(parameter, out))
                 if not words.accept(","):
                     words.expect(")")
                     break
@@ -422,7 +423,7 @@ class _KrlReader:
             raise fault(place, f"this head of a routine can't be read ({error})", "Write DEF NAME ( )") from None
         builder = CodeBuilder(name, tuple(parameters), place)
         if returned:
-            builder.add(syntax.Assign(place, syntax.Variable(syntax.RETURNED), None, "", returned, local=True))
+            builder.add(Assign(place, Variable(RETURNED), None, "", returned, local=True))
         return builder
 
 

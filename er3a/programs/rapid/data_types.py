@@ -18,7 +18,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from er3a.numerics.arrays import Reals
 from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
@@ -56,23 +55,11 @@ TOOL_SPEEDS = (
 """3 speeddata: v5 to v7000, mm/s; each with 500 deg/s, 5000 mm/s, 1000 deg/s."""
 TURN_SPEED, SLIDE_SPEED, AXIS_SPEED = 500.0, 5000.0, 1000.0
 FASTEST = "VMAX"
-ZONES: Mapping[str, tuple[float, ...]] = {
-    "Z0": (0.3, 0.3, 0.3, 0.03, 0.3, 0.03),
-    "Z1": (1, 1, 1, 0.1, 1, 0.1),
-    "Z5": (5, 8, 8, 0.8, 8, 0.8),
-    "Z10": (10, 15, 15, 1.5, 15, 1.5),
-    "Z15": (15, 23, 23, 2.3, 23, 2.3),
-    "Z20": (20, 30, 30, 3.0, 30, 3.0),
-    "Z30": (30, 45, 45, 4.5, 45, 4.5),
-    "Z40": (40, 60, 60, 6.0, 60, 6.0),
-    "Z50": (50, 75, 75, 7.5, 75, 7.5),
-    "Z60": (60, 90, 90, 9.0, 90, 9.0),
-    "Z80": (80, 120, 120, 12, 120, 12),
-    "Z100": (100, 150, 150, 15, 150, 15),
-    "Z150": (150, 225, 225, 23, 225, 23),
-    "Z200": (200, 300, 300, 30, 300, 30),
+ZONES: Mapping[str, float] = {
+    "Z0": 0.3,
+    **{f"Z{size}": size for size in (1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)},
 }
-"""3 zonedata: mm of the path, of the turn and of external axes; deg; mm; deg."""
+"""3 zonedata: mm of the path."""
 
 
 def typed(value: Value, kind: str) -> Value:
@@ -133,7 +120,7 @@ def predefined(name: str) -> Value | None:
     if name == "FINE":
         return typed((True, *(0.0,) * 6), "ZONEDATA")
     if name in ZONES:
-        return typed((False, *ZONES[name]), "ZONEDATA")
+        return typed((False, ZONES[name], *(Unclear(name),) * 5), "ZONEDATA")
     if name[:1] == "V" and name[1:].isdigit() and int(name[1:]) in TOOL_SPEEDS:
         return typed((float(name[1:]), TURN_SPEED, SLIDE_SPEED, AXIS_SPEED), "SPEEDDATA")
     if name == FASTEST:  # how fast that is depends on the arm
@@ -207,24 +194,6 @@ def pose_matrix(value: Value | None) -> Reals | None:
     return pose_of((*xyz, *quaternion), "abb")
 
 
-def rotation_of(value: Value | None) -> Reals | None:
-    """The rotation of an orient.
-
-    Parameters
-    ----------
-    value : a quaternion q1 .. q4, q1 the scalar
-
-    Returns
-    -------
-    R : (3, 3); None unless all numbers are given, and the length is 1 to ``LENGTH_TOLERANCE``
-    """
-    quaternion = plain(value, 4)
-    if quaternion is None or abs(math.hypot(*quaternion) - 1) > LENGTH_TOLERANCE:
-        return None
-    found: Reals = Rotation.from_quat([*quaternion[1:], quaternion[0]]).as_matrix()
-    return found
-
-
 def load_of(value: Value | None) -> MassBody | None:
     """Mass, centre and inertia of loaddata; None unless all its numbers are given.
 
@@ -239,38 +208,6 @@ def load_of(value: Value | None) -> MassBody | None:
     return moved(MassBody(mass, inertia=(x, y, z, 0.0, 0.0, 0.0)), T)
 
 
-def orient_record(R: Reals) -> Record:
-    """A rotation as an orient; the inverse of :func:`rotation_of`.
-
-    Parameters
-    ----------
-    R : (3, 3)
-
-    Returns
-    -------
-    orient : Q1 .. Q4, Q1 the scalar, at least 0
-    """
-    T = np.eye(4)
-    T[:3, :3] = R
-    found = typed(numbers_of(T, "abb")[3:], "ORIENT")
-    assert isinstance(found, Record)
-    return found
-
-
-def pos_record(xyz: Reals) -> Record:
-    """A position as a pos of RAPID.
-
-    Parameters
-    ----------
-    xyz : (3,), m
-
-    Returns
-    -------
-    pos : X, Y, Z in mm
-    """
-    return Record("POS", tuple(zip("XYZ", (float(each) * 1000 for each in xyz))))
-
-
 def pose_record(T: Reals) -> Record:
     """A transform as a pose of RAPID; the inverse of :func:`pose_matrix`.
 
@@ -280,9 +217,12 @@ def pose_record(T: Reals) -> Record:
 
     Returns
     -------
-    pose : TRANS in mm, ROT as a quaternion
+    pose : TRANS in mm, ROT as a quaternion, its scalar first and at least 0
     """
-    return Record("POSE", (("TRANS", pos_record(T[:3, 3])), ("ROT", orient_record(T[:3, :3]))))
+    values = numbers_of(T, "abb")
+    found = typed((values[:3], values[3:]), "POSE")
+    assert isinstance(found, Record)
+    return found
 
 
 QUARTER = math.pi / 2

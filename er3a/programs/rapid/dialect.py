@@ -14,11 +14,31 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import rpy_of, transform
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, syntax
+from er3a.programs import syntax
 from er3a.programs.evaluation import IN_DEGREES, Dialect, Position, ProgramMemory, evaluated, unresolved
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Aside,
+    Instruction,
+    JointTarget,
+    Load,
+    MotionKind,
+    NamedFrame,
+    Output,
+    PoseTarget,
+    Rate,
+    Target,
+    UnclearLoad,
+    Unknown,
+    UnresolvedTarget,
+    Zone,
+)
 from er3a.programs.rapid import data_types, known_names
+from er3a.programs.rapid.data_types import NO_AXIS, pose_matrix, pose_record
+from er3a.programs.syntax import Record, Unclear, Value, Variable, numbers, rate_of, shown
 
-ROBOT_BASE = instructions.NamedFrame("wobj0", np.eye(4))
+ROBOT_BASE = NamedFrame("wobj0", np.eye(4))
 SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
 OPTIONS = frozenset(("ID", "INPOS", "NOEOFFS", "T", "WOBJ"))
@@ -34,9 +54,9 @@ MATHEMATICS: Mapping[str, Callable[..., float]] = {
 }
 OTHERS = ("WOBJDATA", "TOOLDATA")
 """What is no tool, and what is no work object."""
-UNCLEAR = syntax.Unclear("")
-AS_IT_STANDS = syntax.Unclear("the configuration in which the arm stands")
-KINDS: dict[str, instructions.MotionKind] = {"J": "joint", "L": "line", "C": "arc", "A": "joint"}
+UNCLEAR = Unclear("")
+AS_IT_STANDS = Unclear("the configuration in which the arm stands")
+KINDS: dict[str, MotionKind] = {"J": "joint", "L": "line", "C": "arc", "A": "joint"}
 SPELLED = {"MOVEJ": "MoveJ", "MOVEL": "MoveL", "MOVEC": "MoveC", "MOVEABSJ": "MoveAbsJ"}
 
 
@@ -48,7 +68,7 @@ class RapidDialect(Dialect):
     reading = known_names.READING
     by_reference = True
 
-    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Speeds, zones, tool and work object that every controller has.
 
         Returns
@@ -57,7 +77,7 @@ class RapidDialect(Dialect):
         """
         return data_types.predefined(name)
 
-    def typed(self, kind: str, value: syntax.Value) -> syntax.Value:
+    def typed(self, kind: str, value: Value) -> Value:
         """A value with the names of its type's components.
 
         Parameters
@@ -70,26 +90,7 @@ class RapidDialect(Dialect):
         """
         return data_types.typed(value, kind)
 
-    def combined(self, sign: str, left: syntax.Value, right: syntax.Value) -> syntax.Value | None:
-        """Sums of positions, and a number times a position.
-
-        Returns
-        -------
-        value : a pos in mm; None for other operands
-
-        References
-        ----------
-        ABB, *RAPID Reference Manual*, section 7.1.
-        """
-        a, b = data_types.plain(left, 3), data_types.plain(right, 3)
-        scale = syntax.number(left) if a is None else syntax.number(right)
-        if a is not None and b is not None and sign in "+-":
-            return data_types.pos_record(np.array(a) / 1000 + np.array(b) / (1000 if sign == "+" else -1000))
-        if sign == "*" and scale is not None and (xyz := a or b) is not None:
-            return data_types.pos_record(scale * np.array(xyz) / 1000)
-        return None
-
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
+    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> Value:
         """The value of a function of RAPID: mathematics in degrees, positions, where the arm is.
 
         Returns
@@ -98,8 +99,8 @@ class RapidDialect(Dialect):
         """
         values = tuple(UNCLEAR if each is None else memory.value(each) for each in given.arguments)
         named = {key: memory.value(each) for key, each in given.keywords}
-        found: syntax.Value | None = None
-        if name in ("CROBT", "CJOINTT", "CPOS") and not values and named.keys() <= {"TOOL", "WOBJ"}:
+        found: Value | None = None
+        if name in ("CROBT", "CPOS") and not values and named.keys() <= {"TOOL", "WOBJ"}:
             found = _of_position(memory, name, named, dict(given.keywords))
         elif name in MATHEMATICS and not named:
             found = evaluated(MATHEMATICS[name], values)
@@ -108,10 +109,10 @@ class RapidDialect(Dialect):
             found = _of_data(name, values, named)
         if found is not None:
             return found
-        unclear = f"{given.function.lower()}({', '.join(map(syntax.shown, values))})"
-        return next((each for each in values if isinstance(each, syntax.Unclear)), syntax.Unclear(unclear))
+        unclear = f"{given.function.lower()}({', '.join(map(shown, values))})"
+        return next((each for each in values if isinstance(each, Unclear)), Unclear(unclear))
 
-    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
+    def motion(self, memory: ProgramMemory, move: syntax.Move) -> ArmMotion:
         """The motion of MoveJ, MoveL, MoveC and MoveAbsJ, also of those that set an output with it.
 
         Returns
@@ -125,34 +126,33 @@ class RapidDialect(Dialect):
         targets = 2 if kind == "arc" else 1
         beside = 2 if move.form.endswith("DO") else 0
         if not targets + 3 <= len(values) <= targets + 3 + beside:
-            unknown = instructions.UnresolvedTarget(move.text, "not_understood")
-            return instructions.ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None)
+            unknown = UnresolvedTarget(move.text, "not_understood")
+            return ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None)
         speed_at, zone_at, tool_at = targets, targets + 1, targets + 2
         tool, stationary = _tool(memory, move.arguments[tool_at], values[tool_at])
         base, held = _base(memory, dict(move.settings).get("WOBJ"), options.get("WOBJ"))
         checked = memory.read("%CONFJ" if kind == "joint" else "%CONFL") is not False
         made = [_target(memory, value, (move.text, kind, absolute), checked) for value in values[:targets]]
         if stationary or held:
-            made = [instructions.UnresolvedTarget(move.text, "external_tool")] * targets
+            made = [UnresolvedTarget(move.text, "external_tool")] * targets
         taken = values[tool_at], options.get("WOBJ")
-        if any(isinstance(each, syntax.Record) and each.kind == other for each, other in zip(taken, OTHERS)):
-            made = [instructions.UnresolvedTarget(move.text, "not_understood")] * targets
+        if any(isinstance(each, Record) and each.kind == other for each, other in zip(taken, OTHERS)):
+            made = [UnresolvedTarget(move.text, "not_understood")] * targets
         via = made[0] if kind == "arc" else None
-        if isinstance(via, instructions.PoseTarget):
+        if isinstance(via, PoseTarget):
             via = replace(via, branch=None)
         speed, turn = _speed(memory, values[speed_at], options, kind)
-        load: instructions.Load | None = tool.load
+        load: Load | None = tool.load
         if (stated := data_types.part(data_types.typed(values[tool_at], "TOOLDATA"), "TLOAD")) is not None:
-            load = instructions.UnclearLoad(f"tload ({tool.name})") if _is_open(stated) else load
+            load = UnclearLoad(f"tload ({tool.name})") if _is_open(stated) else load
         percent = syntax.number(memory.read("%ACC"))
-        return instructions.ArmMotion(
+        return ArmMotion(
             kind,
             made[-1],
             SPELLED.get(move.form, move.form),
             via,
-            None,
             speed,
-            None if percent is None else instructions.Rate(percent / 100, "share"),
+            None if percent is None else Rate(percent / 100, "share"),
             _zone(values[zone_at], options, move.arguments[zone_at]),
             tool,
             base,
@@ -162,7 +162,7 @@ class RapidDialect(Dialect):
             with_path=kind == "arc" and memory.read("%ARCS") is not True,
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> Instruction | None:
         """Carry out settings (``ConfJ``, ``AccSet``, ``VelSet`` ...) and outputs; the rest as in all languages.
 
         Returns
@@ -180,65 +180,61 @@ class RapidDialect(Dialect):
                 memory.write("%ARCS", "OBJECTFRAME" in options)
                 return None
             case "SINGAREA" if options == {"OFF"}:
-                return instructions.Aside(doing.text)
+                return Aside(doing.text)
             case "ACCSET" if values and (percent := syntax.number(values[0])) is not None:
                 memory.write("%ACC", max(percent, SLOWEST_RAMP))
                 return None
-            case "VELSET" if len(values) == 2 and (found := syntax.numbers(values)) is not None:
+            case "VELSET" if len(values) == 2 and (found := numbers(values)) is not None:
                 memory.write("%SPEED", found)
                 return None
             case name if name in known_names.NOT_SIMULATED | known_names.SHIFTING:
-                return instructions.Unknown(doing.text, may_move=False, shapes=name in known_names.SHIFTING)
+                return Unknown(doing.text, may_move=False, shapes=name in known_names.SHIFTING)
             case name if name in known_names.OUTPUTS and call.arguments:
                 first = call.arguments[0]
-                return instructions.Output(first.name if isinstance(first, syntax.Variable) else name, doing.text)
+                return Output(first.name if isinstance(first, Variable) else name, doing.text)
         return super().carry_out(memory, doing)
 
 
-def _target(
-    memory: ProgramMemory, value: syntax.Value, said: tuple[str, instructions.MotionKind, bool], checked: bool
-) -> instructions.Target:
+def _target(memory: ProgramMemory, value: Value, said: tuple[str, MotionKind, bool], checked: bool) -> Target:
     """What a target means; ``said`` is the line, the motion's kind, and whether it wants joint angles."""
     text, kind, absolute = said
-    if isinstance(value, syntax.Unclear):
+    if isinstance(value, Unclear):
         return unresolved(value, text)
     value = data_types.typed(value, "JOINTTARGET" if absolute else "ROBTARGET")
     first, second = ("ROBAX", "ROBAX") if absolute else ("TRANS", "ROT")
     parts = [data_types.part(value, name) for name in (first, second)]
-    inside = [each for part in parts for each in (part.values() if isinstance(part, syntax.Record) else (part,))]
-    unclear = next((each for each in inside if isinstance(each, syntax.Unclear)), None)
+    inside = [each for part in parts for each in (part.values() if isinstance(part, Record) else (part,))]
+    unclear = next((each for each in inside if isinstance(each, Unclear)), None)
     if unclear is not None:
         return unresolved(unclear)
     external = data_types.external_axes(data_types.part(value, "EXTAX"))
     if absolute:
         degrees, count = data_types.plain(parts[0], 6), memory.cell.joints
         if degrees is None:
-            return instructions.UnresolvedTarget(text, "not_understood")
-        if any(each and abs(each) < data_types.NO_AXIS / 10 for each in degrees[count:]):
-            return instructions.UnresolvedTarget(text, "too_many_joints")
-        return instructions.JointTarget(np.radians(degrees[:count]), external)
-    pose = data_types.pose_matrix(value)
+            return UnresolvedTarget(text, "not_understood")
+        if any(each and abs(each) < NO_AXIS / 10 for each in degrees[count:]):
+            return UnresolvedTarget(text, "too_many_joints")
+        return JointTarget(np.radians(degrees[:count]), external)
+    pose = pose_matrix(value)
     if pose is None:
-        return instructions.UnresolvedTarget(text, "not_understood")
+        return UnresolvedTarget(text, "not_understood")
     conf = data_types.part(value, "ROBCONF")
     branch = data_types.branch_of(conf, memory.cell.joints) if checked else None
-    return instructions.PoseTarget(
-        pose, _said(conf) if checked or kind != "joint" else (), external=external, branch=branch
-    )
+    return PoseTarget(pose, _said(conf) if checked or kind != "joint" else (), external=external, branch=branch)
 
 
-def _said(conf: syntax.Value | None) -> tuple[tuple[str, float | str], ...]:
+def _said(conf: Value | None) -> tuple[tuple[str, float | str], ...]:
     """The parts of confdata, as text where they are not known; none where the arm's own configuration was read."""
-    if isinstance(conf, syntax.Unclear):
+    if isinstance(conf, Unclear):
         return (("robconf", conf.text),)
-    parts = conf.values() if isinstance(conf, syntax.Record) else ()
+    parts = conf.values() if isinstance(conf, Record) else ()
     if len(parts) != 4 or AS_IT_STANDS in parts:
         return ()
-    known = [number if (number := syntax.number(each)) is not None else syntax.shown(each) for each in parts]
+    known = [number if (number := syntax.number(each)) is not None else shown(each) for each in parts]
     return tuple(zip(("cf1", "cf4", "cf6", "cfx"), known))
 
 
-def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
+def frame_of_tool(value: Value | None) -> tuple[Reals | None, bool]:
     """The pose of a tool, and whether it is stationary.
 
     Parameters
@@ -252,149 +248,138 @@ def frame_of_tool(value: syntax.Value | None) -> tuple[Reals | None, bool]:
     """
     data = data_types.typed(value, "TOOLDATA") if value is not None else None
     held = data_types.part(data, "ROBHOLD")
-    pose = None if isinstance(held, syntax.Unclear) else data_types.pose_matrix(data_types.part(data, "TFRAME"))
+    pose = None if isinstance(held, Unclear) else pose_matrix(data_types.part(data, "TFRAME"))
     return pose, held is False
 
 
-def frame_of_object(value: syntax.Value | None) -> tuple[Reals | None, bool]:
+def frame_of_object(value: Value | None) -> tuple[Reals | None, bool]:
     """T_robot_object (4, 4) in m of wobjdata, and whether the arm holds the object (3 wobjdata: robhold).
 
     The object's frame is in the user's frame, and that in the world, which is the robot's base unless a controller
     is set up otherwise. None where an external unit moves the user's frame (ufprog FALSE, ufmec).
     """
     data = data_types.typed(value, "WOBJDATA") if value is not None else None
-    user, own = (data_types.pose_matrix(data_types.part(data, name)) for name in ("UFRAME", "OFRAME"))
+    user, own = (pose_matrix(data_types.part(data, name)) for name in ("UFRAME", "OFRAME"))
     still = data_types.part(data, "UFPROG") is True
     held = data_types.part(data, "ROBHOLD")
-    if user is None or own is None or not still or isinstance(held, syntax.Unclear):
+    if user is None or own is None or not still or isinstance(held, Unclear):
         return None, held is True
     return user @ own, held is True
 
 
-def _named(
-    memory: ProgramMemory, expression: object, value: syntax.Value, pose: Reals | None
-) -> tuple[str, Reals | None]:
+def _named(memory: ProgramMemory, expression: object, value: Value, pose: Reals | None) -> tuple[str, Reals | None]:
     """The name of a frame, and its pose as the program or else the cell gives it, however its letters are written."""
-    name = expression.name.lower() if isinstance(expression, syntax.Variable) else ""
+    name = expression.name.lower() if isinstance(expression, Variable) else ""
     if pose is None:
-        name = value.text.lower() if isinstance(value, syntax.Unclear) else name or "?"
+        name = value.text.lower() if isinstance(value, Unclear) else name or "?"
         pose = next((each for key, each in memory.cell.frames.items() if key.lower() == name), None)
     return name.rpartition("/")[2], pose
 
 
-def _tool(memory: ProgramMemory, expression: object, value: syntax.Value) -> tuple[instructions.NamedFrame, bool]:
+def _tool(memory: ProgramMemory, expression: object, value: Value) -> tuple[NamedFrame, bool]:
     own, stationary = frame_of_tool(value)
     name, pose = _named(memory, expression, value, own)
     load = data_types.load_of(data_types.part(data_types.typed(value, "TOOLDATA"), "TLOAD"))
     load = load if load is not None and load.mass > data_types.MIN_LOAD else None
-    return instructions.NamedFrame(name, pose, load), stationary
+    return NamedFrame(name, pose, load), stationary
 
 
-def _is_open(value: syntax.Value) -> bool:
+def _is_open(value: Value) -> bool:
     """Whether a part of a value is not known."""
-    parts = value.values() if isinstance(value, syntax.Record) else value if isinstance(value, tuple) else ()
-    return isinstance(value, syntax.Unclear) or any(map(_is_open, parts))
+    parts = value.values() if isinstance(value, Record) else value if isinstance(value, tuple) else ()
+    return isinstance(value, Unclear) or any(map(_is_open, parts))
 
 
-def _base(
-    memory: ProgramMemory, expression: object, value: syntax.Value | None
-) -> tuple[instructions.NamedFrame, bool]:
+def _base(memory: ProgramMemory, expression: object, value: Value | None) -> tuple[NamedFrame, bool]:
     if value is None:
         return ROBOT_BASE, False
     own, held = frame_of_object(value)
-    return instructions.NamedFrame(*_named(memory, expression, value, own)), held
+    return NamedFrame(*_named(memory, expression, value, own)), held
 
 
 def _speed(
-    memory: ProgramMemory, value: syntax.Value, options: Mapping[str, syntax.Value], kind: instructions.MotionKind
-) -> tuple[instructions.Rate | None, float | None]:
+    memory: ProgramMemory, value: Value, options: Mapping[str, Value], kind: MotionKind
+) -> tuple[Rate | None, float | None]:
     """Speed of the tool and of its turn (rad/s). 1 VelSet scales and bounds it, but no time, as the faster reading."""
     if "T" in options:
-        return syntax.rate_of(options["T"], "s"), None
+        return rate_of(options["T"], "s"), None
     percent, most = data_types.plain(memory.read("%SPEED"), 2) or (100.0, FULL_SPEED)
     share = percent / 100
-    if isinstance(value, syntax.Record) and value.get("FASTEST") is True:
+    if isinstance(value, Record) and value.get("FASTEST") is True:
         if kind == "joint":
-            return instructions.Rate(share, "share", "vmax"), None
-        return instructions.Rate(most / 1000 * share, "m/s", "vmax"), math.radians(data_types.TURN_SPEED) * share
+            return Rate(share, "share", "vmax"), None
+        return Rate(most / 1000 * share, "m/s", "vmax"), math.radians(data_types.TURN_SPEED) * share
     data = data_types.typed(value, "SPEEDDATA")
     turn = syntax.number(data_types.part(data, "V_ORI"))
-    along = syntax.rate_of(data_types.part(data, "V_TCP"), "m/s")
+    along = rate_of(data_types.part(data, "V_TCP"), "m/s")
     if along is None or along.text:
-        return along or instructions.Rate(0.0, "m/s", syntax.shown(value)), None
+        return along or Rate(0.0, "m/s", shown(value)), None
     limited = min(along.value * share, most)
-    return instructions.Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
+    return Rate(limited / 1000, "m/s"), math.radians(turn) * share if turn and kind != "joint" else None
 
 
-def _zone(value: syntax.Value, options: Mapping[str, syntax.Value], expression: object) -> instructions.Zone:
+def _zone(value: Value, options: Mapping[str, Value], expression: object) -> Zone:
     """3 zonedata; ``\\Inpos`` asks for a stop."""
     data = data_types.typed(value, "ZONEDATA")
     stops = data_types.part(data, "FINEP")
     if "INPOS" in options or stops is True:
-        return instructions.FINE
-    name = expression.name.lower() if isinstance(expression, syntax.Variable) else ""
+        return FINE
+    name = expression.name.lower() if isinstance(expression, Variable) else ""
     size = syntax.number(data_types.part(data, "PZONE_TCP"))
-    if size is None or isinstance(stops, syntax.Unclear):
-        return instructions.Zone("named", 0.0, name or "zonedata")
-    return instructions.Zone("distance", size / 1000, name) if size > 0 else instructions.FINE
+    if size is None or isinstance(stops, Unclear):
+        return Zone("named", 0.0, name or "zonedata")
+    return Zone("distance", size / 1000, name) if size > 0 else FINE
 
 
 def _of_position(
-    memory: ProgramMemory, name: str, named: Mapping[str, syntax.Value], words: Mapping[str, syntax.Expression]
-) -> syntax.Value | None:
+    memory: ProgramMemory, name: str, named: Mapping[str, Value], words: Mapping[str, syntax.Expression]
+) -> Value | None:
     """Where the arm is; unknown after a motion that the program does not wait for (7-zonedata-1).
 
     2 CRobT, 2 CPos: in the work object, for the tool; where none is given, those of the last motion.
     """
     here = Position() if memory.here.passing else memory.here
-    if name == "CJOINTT":
-        if here.joints is None:
-            return None
-        degrees: list[syntax.Value] = [*map(float, np.degrees(here.joints)), *[0.0] * (6 - len(here.joints))]
-        return data_types.typed((tuple(degrees), (data_types.NO_AXIS,) * 6), "JOINTTARGET")
     tool = _tool(memory, words.get("TOOL"), named["TOOL"])[0] if "TOOL" in named else here.tool
     base = _base(memory, words.get("WOBJ"), named.get("WOBJ"))[0] if "WOBJ" in named else here.base
     seen = here.seen(tool, base, memory.cell.flange)
     if seen is None or name == "CPOS":
-        return None if seen is None else data_types.pos_record(seen[:3, 3])
-    conf: syntax.Value = (AS_IT_STANDS,) * 4  # cfx is -1 where the arm's sides are not known
+        return None if seen is None else pose_record(seen).values()[0]
+    conf: Value = (AS_IT_STANDS,) * 4  # cfx is -1 where the arm's sides are not known
     if here.joints is not None and len(here.joints) == 6:
         conf = (*data_types.quarters_of(here.joints), -1)
-    parts = data_types.pos_record(seen[:3, 3]), data_types.orient_record(seen[:3, :3]), conf, (data_types.NO_AXIS,) * 6
-    return data_types.typed(parts, "ROBTARGET")
+    return data_types.typed((*pose_record(seen).values(), conf, (NO_AXIS,) * 6), "ROBTARGET")
 
 
-def _of_data(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
+def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
     """Functions of positions, as ABB's manual defines them (2, each by its name)."""
-    plain = syntax.numbers(values)
-    poses = [pose for each in values if (pose := data_types.pose_matrix(each)) is not None]
+    plain = numbers(values)
+    poses = [pose for each in values if (pose := pose_matrix(each)) is not None]
     match name, len(values):
         case "OFFS" | "RELTOOL", 4:
             return _shifted(name, values, named)
         case "POSEMULT", 2 if len(poses) == 2:
-            return data_types.pose_record(poses[0] @ poses[1])
+            return pose_record(poses[0] @ poses[1])
         case "ORIENTZYX", 3 if plain is not None:  # about z, then the new y, then the new x
-            return data_types.orient_record(transform(np.zeros(3), np.radians(plain[::-1]))[:3, :3])
+            return pose_record(transform(np.zeros(3), np.radians(plain[::-1]))).values()[1]
         case "EULERZYX", 1:
-            turn = data_types.rotation_of(values[0])
+            turn = pose_matrix(((0.0, 0.0, 0.0), values[0]))
             axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
             return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
     return None
 
 
-def _shifted(name: str, values: tuple[syntax.Value, ...], named: Mapping[str, syntax.Value]) -> syntax.Value | None:
+def _shifted(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -> Value | None:
     """2 Offs: along the object's axes. 2 RelTool: along the tool's, then turned about x, the new y, the new z."""
     target = data_types.typed(values[0], "ROBTARGET")
-    pose, shift = data_types.pose_matrix(target), syntax.numbers(values[1:])
-    angles = syntax.numbers(tuple(named.get(key, 0.0) for key in ("RX", "RY", "RZ")))
-    if not isinstance(target, syntax.Record) or pose is None or shift is None or angles is None:
+    pose, shift = pose_matrix(target), numbers(values[1:])
+    angles = numbers(tuple(named.get(key, 0.0) for key in ("RX", "RY", "RZ")))
+    if not isinstance(target, Record) or pose is None or shift is None or angles is None:
         return None
     step = np.eye(4)
     step[:3, 3] = np.array(shift) / 1000
     if name == "OFFS":
-        return target.having("TRANS", data_types.pos_record(pose[:3, 3] + step[:3, 3]))
+        pose[:3, 3] += step[:3, 3]
+        return target.having("TRANS", pose_record(pose).values()[0])
     step[:3, :3] = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-    moved = pose @ step
-    return target.having("TRANS", data_types.pos_record(moved[:3, 3])).having(
-        "ROT", data_types.orient_record(moved[:3, :3])
-    )
+    trans, rot = pose_record(pose @ step).values()
+    return target.having("TRANS", trans).having("ROT", rot)

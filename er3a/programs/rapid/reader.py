@@ -17,26 +17,12 @@ from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, is_no_statement, linked, statements
 from er3a.programs.evaluation import variable_of
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, Names, ProgramText, Words, read_program_text
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked, read_program_text
 from er3a.programs.rapid import known_names
 from er3a.programs.rapid.data_types import starting
+from er3a.programs.syntax import Assign, Constant, Expression, Program, Routine, RoutineParameter, Variable, Waiting
 
 TEXT = r'"(?:[^"\n]|"")*"'
-RAPID = Lexicon(
-    re.compile(rf"""(?P<text>{TEXT})|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<mark>:=|<>|<=|>=|\S)"""),
-    ranks={
-        **dict.fromkeys(("OR", "XOR"), 1),
-        "AND": 2,
-        **dict.fromkeys(("=", "<>", "<", ">", "<=", ">="), 3),
-        **dict.fromkeys(("+", "-"), 4),
-        **dict.fromkeys(("*", "/", "DIV", "MOD"), 5),
-    },
-    right={"NOT": 2, "+": 5, "-": 5},
-    constants={"TRUE": True, "FALSE": False},
-    folds=True,
-    counts_down=True,
-)
-"""RAPID Reference Manual, 7.7 Priority between operators: NOT, OR and XOR bind least."""
 BREAKS = re.compile(
     rf"""(?i)(?P<comment>![^\n]*)|(?P<text>{TEXT})|(?P<bad>")|(?P<line>\\\w+)"""
     r"""|(?P<alone>\b(?:ELSE|ERROR|UNDO|BACKWARD|END(?:IF|FOR|WHILE|TEST|PROC|FUNC|TRAP|RECORD|MODULE))\b(?!\s*:=))"""
@@ -60,7 +46,7 @@ ROUTINES = {
 HANDLERS = ("ERROR", "UNDO", "BACKWARD")
 MOTIONS = frozenset(("MOVEJ", "MOVEL", "MOVEC", "MOVEABSJ", "MOVEJDO", "MOVELDO", "MOVECDO"))
 MAX_ELEMENTS = 1000
-Given = tuple[tuple[syntax.Expression | None, ...], tuple[tuple[str, syntax.Expression], ...]]
+Given = tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]
 """Arguments by place and by name."""
 BLOCKS = {
     "IF": ("if", "THEN"),
@@ -80,27 +66,29 @@ BLOCKS = {
 
 
 class RapidWords(Words):
-    """Words of an instruction of RAPID."""
+    """Words of an instruction of RAPID. NOT, OR and XOR bind least (RAPID Reference Manual, 7.7)."""
 
-    def __init__(self, text: str, names: Names):
-        super().__init__(RAPID, text, names)
+    pattern = re.compile(rf"""(?P<text>{TEXT})|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<mark>:=|<>|<=|>=|\S)""")
+    ranks = ranked("OR XOR", "AND", "= <> < > <= >=", "+ -", "* / DIV MOD")
+    right = {"NOT": 2, "+": 5, "-": 5}
+    folds = counts_down = True
 
-    def special(self) -> syntax.Expression | None:
+    def special(self) -> Expression | None:
         """Aggregates, and the target that only the pendant shows."""
         if self.next == "*" and self.kind == "mark":
             return syntax.Opaque(self.take())
         if not self.accept("["):
             return None
-        items: list[syntax.Expression] = []
+        items: list[Expression] = []
         while not self.accept("]"):
             items.append(self.expression())
             if not self.accept(","):
                 self.expect("]")
                 break
-        values = tuple(each.value for each in items if isinstance(each, syntax.Constant))
-        return syntax.Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
+        values = tuple(each.value for each in items if isinstance(each, Constant))
+        return Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
 
-    def parts_of(self, found: syntax.Expression) -> syntax.Expression:
+    def parts_of(self, found: Expression) -> Expression:
         """An expression with the fields and arguments after it, and elements in braces.
 
         Parameters
@@ -119,7 +107,7 @@ class RapidWords(Words):
             for index in self.in_braces():
                 found = syntax.Element(found, (index,))
 
-    def in_braces(self) -> list[syntax.Expression]:
+    def in_braces(self) -> list[Expression]:
         """Expressions up to a closing brace."""
         found = [self.expression()]
         while self.accept(","):
@@ -144,8 +132,8 @@ class RapidWords(Words):
         MisreadError
             if the bracket or a comma is missing
         """
-        placed: list[syntax.Expression | None] = []
-        named: list[tuple[str, syntax.Expression]] = []
+        placed: list[Expression | None] = []
+        named: list[tuple[str, Expression]] = []
         first = self.at
         while not (self.accept(close) if close else self.kind == "end"):
             if self.kind == "end":
@@ -154,7 +142,7 @@ class RapidWords(Words):
                 continue
             if self.accept("\\"):
                 name = self.name()
-                named.append((name, self.expression() if self.accept(":=") else syntax.Constant(True)))
+                named.append((name, self.expression() if self.accept(":=") else Constant(True)))
             elif self.at > first and self.texts[self.at - 1] not in ",(":
                 raise MisreadError(f"',' expected before '{self.next}'")
             else:
@@ -162,7 +150,7 @@ class RapidWords(Words):
         return tuple(placed), tuple(named)
 
 
-def read_rapid(source: ProgramText) -> syntax.Program:
+def read_rapid(source: ProgramText) -> Program:
     """The program of a module: its ``main``, or else the first of its procedures that no other calls.
 
     Raises
@@ -176,7 +164,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     data = [each for reader in readers for each in reader.data]
     by_name = linked(each for reader in readers for each in reader.routines)
     constants = frozenset(variable_of(each.target) for each in data if each.text[:5].upper() == "CONST")
-    return syntax.Program(
+    return Program(
         "rapid",
         source.path.stem,
         source.path,
@@ -188,7 +176,7 @@ def read_rapid(source: ProgramText) -> syntax.Program:
     )
 
 
-def _entry(own: list[syntax.Routine], routines: Mapping[str, syntax.Routine]) -> str:
+def _entry(own: list[Routine], routines: Mapping[str, Routine]) -> str:
     if "MAIN" in routines:
         return "MAIN"
     calls = ((name, op) for name, each in routines.items() for op in each.code if isinstance(op, syntax.Call))
@@ -214,8 +202,8 @@ class _ModuleReader:
         module = source.path.stem.upper()
         self.names = {name.upper(): f"{module}/{name.upper()}" for name in LOCAL.findall(text)}
         self.counters: list[tuple[str, str | None]] = []
-        self.routines: list[syntax.Routine] = []
-        self.data: list[syntax.Assign] = []
+        self.routines: list[Routine] = []
+        self.data: list[Assign] = []
         self.builder: CodeBuilder | None = None
         self.passing: tuple[str, ...] = ()  # words that end what is passed over
         place = Place(source.path, 1)
@@ -252,7 +240,7 @@ class _ModuleReader:
             builder = self.builder or CodeBuilder("", (), place)
             _declare(builder, place, words, text, local=self.builder is not None)
             if self.builder is None:
-                self.data += [each for each in builder.code if isinstance(each, syntax.Assign)]
+                self.data += [each for each in builder.code if isinstance(each, Assign)]
         elif self.builder is not None:
             self._instruction(self.builder, place, text)
 
@@ -260,7 +248,7 @@ class _ModuleReader:
         """``PROC name(parameters)``, ``FUNC type name(parameters)``; a parameter that may be left out has its name."""
         kind = words.name() if words.take() == "FUNC" else ""
         name = words.name()
-        parameters: list[syntax.RoutineParameter] = []
+        parameters: list[RoutineParameter] = []
         kinds: list[str] = []
         optional = False
         given: list[str] = []
@@ -276,12 +264,12 @@ class _ModuleReader:
             if names:
                 kinds.append(names[-2] + "[]" * given.count("*"))
                 out = names[0] in ("INOUT", "VAR", "PERS")
-                parameters.append(syntax.RoutineParameter(names[-1], out, named=optional))
+                parameters.append(RoutineParameter(names[-1], out, named=optional))
             optional, given = word != ",", []
         self.builder = CodeBuilder(name, tuple(parameters), place)
-        for parameter, its in zip([*parameters, syntax.RoutineParameter(syntax.RETURNED)], [*kinds, kind]):
+        for parameter, its in zip([*parameters, RoutineParameter(syntax.RETURNED)], [*kinds, kind]):
             if its:
-                self.builder.add(syntax.Assign(place, syntax.Variable(parameter.name), None, "", its, local=True))
+                self.builder.add(Assign(place, Variable(parameter.name), None, "", its, local=True))
 
     def _instruction(self, builder: CodeBuilder, place: Place, text: str) -> None:
         """An instruction; one that is not understood is kept as such, and what it assigns to becomes unclear."""
@@ -290,12 +278,12 @@ class _ModuleReader:
         if counter is not None:
             name, own = counter[1].upper(), f"{counter[1].upper()}%{len(builder.code)}"
             self.counters.append((name, self.names.get(name)))
-            builder.add(syntax.Assign(place, syntax.Variable(own), None, "", local=True))
+            builder.add(Assign(place, Variable(own), None, "", local=True))
             words.texts[1] = own
         try:
             if words.next == "IF" and words.texts[-2] != "THEN":
                 words.take()
-                builder.open_if(place, words.expression(), text)
+                builder.open("if", place, words.expression(), text)
                 self._instruction(builder, place, text[words.offset() :])
                 builder.close("if", place)
             elif not block(builder, words, place, text, BLOCKS):
@@ -303,9 +291,7 @@ class _ModuleReader:
         except MisreadError:
             builder.unknown(place, text, stops=is_no_statement(text, calls_without_brackets=True))
             if ":=" in words.texts and words.kinds[0] == "name":
-                builder.unclear(place, syntax.Variable(words.texts[0]), text)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
+                builder.unclear(place, Variable(words.texts[0]), text)
         if counter is not None:
             self.names[name] = own
         elif text.upper() == "ENDFOR":
@@ -326,17 +312,17 @@ def _declare(builder: CodeBuilder, place: Place, words: RapidWords, text: str, l
         initial = starting(kind)
         for size in reversed(words.in_braces() if words.accept("{") else []):
             kind += "[]"
-            count = syntax.number(size.value) if isinstance(size, syntax.Constant) else None
+            count = syntax.number(size.value) if isinstance(size, Constant) else None
             known = count is not None and 0 < count <= MAX_ELEMENTS
             initial = (initial,) * int(count or 0) if known and initial is not None else None
-        value: syntax.Expression | None = words.expression() if words.accept(":=") else None
+        value: Expression | None = words.expression() if words.accept(":=") else None
         words.finish()
     except MisreadError:
         builder.unknown(place, text, may_move=False)
         return
     if value is None and initial is not None and not elsewhere:
-        value = syntax.Constant(initial)
-    builder.add(syntax.Assign(place, syntax.Variable(name), value, text, kind, local))
+        value = Constant(initial)
+    builder.add(Assign(place, Variable(name), value, text, kind, local))
 
 
 def _plain(builder: CodeBuilder, place: Place, words: RapidWords, text: str) -> None:
@@ -346,28 +332,28 @@ def _plain(builder: CodeBuilder, place: Place, words: RapidWords, text: str) -> 
         builder.label(first)
         return
     if words.next in (":=", ".", "{"):
-        target = words.parts_of(syntax.Variable(first))
+        target = words.parts_of(Variable(first))
         words.expect(":=")
         value = words.expression()
         words.finish()
-        builder.add(syntax.Assign(place, target, value, text))
+        builder.add(Assign(place, target, value, text))
         return
     if first in COUNTED:
         target = words.reference()
         sign, amount = COUNTED[first]
-        by = words.expression() if words.accept(",") else syntax.Constant(amount)
+        by = words.expression() if words.accept(",") else Constant(amount)
         words.finish()
-        builder.add(syntax.Assign(place, target, syntax.Binary(sign, target, by), text))
+        builder.add(Assign(place, target, syntax.Binary(sign, target, by), text))
         return
     placed, named = words.arguments("")
     if first in MOTIONS:
         builder.add(syntax.Move(place, first, placed, text, (), named))
     elif first == "WAITTIME" and placed:
-        builder.add(syntax.Waiting(place, "seconds", placed[0], text))
+        builder.add(Waiting(place, "seconds", placed[0], text))
     elif first == "STOP" and not placed:
-        builder.add(syntax.Waiting(place, "operator", None, text))
+        builder.add(Waiting(place, "operator", None, text))
     elif first in known_names.WAITS:
-        builder.add(syntax.Waiting(place, "condition", None, text))
+        builder.add(Waiting(place, "condition", None, text))
     else:
         builder.add(syntax.Doing(place, syntax.Invocation(first, placed, named), text))
     for key, each in named:

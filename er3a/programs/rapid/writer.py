@@ -14,8 +14,20 @@ from dataclasses import replace
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, writing
+from er3a.programs.instructions import ArmMotion, JointTarget, Listing, NamedFrame, Output, PoseTarget, Zone, numbers_of
 from er3a.programs.rapid import data_types
+from er3a.programs.rapid.data_types import MIN_LOAD, TURN_SPEED
+from er3a.programs.writing import (
+    LOAD_DIGITS,
+    ReadyMotion,
+    WriteOptions,
+    Writer,
+    ascii_text,
+    cut,
+    fixed,
+    principal_axes,
+    short,
+)
 from er3a.robots.masses import MassBody
 
 NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -29,7 +41,7 @@ xor
 RESERVED = frozenset(RESERVED_TEXT.split())
 
 
-class RapidWriter(writing.Writer):
+class RapidWriter(Writer):
     """Writes RAPID."""
 
     languages = ("rapid",)
@@ -37,7 +49,7 @@ class RapidWriter(writing.Writer):
     loop = ("WHILE TRUE DO", "ENDWHILE")
     wait = ("WaitTime {};", "Stop;", "{}")
 
-    def __init__(self, listing: instructions.Listing, options: writing.WriteOptions):
+    def __init__(self, listing: Listing, options: WriteOptions):
         super().__init__(listing, options)
         if self.name.lower() in RESERVED:
             self.name = f"p{self.name}"
@@ -53,13 +65,13 @@ class RapidWriter(writing.Writer):
         """
         lines = [
             f"MODULE {self.name}",
-            *(f"  ! {writing.ascii_text(line)}" for line in head),
+            *(f"  ! {ascii_text(line)}" for line in head),
             *(f"  {each}" for each in self.declared),
         ]
         body = ["PROC main()", *(f"  {line}" for line in self.lines), "ENDPROC"]
         return {".mod": "\n".join((*lines, *(f"  {line}" for line in body), "ENDMODULE", ""))}
 
-    def output(self, output: instructions.Output) -> None:
+    def output(self, output: Output) -> None:
         """Write an output by the instruction that was read.
 
         Parameters
@@ -76,7 +88,7 @@ class RapidWriter(writing.Writer):
         load : of the next motions, which carry it themselves
         """
 
-    def motion(self, ready: writing.ReadyMotion) -> None:
+    def motion(self, ready: ReadyMotion) -> None:
         """Write MoveAbsJ, MoveJ, MoveL or MoveC, and before it what has to be set.
 
         Parameters
@@ -86,17 +98,17 @@ class RapidWriter(writing.Writer):
         """
         motion = ready.motion
         target = motion.target
-        own_pose = self.own and motion.kind == "joint" and isinstance(target, instructions.PoseTarget)
+        own_pose = self.own and motion.kind == "joint" and isinstance(target, PoseTarget)
         if motion.kind == "joint" and not own_pose:
             joints = ready.joints
-            if joints is None and isinstance(target, instructions.JointTarget):
+            if joints is None and isinstance(target, JointTarget):
                 joints = target.joints
             if joints is None or np.isnan(joints).any():
                 self.omit(motion)
                 return
             form, texts = "MoveAbsJ", [_joints_text(joints)]
         else:
-            if ready.pose is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
+            if ready.pose is None or (motion.kind == "arc" and ready.via is None):
                 self.omit(motion)
                 return
             form = {"arc": "MoveC", "joint": "MoveJ"}.get(motion.kind, "MoveL")
@@ -115,12 +127,12 @@ class RapidWriter(writing.Writer):
         self._set_before(motion)
         self.lines.append(f"{form} {','.join(texts)},{speed},{zone},{tool}{base};")
 
-    def _configuration(self, ready: writing.ReadyMotion, supervision: str) -> str:
+    def _configuration(self, ready: ReadyMotion, supervision: str) -> str:
         """The target's confdata as it was read, or by the joints; not supervised where neither is known."""
         target = ready.motion.target
-        said = dict(target.configuration) if isinstance(target, instructions.PoseTarget) and self.own else {}
+        said = dict(target.configuration) if isinstance(target, PoseTarget) and self.own else {}
         if {"cf1", "cf4", "cf6", "cfx"} <= said.keys():
-            followed = isinstance(target, instructions.PoseTarget) and target.branch is not None
+            followed = isinstance(target, PoseTarget) and target.branch is not None
             self.set_once(supervision, f"{supervision} \\{'On' if followed else 'Off'};")
             return "[" + ",".join(f"{float(said[key]):g}" for key in ("cf1", "cf4", "cf6", "cfx")) + "]"
         self.set_once(supervision, f"{supervision} \\Off;")
@@ -129,7 +141,7 @@ class RapidWriter(writing.Writer):
             return "[0,0,0,0]"
         return "[" + ",".join(map(str, data_types.quarters_of(joints))) + ",0]"
 
-    def _frame(self, frame: instructions.NamedFrame, kind: str) -> str:
+    def _frame(self, frame: NamedFrame, kind: str) -> str:
         """The name of a tool or work object, which is declared once."""
         plain = frame.name.isidentifier() and frame.name.isascii() and frame.name.lower() not in RESERVED
         null = f"{kind}0"
@@ -155,7 +167,7 @@ class RapidWriter(writing.Writer):
                 self.declared.append(f'PERS wobjdata {name}:=[FALSE,TRUE,"",{pose},{null_pose}];')
         return self.frames[key]
 
-    def _speed(self, ready: writing.ReadyMotion) -> str:
+    def _speed(self, ready: ReadyMotion) -> str:
         motion = ready.motion
         speed = motion.speed
         given = speed is not None and speed.value > 0
@@ -164,63 +176,63 @@ class RapidWriter(writing.Writer):
             share = self.share(ready)
             self.count["estimated"] += speed.unit != "share"
         if share is not None:
-            self.set_once("vel", f"VelSet {writing.short(max(share, 0.001) * 100, 3)},5000;")
+            self.set_once("vel", f"VelSet {short(max(share, 0.001) * 100, 3)},5000;")
             return "vmax"
         self.set_once("vel", "VelSet 100,5000;")  # it may scale timed motions too
         if speed is None or not given:
             return "v100" if motion.kind != "joint" else "vmax"
         if speed.unit == "s":
-            return f"v1000\\T:={writing.short(speed.value)}"
+            return f"v1000\\T:={short(speed.value)}"
         if speed.unit != "m/s":
             return "v100"
         along = speed.value * 1000
-        turn = math.degrees(motion.turn_speed) if motion.turn_speed else data_types.TURN_SPEED
-        if along in data_types.TOOL_SPEEDS and abs(turn - data_types.TURN_SPEED) < 1e-9:
+        turn = math.degrees(motion.turn_speed) if motion.turn_speed else TURN_SPEED
+        if along in data_types.TOOL_SPEEDS and abs(turn - TURN_SPEED) < 1e-9:
             return f"v{along:g}"
-        return f"[{writing.short(along)},{writing.short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
+        return f"[{short(along)},{short(turn)},{data_types.SLIDE_SPEED:g},{data_types.AXIS_SPEED:g}]"
 
-    def _zone(self, motion: instructions.ArmMotion) -> str:
+    def _zone(self, motion: ArmMotion) -> str:
         """A zone by its name, or with turn and external axes as those that have one."""
-        zone: instructions.Zone = motion.zone
+        zone: Zone = motion.zone
         if zone.kind != "distance" or zone.value <= 0:
             self.count["zones"] += zone.kind != "fine"
             return "fine"
         size = zone.value * 1000
-        name = next((name.lower() for name, sizes in data_types.ZONES.items() if abs(sizes[0] - size) < 1e-9), "")
-        own, wide, turn = (writing.cut(share * size) for share in (1.0, 1.5, 0.15))
+        name = next((name.lower() for name, own in data_types.ZONES.items() if abs(own - size) < 1e-9), "")
+        own, wide, turn = (cut(share * size) for share in (1.0, 1.5, 0.15))
         return name or f"[FALSE,{own},{wide},{wide},{turn},{wide},{turn}]"
 
-    def _set_before(self, motion: instructions.ArmMotion) -> None:
+    def _set_before(self, motion: ArmMotion) -> None:
         acceleration = motion.acceleration
         if acceleration is None:
             return
         if acceleration.unit == "share":
-            self.set_once("acc", f"AccSet {writing.short(min(max(acceleration.value * 100, 20), 100), 3)},100;")
+            self.set_once("acc", f"AccSet {short(min(max(acceleration.value * 100, 20), 100), 3)},100;")
         elif acceleration.unit == "m/s2":
-            value = writing.short(acceleration.value)
+            value = short(acceleration.value)
             self.set_once("limit", f"PathAccLim TRUE\\AccMax:={value},TRUE\\DecelMax:={value};")
 
 
 def _joints_text(joints: Reals) -> str:
-    degrees = [writing.fixed(math.degrees(value), DIGITS) for value in joints]
+    degrees = [fixed(math.degrees(value), DIGITS) for value in joints]
     return f"[[{','.join([*degrees, *['0'] * (6 - len(degrees))])}],{NO_AXES}]"
 
 
 def _load_text(load: MassBody | None) -> str:
     """loaddata, with the principal axes of the inertia; the least that a controller takes if it is not known."""
     if load is None:
-        return f"[{data_types.MIN_LOAD},[0,0,{data_types.MIN_LOAD}],[1,0,0,0],0,0,0]"
-    pose, moments = writing.principal_axes(load)
-    quaternion = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in instructions.numbers_of(pose, "abb")[3:])
-    centre = ",".join(writing.short(each * 1000) for each in load.centre)
-    about = ",".join(writing.short(float(each), writing.LOAD_DIGITS) for each in moments)
-    return f"[{writing.short(load.mass)},[{centre}],[{quaternion}],{about}]"
+        return f"[{MIN_LOAD},[0,0,{MIN_LOAD}],[1,0,0,0],0,0,0]"
+    pose, moments = principal_axes(load)
+    quaternion = ",".join(fixed(each, QUATERNION_DIGITS) for each in numbers_of(pose, "abb")[3:])
+    centre = ",".join(short(each * 1000) for each in load.centre)
+    about = ",".join(short(float(each), LOAD_DIGITS) for each in moments)
+    return f"[{short(load.mass)},[{centre}],[{quaternion}],{about}]"
 
 
 def _pose_text(pose: Reals) -> str:
-    x, y, z, *quaternion = instructions.numbers_of(pose, "abb")
-    turn = ",".join(writing.fixed(each, QUATERNION_DIGITS) for each in quaternion)
-    return f"[[{writing.fixed(x, DIGITS)},{writing.fixed(y, DIGITS)},{writing.fixed(z, DIGITS)}],[{turn}]]"
+    x, y, z, *quaternion = numbers_of(pose, "abb")
+    turn = ",".join(fixed(each, QUATERNION_DIGITS) for each in quaternion)
+    return f"[[{fixed(x, DIGITS)},{fixed(y, DIGITS)},{fixed(z, DIGITS)}],[{turn}]]"
 
 
 def _target_text(pose: Reals, conf: str) -> str:

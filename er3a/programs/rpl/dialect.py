@@ -8,9 +8,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import IN_DEGREES, Dialect, ProgramMemory, evaluated, external_axes, unresolved
+from er3a.programs import instructions
+from er3a.programs.evaluation import (
+    IN_DEGREES,
+    Dialect,
+    ProgramMemory,
+    evaluated,
+    external_axes,
+    target_numbers,
+    unresolved,
+)
+from er3a.programs.instructions import ArmMotion, NamedFrame, Rate, UnresolvedTarget, Zone
 from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
+from er3a.programs.syntax import Expression, Invocation, Move, Record, Unclear, Value, number, shown
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
 ZONE = re.compile(r"z(\d+(?:\.\d+)?)$", re.IGNORECASE)
@@ -26,7 +36,7 @@ class RplDialect(Dialect):
     signals = ("io.", "fidbus.")
     harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
 
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function of RPL: points, OFFSET, roots and absolute values.
 
         Returns
@@ -37,13 +47,13 @@ class RplDialect(Dialect):
         values = [None if each is None else memory.value(each) for each in given.arguments]
         if name in FIELDS:
             return _point(name, values)
-        if name == "OFFSET" and values and isinstance(values[0], syntax.Record):
+        if name == "OFFSET" and values and isinstance(values[0], Record):
             return _offset(values[0], values[1:])
         found = evaluated(ROOTS[name.upper()], values) if name.upper() in ROOTS and len(values) == 1 else None
-        unclear = f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})"
-        return syntax.Unclear(unclear) if found is None else found
+        unclear = f"{name}({', '.join('' if each is None else shown(each) for each in values)})"
+        return Unclear(unclear) if found is None else found
 
-    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion of MJOINT and MLIN: target, speed, zone, tool, reference frame.
 
         Returns
@@ -52,23 +62,21 @@ class RplDialect(Dialect):
             base
         """
         given = [*move.arguments, *[None] * (5 - len(move.arguments))]
-        point = syntax.Unclear(move.text) if given[0] is None else memory.value(given[0])
-        goal = (
-            _target(point, move.text) if len(given) == 5 else instructions.UnresolvedTarget(move.text, "not_understood")
-        )
+        point = Unclear(move.text) if given[0] is None else memory.value(given[0])
+        goal = _target(point, move.text) if len(given) == 5 else UnresolvedTarget(move.text, "not_understood")
         tool, base = (_word(memory, each) for each in given[3:5])
         frames = memory.cell.frames
         base_pose = frames.get(base or NO_BASE)
         if base_pose is None and base in ("", NO_BASE):
             base_pose = np.eye(4)
-        return instructions.ArmMotion(
+        return ArmMotion(
             "joint" if move.form == "MJOINT" else "line",
             goal,
             move.form,
             speed=_speed(_word(memory, given[1])),
             zone=_zone(_word(memory, given[2])),
-            tool=instructions.NamedFrame(tool or "no tool", frames.get(tool)),
-            base=instructions.NamedFrame(base or NO_BASE, base_pose),
+            tool=NamedFrame(tool or "no tool", frames.get(tool)),
+            base=NamedFrame(base or NO_BASE, base_pose),
         )
 
     def is_followed(self, name: str) -> bool:
@@ -81,73 +89,63 @@ class RplDialect(Dialect):
         return name.partition(".")[0] not in LIBRARY_NAMES
 
 
-def _word(memory: ProgramMemory, expression: syntax.Expression | None) -> str:
+def _word(memory: ProgramMemory, expression: Expression | None) -> str:
     """The name of a speed, zone or tool, also where a variable of the program holds it."""
-    return "" if expression is None else syntax.shown(memory.value(expression))
+    return "" if expression is None else shown(memory.value(expression))
 
 
-def _speed(word: str) -> instructions.Rate | None:
+def _speed(word: str) -> Rate | None:
     match = SPEED.match(word)
     if match is None:
-        return instructions.Rate(0.0, "m/s", word) if word else None
+        return Rate(0.0, "m/s", word) if word else None
     value = float(match[1])
-    return instructions.Rate(value / 100, "share", word) if match[2] else instructions.Rate(value / 1000, "m/s", word)
+    return Rate(value / 100, "share", word) if match[2] else Rate(value / 1000, "m/s", word)
 
 
-def _zone(word: str) -> instructions.Zone:
+def _zone(word: str) -> Zone:
     match = ZONE.match(word)
     if match is not None:
-        return instructions.Zone("distance", float(match[1]) / 1000, word)
-    return instructions.FINE if word == "fine" else instructions.Zone("named", 0.0, word or "not given")
+        return Zone("distance", float(match[1]) / 1000, word)
+    return instructions.FINE if word == "fine" else Zone("named", 0.0, word or "not given")
 
 
-def _point(name: str, values: list[syntax.Value | None]) -> syntax.Value:
+def _point(name: str, values: list[Value | None]) -> Value:
     """A point of its parts; an unclear one makes it unclear only when it is gone to."""
     fields = FIELDS[name]
-    if not 6 <= len(values) <= len(fields) and not any(
-        each is None or isinstance(each, syntax.Unclear) for each in values
-    ):
-        return syntax.Record(name, ())  # which is no point
+    if not 6 <= len(values) <= len(fields) and not any(each is None or isinstance(each, Unclear) for each in values):
+        return Record(name, ())  # which is no point
     if not 6 <= len(values) <= len(fields) or None in values:
-        return syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
+        return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
     given = [each for each in values if each is not None]
     if name == "EPOINTC" and len(given) == 10 and isinstance(given[6], str):
         fields = FIELDS["POINTC"]
-    return syntax.Record(name, tuple(zip(fields, given)))
+    return Record(name, tuple(zip(fields, given)))
 
 
-def _offset(point: syntax.Record, by: list[syntax.Value | None]) -> syntax.Value:
+def _offset(point: Record, by: list[Value | None]) -> Value:
     if len(by) > 3:
-        return syntax.Unclear(f"OFFSET({syntax.shown(point)}, ...)")
+        return Unclear(f"OFFSET({shown(point)}, ...)")
     for key, step in zip(POSITION, by):
         old = point.get(key)
         for part in (old, step):
-            if isinstance(part, syntax.Unclear):
+            if isinstance(part, Unclear):
                 return part
-        a, b = syntax.number(old), syntax.number(step)
+        a, b = number(old), number(step)
         if a is None or b is None:
-            return syntax.Unclear(f"OFFSET({syntax.shown(point)})")
+            return Unclear(f"OFFSET({shown(point)})")
         point = point.having(key, a + b)
     return point
 
 
-def _target(value: syntax.Value, text: str) -> instructions.Target:
-    if isinstance(value, syntax.Unclear):
+def _target(value: Value, text: str) -> instructions.Target:
+    if isinstance(value, Unclear):
         return unresolved(value)
-    if not isinstance(value, syntax.Record):
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
-        return instructions.UnresolvedTarget(text, "not_understood")
+    if not isinstance(value, Record) or not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
+        return UnresolvedTarget(text, "not_understood")
     keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
-    parts = [value.get(key) for key in keys]
-    for part in parts:
-        if isinstance(part, syntax.Unclear):
-            return _target(part, text)
-    plain = syntax.numbers(tuple(parts))
-    if plain is None:
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if not syntax.finite(plain):
-        return instructions.UnresolvedTarget(text, "not_finite")
+    plain = target_numbers([value.get(key) for key in keys], text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
     outer = external_axes(value, OUTER)
     if keys is JOINTS:
         return instructions.JointTarget(np.radians(plain), outer)

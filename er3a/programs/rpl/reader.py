@@ -9,31 +9,23 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from er3a.errors import InputError
-from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, ProgramText, Words, data_file_of, read_program_text
-
-RPL = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
-    ),
-    ranks={
-        **dict.fromkeys(("OR", "or", "||"), 1),
-        **dict.fromkeys(("XOR", "xor"), 2),
-        **dict.fromkeys(("AND", "and", "&", "&&"), 3),
-        **dict.fromkeys(("=", "==", "<>", "!="), 4),
-        **dict.fromkeys(("<", ">", "<=", ">="), 5),
-        "+": 6,
-        "-": 6,
-        **dict.fromkeys(("*", "/", "MOD"), 7),
-        "**": 8,
-    },
-    right={"NOT": 9, "not": 9, "!": 9, "-": 9, "+": 9},
-    constants={"TRUE": True, "FALSE": False},
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, data_file_of, ranked, read_program_text
+from er3a.programs.syntax import (
+    Assign,
+    Constant,
+    Doing,
+    Expression,
+    Invocation,
+    Move,
+    Opaque,
+    Program,
+    Unclear,
+    Variable,
+    Waiting,
 )
+
 MOTIONS = ("MJOINT", "MLIN")
 POSITION = ("x", "y", "z", "a", "b", "c")
 JOINTS = ("j1", "j2", "j3", "j4", "j5", "j6")
@@ -45,25 +37,28 @@ FIELDS = {
     "EPOINTJ": JOINTS + OUTER,
     "EPOINTC": POSITION + OUTER + CONFIGURATION,
 }
-WORD = re.compile(r"[^\W\d]\w*$")
 
 
 class RplWords(Words):
     """Words of a statement of RPL."""
 
-    def __init__(self, text: str):
-        super().__init__(RPL, text)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)"""
+        r"""|(?P<mark>:=|&&|\|\||<>|!=|==|<=|>=|\*\*|\S)"""
+    )
+    ranks = ranked("OR or ||", "XOR xor", "AND and & &&", "= == <> !=", "< > <= >=", "+ -", "* / MOD", "**")
+    right = dict.fromkeys(("NOT", "not", "!", "-", "+"), 9)
 
-    def special(self) -> syntax.Expression | None:
+    def special(self) -> Expression | None:
         """The taught point ``*`` of a motion."""
-        return syntax.Opaque(self.take()) if self.next == "*" and self.kind == "mark" else None
+        return Opaque(self.take()) if self.next == "*" and self.kind == "mark" else None
 
 
 LIBRARY_NAMES = frozenset(("io", "fidbus", "sys", "str", "log", "tcpip"))
 """Names that belong to the controller, not to a program's .var file."""
 
 
-def expression(text: str) -> syntax.Expression:
+def expression(text: str) -> Expression:
     """An expression by itself, such as an entry of a file of points.
 
     Parameters
@@ -74,18 +69,10 @@ def expression(text: str) -> syntax.Expression:
     -------
     expression : :class:`Opaque` with its text if it is not understood
     """
-    if WORD.match(text) and text.upper() not in RPL.constants and text not in RPL.right:
-        return syntax.Variable(text)
-    words = RplWords(text)
-    try:
-        found = words.expression()
-        words.finish()
-    except MisreadError:
-        return syntax.Opaque(" ".join(text.split()))
-    return found
+    return RplWords(text).condition()
 
 
-def initial(text: str, kind: str) -> syntax.Expression:
+def initial(text: str, kind: str) -> Expression:
     """The first value of a declared variable.
 
     Parameters
@@ -96,52 +83,33 @@ def initial(text: str, kind: str) -> syntax.Expression:
     return expression(kind + text if kind in FIELDS and text.startswith("(") else text)
 
 
-def plain_statement(builder: CodeBuilder, place: Place, text: str) -> None:
-    """Read a statement that begins and ends no block: an assignment or a call.
-
-    Parameters
-    ----------
-    builder : takes the operation
-    text : without the semicolon
-
-    Raises
-    ------
-    MisreadError
-        if it can't be read
-    """
-    words = RplWords(text)
+def _plain(builder: CodeBuilder, words: Words, place: Place, text: str) -> None:
+    """An assignment or a call."""
     left = words.expression()
     if words.accept(":="):
         value = words.expression()
         words.finish()
-        builder.add(syntax.Assign(place, left, value, text))
+        builder.add(Assign(place, left, value, text))
         return
     words.finish()
-    if not isinstance(left, syntax.Invocation):
+    if not isinstance(left, Invocation):
         raise MisreadError("neither an assignment nor a call")
-    call(builder, place, left, text)
+    _call(builder, place, left, text)
 
 
-def call(builder: CodeBuilder, place: Place, left: syntax.Invocation, text: str) -> None:
-    """Read a statement that is a call: a motion, a wait, a routine.
-
-    Parameters
-    ----------
-    builder : takes the operation
-    left : the call
-    text : of the statement, for messages
-    """
+def _call(builder: CodeBuilder, place: Place, left: Invocation, text: str) -> None:
+    """A call: a motion, a wait, a routine."""
     name, given = left.function.upper(), left.arguments
     if name in MOTIONS:
-        builder.add(syntax.Move(place, name, given, text))
+        builder.add(Move(place, name, given, text))
     elif name == "WAIT" and len(given) == 1:
-        builder.add(syntax.Waiting(place, "condition", given[0], text[text.index("(") + 1 : text.rindex(")")].strip()))
+        builder.add(Waiting(place, "condition", given[0], text[text.index("(") + 1 : text.rindex(")")].strip()))
     elif name == "DWELL" and len(given) == 1:
-        builder.add(syntax.Waiting(place, "seconds", given[0], text))
-    elif name == "CALL" and len(given) == 1 and isinstance(given[0], syntax.Invocation):
-        builder.add(syntax.Doing(place, given[0], text))
+        builder.add(Waiting(place, "seconds", given[0], text))
+    elif name == "CALL" and len(given) == 1 and isinstance(given[0], Invocation):
+        builder.add(Doing(place, given[0], text))
     else:
-        builder.add(syntax.Doing(place, left, text))
+        builder.add(Doing(place, left, text))
 
 
 BREAKS = re.compile(
@@ -157,7 +125,7 @@ VARIABLE = re.compile(
 MAIN = "MAIN"
 
 
-def read_rpl(source: ProgramText) -> syntax.Program:
+def read_rpl(source: ProgramText) -> Program:
     """The program of a .pgm file.
 
     Raises
@@ -173,10 +141,10 @@ def read_rpl(source: ProgramText) -> syntax.Program:
         else:
             statement(builder, place, text)
     by_name, data = linked([builder.routine(place)]), tuple(_variables(source))
-    return syntax.Program("rpl", source.path.stem, source.path, by_name, MAIN, data, lines=source.lines)
+    return Program("rpl", source.path.stem, source.path, by_name, MAIN, data, lines=source.lines)
 
 
-def _variables(source: ProgramText) -> Iterator[syntax.Assign]:
+def _variables(source: ProgramText) -> Iterator[Assign]:
     """Declarations of the .var file."""
     path = data_file_of(source.path, ".var")
     for number, line in enumerate(read_program_text(path).lines if path else (), 1):
@@ -184,8 +152,8 @@ def _variables(source: ProgramText) -> Iterator[syntax.Assign]:
             scope, kind, name, _, first = match.groups()
             value = initial(first, kind.upper()) if first else None
             if scope.upper() == "INPUT":  # which the caller gives
-                value = syntax.Constant(syntax.Unclear(name))
-            yield syntax.Assign(Place(path, number), syntax.Variable(name), value, line.strip(), kind.upper())
+                value = Constant(Unclear(name))
+            yield Assign(Place(path, number), Variable(name), value, line.strip(), kind.upper())
 
 
 def _ends(text: str, mark: str) -> bool:
@@ -212,12 +180,11 @@ def statement(builder: CodeBuilder, place: Place, text: str) -> None:
     if not text:
         return
     try:
-        if not block(builder, RplWords(text), place, text, BLOCKS):
-            plain_statement(builder, place, text)
+        words = RplWords(text)
+        if not block(builder, words, place, text, BLOCKS):
+            _plain(builder, words, place, text)
     except MisreadError:
         builder.unread(place, text)
-    except RecursionError:
-        raise InputError(place.file, place.where, "nested too deeply", "Split this statement") from None
 
 
 BLOCKS = {

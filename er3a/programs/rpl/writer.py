@@ -19,7 +19,7 @@ from er3a.planning.sequences import Arc
 from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, numbers_of
 from er3a.programs.rpl.dialect import SPEED, ZONE
 from er3a.programs.solving import way_of
-from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, fixed, short, tool_speed
+from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, by_length, fixed, short
 
 DIGITS = 6
 MAX_LINES = 10_000  # for an arc
@@ -162,7 +162,7 @@ class RplWriter(Writer):
         """Lines near the arc, through the joints that the arm's table gives."""
         motion = ready.motion
         joints = None
-        if ready.pose is not None and ready.pose_before is not None and ready.via is not None and motion.angle is None:
+        if ready.pose is not None and ready.pose_before is not None and ready.via is not None:
             poses = _chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
             frames = (motion.tool, motion.base)
             joints = None if poses is None else self.resolver.along(poses, frames, ready.joints_before)
@@ -196,7 +196,7 @@ class RplWriter(Writer):
         if speed is not None and self.own and SPEED.match(speed.text):
             return speed.text
         joint = ready.motion.kind == "joint"
-        value = self.share(ready) if joint else tool_speed(ready)
+        value = self.share(ready) if joint else by_length(ready, "m/s")
         if value is None or speed is None:
             self.count["estimated"] += speed is not None
             return USUAL_JOINT if joint else USUAL_LINE

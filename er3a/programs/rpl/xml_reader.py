@@ -6,120 +6,65 @@ Elements that are not understood are kept; a loop's body is another ``Pou`` that
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Mapping
+from functools import partial
+from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from er3a.errors import InputError
-from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, fault, linked
-from er3a.programs.instructions import Disabled, Place
+from er3a.programs.instructions import Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.rpl.reader import expression, initial, statement
+from er3a.programs.syntax import Assign, Program, Return, Routine, RoutineParameter, Variable
 
 DEEPEST_ELEMENT = 100
 DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
 
 
-@dataclass(slots=True, eq=False)
-class XmlNode:
-    """An element."""
-
-    tag: str
-    line: int
-    attributes: dict[str, str]
-    children: list[XmlNode] = field(default_factory=list)
-    parts: list[str] = field(default_factory=list)
-
-    @property
-    def text(self) -> str:
-        """Its own text."""
-        return "".join(self.parts).strip()
-
-    def child(self, tag: str) -> XmlNode | None:
-        """The first child with a tag.
-
-        Parameters
-        ----------
-        tag : without namespace
-
-        Returns
-        -------
-        node : None if there is none
-        """
-        return next((each for each in self.children if each.tag == tag), None)
-
-    def text_of(self, tag: str) -> str:
-        """The text of the first child with a tag.
-
-        Parameters
-        ----------
-        tag : of a direct child
-
-        Returns
-        -------
-        text : empty if there is none
-        """
-        found = self.child(tag)
-        return "" if found is None else found.text
-
-    def all(self, *path: str) -> list[XmlNode]:
-        """The descendants along a path of tags.
-
-        Parameters
-        ----------
-        path : tags from the children on; none for the element itself
-
-        Returns
-        -------
-        nodes : in the order of the file
-        """
-        found = [self]
-        for tag in path:
-            found = [each for node in found for each in node.children if each.tag == tag]
-        return found
-
-    def below(self) -> Iterator[XmlNode]:
-        """All elements within it."""
-        for each in self.children:
-            yield each
-            yield from each.below()
+LINE = "line of the file"
+"""Attribute of every element in memory; no attribute of XML has such a name."""
 
 
-def read_xml(source: ProgramText) -> XmlNode:
+def read_xml(source: ProgramText) -> Element:
     """The top element.
+
+    Returns
+    -------
+    top : all elements have their line as the attribute ``LINE``
 
     Raises
     ------
     InputError
         for text that is not XML, holds a document type or entities, or is nested too deeply
     """
-    top = XmlNode("", 0, {})
-    stack = [top]
+    tree, depth = TreeBuilder(), 0
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
 
-    def refuse(*_: object) -> int:
-        problem, remedy = "holds a document type or entities", "Remove them; a program needs none"
+    def refuse(*_: object, problem: str = "holds a document type or entities") -> int:
+        remedy = "A program needs none, and few elements within each other"
         raise InputError(source.path, f"line {parser.CurrentLineNumber}", problem, remedy)
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        if len(stack) > DEEPEST_ELEMENT:
-            problem = f"more than {DEEPEST_ELEMENT} elements within each other"
-            raise InputError(source.path, f"line {parser.CurrentLineNumber}", problem, "Nest fewer")
-        node = XmlNode(tag, parser.CurrentLineNumber, attributes)
-        stack[-1].children.append(node)
-        stack.append(node)
+        nonlocal depth
+        depth += 1
+        if depth > DEEPEST_ELEMENT:
+            refuse(problem=f"more than {DEEPEST_ELEMENT} elements within each other")
+        tree.start(tag, {**attributes, LINE: str(parser.CurrentLineNumber)})
 
-    def end(_: str) -> None:
-        stack.pop()
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        tree.end(tag)
 
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
     parser.ExternalEntityRefHandler = refuse
     parser.StartElementHandler = start
     parser.EndElementHandler = end
-    parser.CharacterDataHandler = lambda text: stack[-1].parts.append(text)
+    parser.CharacterDataHandler = tree.data
     text = DECLARATION.sub(lambda match: "\n" * match.group().count("\n"), source.text, count=1)
     try:
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
@@ -127,7 +72,22 @@ def read_xml(source: ProgramText) -> XmlNode:
         problem = f"not valid XML ({expat.ErrorString(error.code)})"
         remedy = "Correct the file, or save it on the pendant again"
         raise InputError(source.path, f"line {error.lineno}", problem, remedy) from None
-    return top.children[0]
+    return tree.close()
+
+
+def _text(element: Element, tag: str) -> str:
+    """The text of the first child with a tag; empty if there is none."""
+    found = element.find(tag)
+    return "" if found is None else _own_text(found)
+
+
+def _own_text(element: Element) -> str:
+    """All text that is not within the children."""
+    return "".join((element.text or "", *(each.tail or "" for each in element))).strip()
+
+
+def _place(source: ProgramText, element: Element, path: str) -> Place:
+    return Place(source.path, int(element.attrib[LINE]), path)
 
 
 TOP = "Xpl-source"
@@ -147,7 +107,7 @@ PARTS: Mapping[str, tuple[str, ...]] = {
 """The elements that are understood, with those that they hold. An element with others, or with attributes, is not."""
 
 
-def read_xpl(source: ProgramText) -> syntax.Program:
+def read_xpl(source: ProgramText) -> Program:
     """The program of an .XPL file.
 
     Raises
@@ -159,37 +119,36 @@ def read_xpl(source: ProgramText) -> syntax.Program:
         problem = "is text, not XML: the controller refuses it (alarm 4902)"
         raise InputError(source.path, None, problem, "Save it as .pgm, or export it from the pendant")
     top = read_xml(source)
-    environment = top.child("XplEnvironment")
+    environment = top.find("XplEnvironment")
     if top.tag != TOP or environment is None:
         problem = f"the top element is <{top.tag}>" if top.tag != TOP else "holds no <XplEnvironment>"
-        raise InputError(source.path, f"line {top.line}", problem, f"An .XPL file has <{TOP}> with <XplEnvironment>")
-    pous = environment.all("Pous", "Pou")
+        raise fault(_place(source, top, ""), problem, f"An .XPL file has <{TOP}> with <XplEnvironment>")
+    pous = environment.findall("Pous/Pou")
     if not pous:
-        raise InputError(source.path, f"line {environment.line}", "holds no <Pou>", "Give a program with its Main")
+        raise fault(_place(source, environment, ""), "holds no <Pou>", "Give a program with its Main")
     by_name = linked([_Pou(source, pou).routine() for pou in pous])
-    entry = next((pou for pou in pous if pou.text_of("Type").upper() == "PROGRAM"), pous[0])
-    groups = [each for group in environment.all("VarDeclarations") for each in group.children]
-    data = tuple(_declared(source, var, local=False) for group in groups for var in group.all("Var"))
-    name = entry.text_of("Name")
-    return syntax.Program("xpl", source.path.stem, source.path, by_name, name, data, lines=source.lines)
+    entry = next((pou for pou in pous if _text(pou, "Type").upper() == "PROGRAM"), pous[0])
+    data = tuple(_declared(source, var, local=False) for var in environment.findall("VarDeclarations/*/Var"))
+    name = _text(entry, "Name")
+    return Program("xpl", source.path.stem, source.path, by_name, name, data, lines=source.lines)
 
 
-def _declared(source: ProgramText, var: XmlNode, local: bool) -> syntax.Assign:
-    kind, name, first = var.text_of("Type"), var.text_of("Name"), var.text_of("InitValue")
-    place = Place(source.path, var.line, f"Var {name}")
+def _declared(source: ProgramText, var: Element, local: bool) -> Assign:
+    kind, name, first = _text(var, "Type"), _text(var, "Name"), _text(var, "InitValue")
+    place = _place(source, var, f"Var {name}")
     value = initial(first, kind) if first else None
-    return syntax.Assign(place, syntax.Variable(name), value, f"{kind} {name} := {first}", kind, local)
+    return Assign(place, Variable(name), value, f"{kind} {name} := {first}", kind, local)
 
 
 class _Pou:
     """One routine, with the bodies of its loops."""
 
-    def __init__(self, source: ProgramText, pou: XmlNode):
+    def __init__(self, source: ProgramText, pou: Element):
         self.source, self.pou = source, pou
-        self.name = pou.text_of("Name")
-        self.place = Place(source.path, pou.line, self.name)
+        self.name = _text(pou, "Name")
+        self.place = _place(source, pou, self.name)
 
-    def routine(self) -> syntax.Routine:
+    def routine(self) -> Routine:
         """The routine: its parameters, its own variables, and its body with all loops.
 
         Returns
@@ -202,41 +161,41 @@ class _Pou:
             for a loop without a body, or blocks nested too deeply
         """
         parameters = tuple(
-            syntax.RoutineParameter(var.text_of("Name"), var.text_of("Attrib").upper() not in ("IN", ""))
-            for var in self.pou.all("VarDeclarations", "VarInterface", "Var")
+            RoutineParameter(_text(var, "Name"), _text(var, "Attrib").upper() not in ("IN", ""))
+            for var in self.pou.findall("VarDeclarations/VarInterface/Var")
         )
         builder = CodeBuilder(self.name, parameters, self.place)
-        for var in self.pou.all("VarDeclarations", "VarLocal", "Var"):
+        for var in self.pou.findall("VarDeclarations/VarLocal/Var"):
             builder.add(_declared(self.source, var, local=True))
         self._body(builder, self.pou, self.name, ())
         return builder.routine(self.place)
 
-    def _body(self, builder: CodeBuilder, pou: XmlNode, path: str, within: tuple[XmlNode, ...]) -> None:
-        counts: dict[str, int] = {}
-        for element in (each for body in pou.all("Body") for each in body.children):
-            counts[element.tag] = counts.get(element.tag, 0) + 1
-            place = Place(self.source.path, element.line, f"{path}/{element.tag}[{counts[element.tag]}]")
-            switch = element.attributes.pop("disable", "false").lower()
-            if switch == "true" and not element.attributes:
-                builder.add(syntax.Fixed(place, Disabled(text_of(element))))
+    def _body(self, builder: CodeBuilder, pou: Element, path: str, within: tuple[Element, ...]) -> None:
+        counts: Counter[str] = Counter()
+        for element in pou.findall("Body/*"):
+            counts[element.tag] += 1
+            place = _place(self.source, element, f"{path}/{element.tag}[{counts[element.tag]}]")
+            switch = element.attrib.pop("disable", "false").lower()
+            if switch == "true" and len(element.attrib) == 1:
+                builder.remark(place, f"disabled: {text_of(element)}")
             elif switch != "false" or _is_strange(element):
                 builder.unread(place, f"{text_of(element)} {_all_text(element)}")
             elif element.tag == "rem":
-                builder.remark(place, element.text_of("text"))
+                builder.remark(place, _text(element, "text"))
             elif element.tag == "end_pro":
-                builder.add(syntax.Return(place, ends=True))
+                builder.add(Return(place, ends=True))
             else:
                 statement(builder, place, text_of(element))
-            if element.child("pouref") is not None and element.tag in ("while", "for"):
+            if element.find("pouref") is not None and element.tag in ("while", "for"):
                 self._inside(builder, element, place, (*within, pou))
-            elif element.tag == "wait" and (flag := element.text_of("var")):  # whether it came in time
+            elif element.tag == "wait" and (flag := _text(element, "var")):  # whether it came in time
                 builder.unclear(place, expression(flag), flag)
 
-    def _inside(self, builder: CodeBuilder, element: XmlNode, place: Place, within: tuple[XmlNode, ...]) -> None:
+    def _inside(self, builder: CodeBuilder, element: Element, place: Place, within: tuple[Element, ...]) -> None:
         """A loop's body: the nearest around it that has its name."""
-        name = element.text_of("pouref")
-        places = (*(each for pou in reversed(within) for each in pou.children), *self.pou.below())
-        body = next((each for each in places if each.tag == "Pou" and each.text_of("Name") == name), None)
+        name = _text(element, "pouref")
+        places = (*(each for pou in reversed(within) for each in pou.findall("Pou")), *self.pou.iter("Pou"))
+        body = next((each for each in places if each is not self.pou and _text(each, "Name") == name), None)
         if body is None:
             raise fault(place, f"there is no <Pou> '{name}' for the loop's body", "Add it, or correct <pouref>")
         if body in within or len(within) > MAX_LOOPS:
@@ -245,26 +204,17 @@ class _Pou:
         builder.close(element.tag, place)
 
 
-def _is_strange(element: XmlNode) -> bool:
+def _is_strange(element: Element) -> bool:
     """Whether something of an element is not understood."""
     parts = PARTS.get(element.tag)
-    inside = list(element.below())
     return (
         parts is None
-        or any(each.tag not in parts for each in inside)
-        or any(each.attributes or (each.children and each.text) for each in (element, *inside))
+        or any(each.tag not in parts for each in element.iter() if each is not element)
+        or any(len(each.attrib) > 1 or (len(each) and _own_text(each)) for each in element.iter())
     )
 
 
-def _arguments(call: XmlNode) -> list[str]:
-    """What a routine is called with, without what is left out at the end."""
-    texts = [each.text for each in call.all("subroutine", "args", "arg")]
-    while texts and not texts[-1]:
-        texts.pop()
-    return texts
-
-
-def text_of(element: XmlNode) -> str:
+def text_of(element: Element) -> str:
     """An element as one line of RPL, as far as it has an equal there.
 
     Parameters
@@ -275,7 +225,7 @@ def text_of(element: XmlNode) -> str:
     -------
     text : for others the tag and all text within it, 200 letters at most
     """
-    inner = element.text_of
+    inner = partial(_text, element)
     match element.tag:
         case "mjoint" | "mlin":
             return f"{element.tag.upper()}({', '.join(map(inner, MOTION_PARTS)).rstrip(', ')})"
@@ -288,15 +238,16 @@ def text_of(element: XmlNode) -> str:
         case "while":
             return f"WHILE {inner('cond')} DO"
         case "for":
-            step = f" BY {inner('by')}" if element.child("by") is not None else ""
+            step = f" BY {inner('by')}" if element.find("by") is not None else ""
             return f"FOR {inner('var')} := {inner('from')} TO {inner('to')}{step} DO"
         case "rem":
             return f"(* {inner('text')} *)"
         case "call":
-            name = "".join(each.text_of("name") for each in element.all("subroutine"))
-            return f"{name}({', '.join(_arguments(element))})"
+            name = "".join(_text(each, "name") for each in element.findall("subroutine"))
+            arguments = ", ".join(map(_own_text, element.findall("subroutine/args/arg")))
+            return f"{name}({arguments.rstrip(', ')})"
     return f"<{element.tag}> {_all_text(element)}"[:200]
 
 
-def _all_text(element: XmlNode) -> str:
-    return " ".join(filter(None, (each.text for each in (element, *element.below()))))
+def _all_text(element: Element) -> str:
+    return " ".join(filter(None, map(_own_text, element.iter())))

@@ -11,12 +11,46 @@ import scipy
 
 from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
-from er3a.programs import instructions, syntax
-from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, unresolved
+from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, target_numbers
+from er3a.programs.instructions import (
+    FINE,
+    ArmMotion,
+    Aside,
+    Instruction,
+    JointTarget,
+    Load,
+    MotionKind,
+    NamedFrame,
+    Output,
+    PoseTarget,
+    RateUnit,
+    Target,
+    UnclearLoad,
+    Unknown,
+    UnresolvedTarget,
+    Zone,
+    numbers_of,
+    pose_of,
+)
+from er3a.programs.syntax import (
+    POSE_KEYS,
+    Doing,
+    Expression,
+    Invocation,
+    Move,
+    Record,
+    Unclear,
+    Value,
+    finite,
+    number,
+    numbers,
+    rate_of,
+    shown,
+)
 from er3a.programs.urscript.reader import LIST_METHODS
 from er3a.robots.masses import MassBody
 
-KINDS: dict[str, instructions.MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
+KINDS: dict[str, MotionKind] = {"movej": "joint", "movel": "line", "movep": "line", "movec": "arc"}
 PARAMETERS = {
     "movej": ("q", "a", "v", "t", "r"),
     "movel": ("pose", "a", "v", "t", "r"),
@@ -25,7 +59,7 @@ PARAMETERS = {
 }
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
 SAME_TURN = 1e-9  # of an element of a rotation matrix
-ROBOT_BASE = instructions.NamedFrame("base", np.eye(4))
+ROBOT_BASE = NamedFrame("base", np.eye(4))
 RESTING = frozenset(("set_gravity", "set_payload_mass", "set_payload_cog", "servoc", "servoj", "speedj", "speedl"))
 """What is not followed, and sets no tool; some of them move the arm."""
 HARMLESS_TEXT = """
@@ -113,7 +147,7 @@ PLAIN: dict[str, Callable[..., float]] = {
     "log": lambda base, x: math.log(x, base),
     "abs": abs,
 }
-Values = dict[str, syntax.Value]
+Values = dict[str, Value]
 
 
 class UrScriptDialect(Dialect):
@@ -130,7 +164,7 @@ class UrScriptDialect(Dialect):
     first_index = 0
     harmless = HARMLESS | SIGNATURES.keys() | {"struct"}
 
-    def constant(self, memory: ProgramMemory, name: str) -> syntax.Value | None:
+    def constant(self, memory: ProgramMemory, name: str) -> Value | None:
         """Numbers of the language.
 
         Returns
@@ -139,7 +173,7 @@ class UrScriptDialect(Dialect):
         """
         return math.pi if name == "MATH_PI" else None
 
-    def listed(self, kind: str, values: tuple[syntax.Value, ...]) -> syntax.Value:
+    def listed(self, kind: str, values: tuple[Value, ...]) -> Value:
         """The value of ``[...]``, and of ``p[...]`` with six numbers.
 
         Parameters
@@ -153,10 +187,10 @@ class UrScriptDialect(Dialect):
         if not kind:
             return values
         if len(values) != 6:
-            return syntax.Unclear(f"p[{', '.join(map(syntax.shown, values))}]")
-        return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, values)))
+            return Unclear(f"p[{', '.join(map(shown, values))}]")
+        return Record("p", tuple(zip(POSE_KEYS, values)))
 
-    def function(self, memory: ProgramMemory, name: str, given: syntax.Invocation) -> syntax.Value:
+    def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function of URScript: mathematics, poses, lists, where the arm is.
 
         Returns
@@ -165,8 +199,8 @@ class UrScriptDialect(Dialect):
         """
         values, keywords = _given(memory, given.arguments, given.keywords)
         if name == "struct":
-            return syntax.Record(name, tuple(keywords.items()))
-        unclear = syntax.Unclear(f"{name}({', '.join('' if each is None else syntax.shown(each) for each in values)})")
+            return Record(name, tuple(keywords.items()))
+        unclear = Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
         placed = _placed(SIGNATURES.get(name), values, keywords)
         if placed is None:
             return unclear
@@ -177,7 +211,7 @@ class UrScriptDialect(Dialect):
             found = _of_values(name, list(placed.values())) if found is None else found
         return unclear if found is None else found
 
-    def motion(self, memory: ProgramMemory, move: syntax.Move) -> instructions.ArmMotion:
+    def motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
         """The motion of movej, movel, movep and movec.
 
         Returns
@@ -188,37 +222,36 @@ class UrScriptDialect(Dialect):
         kind, tool = KINDS[move.form], _tool(memory)
         values = _placed(PARAMETERS[move.form], *_given(memory, move.arguments, move.settings))
         if values is None:
-            unknown = instructions.UnresolvedTarget(move.text, "not_understood")
-            return instructions.ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None, tool=tool)
-        goals = [values.get(name, syntax.Unclear(move.text)) for name in PARAMETERS[move.form][: 1 + (kind == "arc")]]
+            unknown = UnresolvedTarget(move.text, "not_understood")
+            return ArmMotion(kind, unknown, move.form, unknown if kind == "arc" else None, tool=tool)
+        goals = [values.get(name, Unclear(move.text)) for name in PARAMETERS[move.form][: 1 + (kind == "arc")]]
         made = [_target(goal, move.text) for goal in goals]
         a, v = DEFAULTS[move.form]
-        unit: tuple[instructions.RateUnit, instructions.RateUnit] = ("m/s", "m/s2")
+        unit: tuple[RateUnit, RateUnit] = ("m/s", "m/s2")
         if kind == "joint":
             unit = ("rad/s", "rad/s2")
-        timed = "t" in values and syntax.number(values["t"]) != 0.0  # 0: by speed and acceleration
-        speed = syntax.rate_of(values["t"], "s") if timed else syntax.rate_of(values.get("v", v), unit[0])
+        timed = "t" in values and number(values["t"]) != 0.0  # 0: by speed and acceleration
+        speed = rate_of(values["t"], "s") if timed else rate_of(values.get("v", v), unit[0])
         radius = values.get("r", 0.0)
-        blend = syntax.number(radius)
-        zone = instructions.Zone("named", 0.0, syntax.shown(radius))
+        blend = number(radius)
+        zone = Zone("named", 0.0, shown(radius))
         if blend is not None:
-            zone = instructions.Zone("distance", blend) if blend > 0 else instructions.FINE
-        return instructions.ArmMotion(
+            zone = Zone("distance", blend) if blend > 0 else FINE
+        return ArmMotion(
             kind,
             made[-1],
             move.form,
             made[0] if kind == "arc" else None,
-            None,
             speed,
-            syntax.rate_of(values.get("a", a), unit[1]),
+            rate_of(values.get("a", a), unit[1]),
             zone,
             tool,
             ROBOT_BASE,
             load=_load(memory.read("%load")),
-            not_followed="" if syntax.number(values.get("mode", 0)) == 0 else "mode",
+            not_followed="" if number(values.get("mode", 0)) == 0 else "mode",
         )
 
-    def carry_out(self, memory: ProgramMemory, doing: syntax.Doing) -> instructions.Instruction | None:
+    def carry_out(self, memory: ProgramMemory, doing: Doing) -> Instruction | None:
         """Carry out settings of tool and load, and outputs; the rest as in all languages.
 
         Returns
@@ -230,42 +263,40 @@ class UrScriptDialect(Dialect):
         values, keywords = _given(memory, call.arguments, call.keywords)
         if call.function == "set_tcp":
             pose = (_placed(("pose", "tcp_name"), values, keywords) or {}).get("pose")
-            known = isinstance(pose, syntax.Unclear) or _pose(pose) is not None
-            memory.write("%tcp", pose if known and pose is not None else syntax.Unclear(doing.text))
-            return None if known or isinstance(pose, syntax.Record) else instructions.Unknown(doing.text)
+            known = isinstance(pose, Unclear) or _pose(pose) is not None
+            memory.write("%tcp", pose if known and pose is not None else Unclear(doing.text))
+            return None if known or isinstance(pose, Record) else Unknown(doing.text)
         if call.function in LOADS:
             loaded = _placed(LOADS[call.function], values, keywords)
             usual: Values = {"cog": (0.0,) * 3, "inertia": (0.0,) * 6}
-            load = (
-                syntax.Unclear(doing.text) if loaded is None else syntax.Record("load", tuple((usual | loaded).items()))
-            )
+            load = Unclear(doing.text) if loaded is None else Record("load", tuple((usual | loaded).items()))
             memory.write("%load", load)
-            return instructions.Aside(doing.text) if isinstance(_load(load), instructions.UnclearLoad) else None
+            return Aside(doing.text) if isinstance(_load(load), UnclearLoad) else None
         if call.function in RESTING:
             memory.here = Position()
-            return instructions.Unknown(doing.text, may_move=False)
+            return Unknown(doing.text, may_move=False)
         if memory.here.passing and call.function in ("stopj", "stopl"):  # within a blend, somewhere on its way
-            return instructions.Unknown(doing.text)
+            return Unknown(doing.text)
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
-            name = f"{OUTPUTS[call.function]}[{syntax.shown(output['n'])}]"
-            return instructions.Output(name, syntax.shown(output["b"]))
+            name = f"{OUTPUTS[call.function]}[{shown(output['n'])}]"
+            return Output(name, shown(output["b"]))
         if call.function.partition(".")[2] in LIST_METHODS:
-            return instructions.Aside(doing.text)
+            return Aside(doing.text)
         return super().carry_out(memory, doing)
 
 
 def _given(
     memory: ProgramMemory,
-    placed: tuple[syntax.Expression | None, ...],
-    named: tuple[tuple[str, syntax.Expression], ...],
-) -> tuple[list[syntax.Value | None], Values]:
+    placed: tuple[Expression | None, ...],
+    named: tuple[tuple[str, Expression], ...],
+) -> tuple[list[Value | None], Values]:
     """The values of arguments by place and by name."""
     values = [None if each is None else memory.value(each) for each in placed]
     return values, {name: memory.value(each) for name, each in named}
 
 
-def _placed(names: tuple[str, ...] | None, values: list[syntax.Value | None], keywords: Values) -> Values | None:
+def _placed(names: tuple[str, ...] | None, values: list[Value | None], keywords: Values) -> Values | None:
     """Arguments by the names of a function's parameters; None for a call that does not fit them."""
     if names is None or len(values) > len(names) or None in values or not keywords.keys() <= set(names):
         return None
@@ -273,61 +304,58 @@ def _placed(names: tuple[str, ...] | None, values: list[syntax.Value | None], ke
     return None if placed.keys() & keywords.keys() else placed | keywords
 
 
-def _tool(memory: ProgramMemory) -> instructions.NamedFrame:
+def _tool(memory: ProgramMemory) -> NamedFrame:
     value = memory.read("%tcp")
     if value is None:
-        return instructions.NamedFrame("", memory.cell.tool, own=False)
-    return instructions.NamedFrame(value.text if isinstance(value, syntax.Unclear) else "", _pose(value))
+        return NamedFrame("", memory.cell.tool, own=False)
+    return NamedFrame(value.text if isinstance(value, Unclear) else "", _pose(value))
 
 
-def _load(value: syntax.Value | None) -> instructions.Load | None:
+def _load(value: Value | None) -> Load | None:
     """What the program says hangs on the flange: mass (kg), centre (m, in its frame), inertia (kg m^2, about it)."""
-    if not isinstance(value, syntax.Record):
-        return instructions.UnclearLoad(value.text) if isinstance(value, syntax.Unclear) else None
+    if not isinstance(value, Record):
+        return UnclearLoad(value.text) if isinstance(value, Unclear) else None
     mass, centre, inertia = (value.get(key) for key in ("m", "cog", "inertia"))
     parts = (mass, *(centre if isinstance(centre, tuple) else ()), *(inertia if isinstance(inertia, tuple) else ()))
-    plain = syntax.numbers(parts)
-    if plain is None or len(plain) != 10 or not syntax.finite(plain) or plain[0] < 0:
-        text = "set_payload" if mass is None else f"set_payload({syntax.shown(mass)})"
-        return instructions.UnclearLoad(text, syntax.number(mass))
+    plain = numbers(parts)
+    if plain is None or len(plain) != 10 or not finite(plain) or plain[0] < 0:
+        text = "set_payload" if mass is None else f"set_payload({shown(mass)})"
+        return UnclearLoad(text, number(mass))
     kg, x, y, z, xx, yy, zz, xy, xz, yz = plain
     return MassBody(kg, (x, y, z), (xx, yy, zz, xy, xz, yz)) if kg else None
 
 
-def _pose(value: syntax.Value | None) -> Reals | None:
+def _pose(value: Value | None) -> Reals | None:
     """The transform (4, 4) of a pose of six finite numbers."""
-    if not isinstance(value, syntax.Record) or value.kind != "p":
+    if not isinstance(value, Record) or value.kind != "p":
         return None
-    plain = syntax.numbers(value.values())
-    return instructions.pose_of(plain, "ur") if plain is not None and syntax.finite(plain) else None
+    plain = numbers(value.values())
+    return pose_of(plain, "ur") if plain is not None and finite(plain) else None
 
 
-def _record(pose: Reals) -> syntax.Record:
-    return syntax.Record("p", tuple(zip(syntax.POSE_KEYS, instructions.numbers_of(pose, "ur"))))
+def _record(pose: Reals) -> Record:
+    return Record("p", tuple(zip(POSE_KEYS, numbers_of(pose, "ur"))))
 
 
-def _target(value: syntax.Value, text: str) -> instructions.Target:
-    if isinstance(value, syntax.Record) and value.kind == "near":  # a solution near to given joints
+def _target(value: Value, text: str) -> Target:
+    if isinstance(value, Record) and value.kind == "near":  # a solution near to given joints
         pose = _target(value.values()[0], text)
         near = _target(value.values()[-1], text)
-        if len(value.items) == 1 or not isinstance(near, instructions.JointTarget):
+        if len(value.items) == 1 or not isinstance(near, JointTarget):
             return pose if len(value.items) == 1 else near
-        return replace(pose, near=near.joints) if isinstance(pose, instructions.PoseTarget) else pose
-    parts = value.values() if isinstance(value, syntax.Record) else value if isinstance(value, tuple) else (value,)
-    unclear = next((each for each in parts if isinstance(each, syntax.Unclear)), None)
-    if unclear is not None:
-        return unresolved(unclear, text)
-    plain = syntax.numbers(parts)
-    if plain is None or len(plain) != 6 or (isinstance(value, syntax.Record) and value.kind != "p"):
-        return instructions.UnresolvedTarget(text, "not_understood")
-    if not syntax.finite(plain):
-        return instructions.UnresolvedTarget(text, "not_finite")
-    if isinstance(value, syntax.Record):
-        return instructions.PoseTarget(instructions.pose_of(plain, "ur"))
-    return instructions.JointTarget(np.array(plain))
+        return replace(pose, near=near.joints) if isinstance(pose, PoseTarget) else pose
+    parts = value.values() if isinstance(value, Record) else value if isinstance(value, tuple) else (value,)
+    plain = target_numbers(parts, text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
+    if len(plain) != 6 or (isinstance(value, Record) and value.kind != "p"):
+        return UnresolvedTarget(text, "not_understood")
+    if isinstance(value, Record):
+        return PoseTarget(pose_of(plain, "ur"))
+    return JointTarget(np.array(plain))
 
 
-def _of_position(memory: ProgramMemory, name: str, given: Values) -> syntax.Value | None:
+def _of_position(memory: ProgramMemory, name: str, given: Values) -> Value | None:
     """Functions of where the arm is, and of its table; a pose stands for its joints nearest to where the arm is.
 
     After a motion with a blend radius the program goes on where the arm enters it [1]_, so that what it reads of the
@@ -346,12 +374,12 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> syntax.Valu
         case "get_tcp_offset":
             return None if tool.pose is None else _record(tool.pose)
         case "get_inverse_kin":
-            return syntax.Record("near", tuple(given.items())) if _pose(given.get("x")) is not None else None
+            return Record("near", tuple(given.items())) if _pose(given.get("x")) is not None else None
         case "get_forward_kin" if given:
             joints = _target(given["q"], "")
-            here = Position(joints.joints) if isinstance(joints, instructions.JointTarget) else Position()
+            here = Position(joints.joints) if isinstance(joints, JointTarget) else Position()
         case "get_actual_tool_flange_pose":
-            tool = instructions.NamedFrame("flange", np.eye(4))
+            tool = NamedFrame("flange", np.eye(4))
         case "get_forward_kin" | "get_actual_tcp_pose" | "get_target_tcp_pose" | "get_target_waypoint":
             pass
         case _:
@@ -360,7 +388,7 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> syntax.Valu
     return None if seen is None else _record(seen)
 
 
-def _of_values(name: str, values: list[syntax.Value]) -> syntax.Value | None:
+def _of_values(name: str, values: list[Value]) -> Value | None:
     """Functions of lists and poses, as the manual defines them [1]_.
 
     References
@@ -369,14 +397,14 @@ def _of_values(name: str, values: list[syntax.Value]) -> syntax.Value | None:
     """
     value = values[0] if values else None
     poses = [pose for pose in map(_pose, values) if pose is not None]
-    plain = syntax.numbers(value) if isinstance(value, tuple) else None
+    plain = numbers(value) if isinstance(value, tuple) else None
     match name:
         case "length" | "get_list_length":
             return len(value) if isinstance(value, tuple) else None
-        case "norm" | "normalize" if plain and syntax.finite(plain):
+        case "norm" | "normalize" if plain and finite(plain):
             size = math.hypot(*plain)
             return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
-        case "rpy2rotvec" if plain is not None and len(plain) == 3 and syntax.finite(plain):
+        case "rpy2rotvec" if plain is not None and len(plain) == 3 and finite(plain):
             turn = transform(np.zeros(3), np.array(plain))[:3, :3]
             return tuple(map(float, scipy.spatial.transform.Rotation.from_matrix(turn).as_rotvec()))
         case "pose_inv" if len(poses) == 1:

@@ -9,30 +9,24 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from er3a.errors import InputError
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, Lexicon, MisreadError, MoreError, ProgramText, Words, as_number
-
-UR = Lexicon(
-    re.compile(
-        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
-        r"""|(?P<mark>==|!=|<=|>=|\S)"""
-    ),
-    ranks={
-        "or": 1,
-        "xor": 2,
-        "and": 3,
-        **dict.fromkeys(("==", "!=", "<", ">", "<=", ">="), 5),
-        "+": 6,
-        "-": 6,
-        **dict.fromkeys(("*", "/", "%"), 7),
-        "^": 8,
-    },
-    right={"not": 5, "-": 8, "+": 8},
-    constants={"TRUE": True, "FALSE": False},
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, as_number, ranked
+from er3a.programs.syntax import (
+    POSE_KEYS,
+    Assign,
+    Constant,
+    Element,
+    Expression,
+    Invocation,
+    Listed,
+    Move,
+    Program,
+    Routine,
+    Variable,
 )
+
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
 LONGEST_STATEMENT = 500  # lines
 LIST_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove", "sort"))
@@ -42,52 +36,29 @@ TEXT = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
 BREAKS = re.compile(rf"""(?P<comment>#[^\n]*)|(?P<text>{TEXT.pattern})|(?P<bad>["'])|(?P<mark>\n)""")
 OPEN_END = re.compile(r"(?:\b(?:or|and|xor|not)|[-+*/%^<>=,])$")
 """With what a line ends whose statement goes on in the next."""
-STATEMENT = re.compile(
-    r"(?:[A-Za-z_][\w.]*\s*(?:\(|(?:\[[^]]*\]\s*)?=(?!=))|(?:end|break|continue|return|halt|if|while|global|local)\b)"
-)
-"""With what a statement begins for sure."""
 
 
 class UrWords(Words):
     """Words of a statement of URScript."""
 
-    def __init__(self, text: str):
-        super().__init__(UR, text)
+    pattern = re.compile(
+        rf"""(?P<text>"[^"]*"|'[^']*')|(?P<number>0x[0-9A-Fa-f]+|{NUMBER})|(?P<name>[^\W\d]\w*)"""
+        r"""|(?P<mark>==|!=|<=|>=|\S)"""
+    )
+    ranks = ranked("or", "xor", "and", "== != < > <= >=", "+ -", "* / %", "^")
+    right = {"not": 4, "-": 7, "+": 7}
 
     def finish(self) -> None:
-        """Nothing may follow but another statement: :class:`MoreError`."""
+        """Nothing may follow but a semicolon."""
         self.accept(";")
-        if self.kind != "end":
-            start = self.offset()
-            if STATEMENT.match(self.text, start):
-                raise MoreError(start)
         super().finish()
 
-    def parts_of(self, found: syntax.Expression) -> syntax.Expression:
-        """An expression with what follows it; elements of matrices, ``m[1,0]``, as those of lists of lists.
-
-        Parameters
-        ----------
-        found : what was read before them
-
-        Returns
-        -------
-        expression : with one index for each element
-        """
-        made = super().parts_of(found)
-        if not isinstance(made, syntax.Element) or len(made.indices) < 2:
-            return made
-        found = made.of
-        for index in made.indices:
-            found = syntax.Element(found, (index,))
-        return found
-
-    def special(self) -> syntax.Expression | None:
+    def special(self) -> Expression | None:
         """Lists and poses, with an index after them."""
         found = self._list()
         return None if found is None else self.parts_of(found)
 
-    def _list(self) -> syntax.Expression | None:
+    def _list(self) -> Expression | None:
         kind = "p" if self.next == "p" and self.texts[self.at + 1] == "[" else ""
         if kind:
             self.take()
@@ -96,20 +67,20 @@ class UrWords(Words):
         self.take()
         numbers = self._numbers()
         if numbers is not None and not kind:
-            return syntax.Constant(numbers)
-        if numbers is not None and len(numbers) == len(syntax.POSE_KEYS):
-            return syntax.Constant(syntax.Record("p", tuple(zip(syntax.POSE_KEYS, numbers))))
+            return Constant(numbers)
+        if numbers is not None and len(numbers) == len(POSE_KEYS):
+            return Constant(syntax.Record("p", tuple(zip(POSE_KEYS, numbers))))
         if numbers is not None:
-            return self._pose_or_element(tuple(map(syntax.Constant, numbers)))
+            return self._pose_or_element(tuple(map(Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
         given = tuple(each for each in placed if each is not None)
-        return self._pose_or_element(given) if kind else syntax.Listed(kind, given)
+        return self._pose_or_element(given) if kind else Listed(kind, given)
 
-    def _pose_or_element(self, given: tuple[syntax.Expression, ...]) -> syntax.Expression:
+    def _pose_or_element(self, given: tuple[Expression, ...]) -> Expression:
         """``p[...]``: a pose has six numbers; with one it is an element of a variable of this name."""
-        return syntax.Element(syntax.Variable("p"), given) if len(given) == 1 else syntax.Listed("p", given)
+        return Element(Variable("p"), given) if len(given) == 1 else Listed("p", given)
 
     def _numbers(self) -> tuple[int | float, ...] | None:
         """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
@@ -131,7 +102,7 @@ class UrWords(Words):
             at += 1
 
 
-def read_urscript(source: ProgramText) -> syntax.Program:
+def read_urscript(source: ProgramText) -> Program:
     """The program of a .script file: its statements, or else the first of its outermost routines that no other calls.
 
     Raises
@@ -141,17 +112,17 @@ def read_urscript(source: ProgramText) -> syntax.Program:
     """
     reader = _UrReader(source)
     by_name = linked(reader.read())
-    return syntax.Program("urscript", source.path.stem, source.path, by_name, "", lines=source.lines)
+    return Program("urscript", source.path.stem, source.path, by_name, "", lines=source.lines)
 
 
 class _UrReader:
     def __init__(self, source: ProgramText):
         self.source = source
-        self.routines: list[syntax.Routine] = []
+        self.routines: list[Routine] = []
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
 
-    def read(self) -> list[syntax.Routine]:
+    def read(self) -> list[Routine]:
         """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
         for place, text, is_comment in statements(self.source, BREAKS, _is_over):
@@ -166,7 +137,7 @@ class _UrReader:
             raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
         top = self.open[0]
         names = {each.name for each in self.routines}
-        if not any(isinstance(each, syntax.Move) or names & set(_called(each)) for each in top.code):
+        if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
             called = {
                 name for each in self.routines for step in each.code for name in _called(step) if name != each.name
             }
@@ -183,15 +154,10 @@ class _UrReader:
             return
         try:
             self._read(builder, UrWords(text), place, text)
-        except MoreError as more:
-            self._statement(place, text[: more.at].strip())
-            self._statement(place, text[more.at :].strip())
         except MisreadError:
             if re.match(r"(else|elif)\b", text) or text.endswith(":"):  # of a block, which means nothing without it
                 raise fault(place, f"'{text[:60]}' can't be read", "Correct this line") from None
             builder.unread(place, text)
-        except RecursionError:
-            raise InputError(place.file, place.where, "nested too deeply", "Split this line") from None
 
     def _read(self, builder: CodeBuilder, words: UrWords, place: Place, text: str) -> None:
         first = words.next
@@ -230,13 +196,11 @@ class _UrReader:
                 break
         words.accept(":")
         words.finish()
-        if len(self.open) > 50:
-            raise fault(place, "more than 50 routines within each other", "Nest fewer")
         self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
 
     def _close(self, builder: CodeBuilder, place: Place) -> None:
         if builder.blocks:
-            builder.close(builder.blocks[-1].word, place)
+            builder.close(builder.blocks[-1].kind, place)
             return
         if len(self.open) == 1:
             raise fault(place, "an end without a beginning", "Remove it")
@@ -272,36 +236,36 @@ def _plain(builder: CodeBuilder, words: UrWords, place: Place, text: str) -> Non
             return
         value = words.expression()
         words.finish()
-        if isinstance(left, syntax.Listed) and left.kind == "p":  # a variable of this name, or a pose that is no target
-            left, value = syntax.Variable("p"), syntax.Opaque(text)
-        elif not isinstance(left, (syntax.Variable, syntax.Member, syntax.Element)):
+        if isinstance(left, Listed) and left.kind == "p":  # a variable of this name, or a pose that is no target
+            left, value = Variable("p"), syntax.Opaque(text)
+        elif not isinstance(left, (Variable, syntax.Member, Element)):
             raise MisreadError("nothing can be assigned to this")
-        builder.add(syntax.Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
-        if isinstance(value, syntax.Invocation):
+        builder.add(Assign(place, left, value, text, "global" if scope == "global" else "", scope == "local"))
+        if isinstance(value, Invocation):
             _method(builder, value, place, text)
         return
     words.finish()
     if scope:
-        builder.add(syntax.Assign(place, left, None, text, scope, scope == "local"))
-    elif not isinstance(left, syntax.Invocation):
+        builder.add(Assign(place, left, None, text, scope, scope == "local"))
+    elif not isinstance(left, Invocation):
         raise MisreadError("neither an assignment nor a call")
     elif left.function in MOTIONS:
-        builder.add(syntax.Move(place, left.function, left.arguments, text, (), left.keywords))
+        builder.add(Move(place, left.function, left.arguments, text, (), left.keywords))
     elif left.function == "sleep" and len(left.arguments) == 1:
         builder.add(syntax.Waiting(place, "seconds", left.arguments[0], text))
     elif not _method(builder, left, place, text):
         builder.add(syntax.Doing(place, left, text))
 
 
-def _method(builder: CodeBuilder, call: syntax.Invocation, place: Place, text: str) -> bool:
+def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> bool:
     """A method that changes its list; False if the call is none."""
     name, _, method = call.function.partition(".")
     if method not in LIST_METHODS:
         return False
-    builder.unclear(place, syntax.Variable(name), text)
+    builder.unclear(place, Variable(name), text)
     return True
 
 
 def _called(operation: syntax.Operation) -> Iterator[str]:
     """Functions that an operation calls."""
-    return (each.function for each in syntax.parts(operation) if isinstance(each, syntax.Invocation))
+    return (each.function for each in syntax.parts(operation) if isinstance(each, Invocation))

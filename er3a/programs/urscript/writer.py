@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.numerics.arrays import Reals
-from er3a.programs import writing
 from er3a.programs.instructions import RAMP_OF_A_DURATION, Output, PoseTarget, numbers_of
 from er3a.programs.urscript.dialect import DEFAULTS
+from er3a.programs.writing import LOAD_DIGITS, ReadyMotion, Writer, by_length, cut, fixed, short
 from er3a.robots.masses import MassBody
 
 DIGITS = 9
 
 
-class UrScriptWriter(writing.Writer):
+class UrScriptWriter(Writer):
     """Writes URScript."""
 
     languages = ("urscript",)
@@ -80,18 +80,11 @@ class UrScriptWriter(writing.Writer):
         load : kg, m, kg m^2, in the flange's axes; None is written as a mass of 0
         """
         load = load or MassBody(0.0)
-        parts = [
-            f"[{', '.join(writing.short(each, writing.LOAD_DIGITS) for each in part)}]"
-            for part in (load.centre, load.inertia)
-        ]
-        given = (
-            ", ".join((writing.short(load.mass), *parts))
-            if any(load.inertia)
-            else f"{writing.short(load.mass)}, {parts[0]}"
-        )
+        parts = [f"[{', '.join(short(each, LOAD_DIGITS) for each in part)}]" for part in (load.centre, load.inertia)]
+        given = ", ".join((short(load.mass), *parts)) if any(load.inertia) else f"{short(load.mass)}, {parts[0]}"
         self.line(f"set_{'target_' if any(load.inertia) else ''}payload({given})")
 
-    def motion(self, ready: writing.ReadyMotion) -> None:
+    def motion(self, ready: ReadyMotion) -> None:
         """Write movej, movel, movep or movec, and before it the tool where it changes.
 
         Parameters
@@ -101,7 +94,7 @@ class UrScriptWriter(writing.Writer):
         motion = ready.motion
         target = self._target(ready)
         base = motion.base
-        if target is None or (motion.kind == "arc" and ready.via is None) or motion.angle is not None:
+        if target is None or (motion.kind == "arc" and ready.via is None):
             self.omit(motion)
             return
         if base.pose is None and base.name:
@@ -116,7 +109,7 @@ class UrScriptWriter(writing.Writer):
         via = "" if ready.via is None else f"{_pose_text(self._in_robot(ready, ready.via))}, "
         self.line(f"{form}({via}{target}{self._speed(ready, form)}{self._zone(ready)})")
 
-    def _target(self, ready: writing.ReadyMotion) -> str | None:
+    def _target(self, ready: ReadyMotion) -> str | None:
         target = ready.motion.target
         if ready.motion.kind == "joint":
             if isinstance(target, PoseTarget) and target.joints is None and (self.own or ready.joints is None):
@@ -126,14 +119,14 @@ class UrScriptWriter(writing.Writer):
             return None if ready.joints is None else _joints_text(ready.joints)
         return None if ready.pose is None else _pose_text(self._in_robot(ready, ready.pose))
 
-    def _in_robot(self, ready: writing.ReadyMotion, pose: Reals) -> Reals:
+    def _in_robot(self, ready: ReadyMotion, pose: Reals) -> Reals:
         base = ready.motion.base.pose
         if base is None or np.array_equal(base, np.eye(4)):
             return pose
         found: Reals = base @ pose
         return found
 
-    def _tool(self, ready: writing.ReadyMotion) -> None:
+    def _tool(self, ready: ReadyMotion) -> None:
         tool = ready.motion.tool
         if tool.pose is None:
             if tool.name:
@@ -141,7 +134,7 @@ class UrScriptWriter(writing.Writer):
             return
         self.set_once("tcp", f"set_tcp({_pose_text(tool.pose)})")
 
-    def _speed(self, ready: writing.ReadyMotion, form: str) -> str:
+    def _speed(self, ready: ReadyMotion, form: str) -> str:
         """Acceleration and speed, or the motion's time, unless that is too short for a motion from rest to rest."""
         motion = ready.motion
         usual_a, usual_v = DEFAULTS[form]
@@ -154,17 +147,17 @@ class UrScriptWriter(writing.Writer):
         if speed is not None and timed and form == "movej" and (stops or self.stops or self._is_short(ready)):
             self.count["estimated"] += 1
             v = self.leading_joint_speed(ready)
-            return f", a={writing.short(a)}, v={writing.short(usual_v if v is None else v)}"
+            return f", a={short(a)}, v={short(usual_v if v is None else v)}"
         if speed is not None and timed and form in ("movej", "movel"):
-            return f", a={writing.short(a)}, t={writing.short(speed.value)}"
-        v = self.leading_joint_speed(ready) if joint else writing.tool_speed(ready)
-        if v is None and joint and (seconds := writing.duration(ready)) is not None:
-            return f", a={writing.short(a)}, t={writing.short(seconds)}"
+            return f", a={short(a)}, t={short(speed.value)}"
+        v = self.leading_joint_speed(ready) if joint else by_length(ready, "m/s")
+        if v is None and joint and (seconds := by_length(ready, "s")) is not None:
+            return f", a={short(a)}, t={short(seconds)}"
         if speed is not None and speed.unit == "s":
             self.count["estimated"] += 1
-        return f", a={writing.short(a)}, v={writing.short(v if v is not None and v > 0 else usual_v)}"
+        return f", a={short(a)}, v={short(v if v is not None and v > 0 else usual_v)}"
 
-    def _is_short(self, ready: writing.ReadyMotion) -> bool:
+    def _is_short(self, ready: ReadyMotion) -> bool:
         """Whether a joint would be too fast if it moved in the motion's time with ramps as check-program takes them."""
         speed, before, after = ready.motion.speed, ready.joints_before, ready.joints
         if speed is None or before is None or after is None or self.robot is None:
@@ -172,17 +165,17 @@ class UrScriptWriter(writing.Writer):
         peak = np.abs(after - before) / speed.value / (1 - RAMP_OF_A_DURATION)
         return any(float(each) > self._speed_of(joint)[0] for joint, each in enumerate(peak))
 
-    def _zone(self, ready: writing.ReadyMotion) -> str:
+    def _zone(self, ready: ReadyMotion) -> str:
         zone = ready.motion.zone
         if zone.kind == "distance" and zone.value > 0:
-            return f", r={writing.cut(zone.value)}"
+            return f", r={cut(zone.value)}"
         self.count["zones"] += zone.kind != "fine"
         return ""
 
 
 def _joints_text(joints: Reals) -> str:
-    return "[" + ", ".join(writing.fixed(float(value), DIGITS) for value in joints) + "]"
+    return "[" + ", ".join(fixed(float(value), DIGITS) for value in joints) + "]"
 
 
 def _pose_text(pose: Reals) -> str:
-    return "p[" + ", ".join(writing.fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"
+    return "p[" + ", ".join(fixed(value, DIGITS) for value in numbers_of(pose, "ur")) + "]"

@@ -26,7 +26,7 @@ from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_p
 from er3a.program_check.motion_checks import AssumedRates
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.execution import RunLimits
-from er3a.programs.instructions import Pause, Place
+from er3a.programs.instructions import Pause
 from er3a.programs.languages import read_program
 from er3a.programs.program_names import ProgramOutcome
 from er3a.robots.joint_limits import shown, speeds_given
@@ -72,7 +72,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             unknown_starts.append(entry.name)
         arms += check.arms if entry.expect in (None, "pass") else ()
         lines.append(_lines(entry.name, check))
-        instructions.append(_instructions(entry.name, check, robot))
+        instructions.append(_instructions(entry.name, check))
         motions.append(motion)
     smallest = {
         each.name: None if each.least_clearance_mm is None else each.least_clearance_mm / 1000
@@ -96,7 +96,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             ),
         ),
         lines=model.Lines.stacked(lines),
-        instructions=model.Instructions.stacked(instructions).of_joints(robot.slides),
+        instructions=model.Instructions.stacked(instructions),
         motion=model.ProgramMotion.stacked(motions).of_joints(robot.slides),
     )
 
@@ -116,11 +116,11 @@ def _assumed(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[
     """Where the arm stands at first, axes beside its own, and loads."""
     if unknown_starts:
         yield Open("program_starts", tuple(unknown_starts))
-    outer = tuple(each.name for each in programs if any(_is_of_outer_axes(at.finding) for at in each.findings))
+    found = [(each.name, at.finding) for each in programs for at in each.findings]
+    outer = {name: None for name, one in found if is_one(one, "not_followed") and one.reason == "external_axes"}
     if outer:
-        yield Open("outer_axes", outer)
-    loads = [(each, at.finding) for each in programs for at in each.findings]
-    said = (f"{each.name}: {load.mass_kg:g} kg" for each, load in loads if is_one(load, "load_above_payload"))
+        yield Open("outer_axes", tuple(outer))
+    said = (f"{name}: {load.mass_kg:g} kg" for name, load in found if is_one(load, "load_above_payload"))
     if texts := tuple(dict.fromkeys(said)):
         yield Open("program_load", texts)
 
@@ -163,10 +163,6 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
     )
 
 
-def _is_of_outer_axes(finding: object) -> bool:
-    return isinstance(finding, Finding) and finding.code == "not_followed" and finding.reason == "external_axes"
-
-
 def _not_followed(check: ProgramCheck) -> set[int]:
     """Lines of motions that were not followed each time, and of instructions that were not."""
     lines = {each.place.line for each in check.verdicts if not each.followed}
@@ -178,13 +174,7 @@ def _lines(name: str, check: ProgramCheck) -> model.Lines:
     return model.Lines.of(program=name, line=np.arange(1, len(text) + 1), text=text)
 
 
-def _instructions(name: str, check: ProgramCheck, robot: Robot) -> model.Instructions:
-    ends: dict[Place, Reals] = {}
-    for number, motion in check.motions.items():
-        if motion.end is not None:
-            ends.setdefault(check.execution.steps[number].place, motion.end)
-    unknown = np.full(robot.joints, np.nan)
-    first_ends = np.array([ends.get(each.place, unknown) for each in check.verdicts]).reshape(-1, robot.joints)
+def _instructions(name: str, check: ProgramCheck) -> model.Instructions:
     return model.Instructions.of(
         program=name,
         line=[each.line for each in check.verdicts],
@@ -194,7 +184,6 @@ def _instructions(name: str, check: ProgramCheck, robot: Robot) -> model.Instruc
         times=[each.times for each in check.verdicts],
         duration_s=[each.duration_s for each in check.verdicts],
         clearance_mm=[each.least_clearance_mm for each in check.verdicts],
-        end_deg=shown(robot, first_ends),
     )
 
 

@@ -13,7 +13,7 @@ from er3a.pipeline.results import Results, Summary, Verdict
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
-from er3a.program_check.program_check_findings import CheckFinding, Level
+from er3a.program_check.program_check_findings import Level
 from er3a.programs.program_names import LanguageName, ProgramOutcome
 
 NO_STEPS: Mapping[int, Any] = MappingProxyType({})
@@ -35,7 +35,7 @@ class FindingAt:
     element: str
     level: Level
     times: int
-    finding: CheckFinding
+    finding: Finding
     motion_s: float | None = None
     program_s: float | None = None
 
@@ -61,7 +61,7 @@ def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> 
     )
 
 
-def _without_path(finding: CheckFinding) -> CheckFinding:
+def _without_path(finding: Finding) -> Finding:
     """A finding whose own place names no folder of this machine."""
     return replace(finding, params={name: value for name, value in finding.params.items() if name != "place"})
 
@@ -128,7 +128,6 @@ class Instructions(Table):
     times: Integers = column("how often it was carried out")
     duration_s: Reals = column("longest estimated duration; NaN where unknown")
     clearance_mm: Reals = column("smallest clearance, negative by an overlap; NaN where not measured")
-    end_deg: Reals = per_joint("joint angle at its first end; NaN where unknown", name="q_deg")
 
 
 class ProgramMotion(Table):

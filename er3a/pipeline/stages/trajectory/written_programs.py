@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.collision.shapes import shapes_assumed
-from er3a.finding import fact, is_one
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, MinClearance, ProgramFiles
@@ -25,7 +25,6 @@ from er3a.planning.stated_rates import StatedMotion
 from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
-from er3a.programs.program_findings import WriteFinding
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown
@@ -41,9 +40,9 @@ def written(
     motion: Motion,
     verdict: PathVerdict,
     language: LanguageName,
-    near: tuple[WriteFinding, ...],
+    near: tuple[Finding, ...],
     speed: Reals,
-) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
+) -> tuple[Mapping[str, str], tuple[Finding, ...]]:
     """The files of a path by suffix, and what is to be said of them; ``near`` as of :func:`near_assumed_shapes`.
 
     ``speed``: (n,), the joints' greatest, rad/s or m/s.
@@ -58,7 +57,7 @@ def written(
     start = motion.q[0]
     if not np.isfinite(start).all():
         raise ValueError(f"{motion.entry.name}: the start can't be reached")
-    unsafe: tuple[WriteFinding, ...] = (
+    unsafe: tuple[Finding, ...] = (
         near if verdict == "safe" else (fact("written_unsafe", path=motion.entry.name, verdict=verdict),)
     )
     head = (
@@ -101,9 +100,7 @@ def _of_its_program(motion: Motion) -> list[str]:
     return [f"check-program says of the program that this path is of: {ascii_text(each)}" for each in found]
 
 
-def near_assumed_shapes(
-    robot: Robot, name: str, clearance: MinClearance | None, margin: float
-) -> tuple[WriteFinding, ...]:
+def near_assumed_shapes(robot: Robot, name: str, clearance: MinClearance | None, margin: float) -> tuple[Finding, ...]:
     """The finding that a path passes close to assumed shapes, for the head of its programs.
 
     Parameters
@@ -146,7 +143,7 @@ def program_files(
     languages: Sequence[LanguageName],
     write_unsafe: bool,
     *,
-    near: tuple[WriteFinding, ...],
+    near: tuple[Finding, ...],
     repaired: AvoidanceRows,
     speed: Reals,
 ) -> ProgramFiles:
@@ -181,13 +178,13 @@ def program_files(
     return ProgramFiles.of_rows((motion.entry.name, *row) for row in rows)
 
 
-def _assumed(findings: tuple[WriteFinding, ...]) -> str:
+def _assumed(findings: tuple[Finding, ...]) -> str:
     return next((each.assumed for each in findings if is_one(each, "written_speeds_of_assumed")), "")
 
 
 def _repair(
     robot: Robot, motion: Motion, rows: AvoidanceRows, language: LanguageName, speed: Reals
-) -> tuple[Mapping[str, str], tuple[WriteFinding, ...]]:
+) -> tuple[Mapping[str, str], tuple[Finding, ...]]:
     """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
     comment = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
     q = meant(robot, rows.q_deg)
