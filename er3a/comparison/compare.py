@@ -295,7 +295,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
     reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
     directions = DirectionLayer(not reversed_rows, reversed_rows)
-    at_ends = _ends_as_entries(robot_a, _rows_at_ends(robot_a, found, tolerances))
+    at_ends = _ends_as_entries(robot_a, rows_at_ends(robot_a, found, tolerances))
     base, flange = (_placement(T, entries, tolerances) for T, entries in zip((found.base, found.flange), at_ends))
     joint_zeros = _joint_zeros(robot_a, found)
     layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
@@ -888,9 +888,21 @@ Row = tuple[tuple[str, int, float], ...]
 """Columns, rows (from 0) and values, m and rad, of entries that change."""
 
 
-def _rows_at_ends(robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> tuple[Row, Row]:
-    """The entries of the first row that hold what base differs by, and of the last row what flange does; none where
-    they can't: of a standard table the first row's ``Rz Tz`` and all of the last, of a modified one the reverse."""
+def rows_at_ends(robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> tuple[Row, Row]:
+    """The entries of the first row that hold what base differs by, and of the last row what flange does.
+
+    Of a standard table the first row's ``Rz Tz`` and all of the last can, of a modified one the reverse.
+
+    Parameters
+    ----------
+    robot : the first of two arms
+    found : their match
+    tolerances : m and rad; what differs by less is left as it is
+
+    Returns
+    -------
+    rows : of each end columns, rows (from 0) and values, m and rad; empty where they can't hold it
+    """
     before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
     behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
     standard, rows = robot.convention == "standard", []
@@ -947,7 +959,7 @@ def _ends_corrected(
 ) -> tuple[Reals, Reals]:
     """Base and flange as the other arm has them; where the first or last row can hold the difference, that is changed
     in ``columns`` instead."""
-    rows = _rows_at_ends(robot, found, tolerances)
+    rows = rows_at_ends(robot, found, tolerances)
     base, flange = robot.base, robot.flange
     if not (rows[0] or mechanism.is_identity(found.base, tolerances)):
         base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)

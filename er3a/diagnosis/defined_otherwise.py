@@ -18,9 +18,11 @@ from typing import Literal
 import numpy as np
 
 from er3a.comparison.axis_table import table_from_axes
+from er3a.comparison.compare import rows_at_ends
 from er3a.comparison.entries import Entry, shifted
 from er3a.comparison.mechanism import (
     EntryDifference,
+    Match,
     Tolerances,
     is_identity,
     match,
@@ -75,13 +77,12 @@ class Conventions:
     corrected: Robot
 
 
-def conventions_of(robot: Robot, references: Sequence[Reference], most_wrong: float = MAX_WRONG) -> list[Conventions]:
+def conventions_of(robot: Robot, references: Sequence[Reference]) -> list[Conventions]:
     """How references define zeros, directions, base and flange of a table otherwise.
 
     Parameters
     ----------
     references : that all state a value; limits don't count here, but are set right besides
-    most_wrong : entries of the geometry that may be wrong, too
 
     Returns
     -------
@@ -91,7 +92,7 @@ def conventions_of(robot: Robot, references: Sequence[Reference], most_wrong: fl
         return []
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
-    found = (_conventions(robot, stated, lines, finer, most_wrong) for finer in FINER) if lines else ()
+    found = (_conventions(robot, stated, lines, finer) for finer in FINER) if lines else ()
     chosen = [_with_limits(robot, each, references) for each in itertools.islice(filter(None, found), 1)]
     return [each for each in chosen if each.faults]
 
@@ -143,7 +144,7 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
 
 
 def described_by(robot: Robot, references: Sequence[Reference]) -> list[Robot]:
-    """The table corrected to be that of the arm whose axes references state, however much of it is wrong.
+    """The table corrected by comparison with the arm whose axes references state, however much of it is wrong.
 
     Parameters
     ----------
@@ -151,33 +152,46 @@ def described_by(robot: Robot, references: Sequence[Reference]) -> list[Robot]:
 
     Returns
     -------
-    robots : one; none if they don't state all axes, or contradict each other
+    robots : one, with base and flange as they are as far as rows can hold what differs; none if axes are not all stated
     """
-    return [each.corrected for each in conventions_of(robot, references, math.inf)]
+    lines = _lines(references, robot.joints) if robot.rows == robot.joints else None
+    if lines is None:
+        return []
+    found, start, _ = _matched(robot, references, lines, lines[-1])
+    table = tables_of(start)
+    for column, row, value in itertools.chain(*rows_at_ends(robot, found, lines[-1])):
+        table = table.with_column(column, [row], np.array([[value]]))
+    return [robot_of(table, 0, start)]
 
 
-def _conventions(
-    robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float, most_wrong: float
-) -> Conventions | None:
-    """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
-    finer part of them."""
-    _, _, signed, widest = lines
-    tolerances = Tolerances(finer * widest.length, finer * widest.angle)
+def _matched(
+    robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
+) -> tuple[Match, Robot, list[Entry]]:
+    """The match with the arm that lines describe, the table with it, and the entries that differ."""
     other = _arm_of(lines, _zero_flange(stated))
     found = match(mechanism_of(robot.without_tool()), mechanism_of(other), tolerances)
-    if any(each.column not in LINKS for each in found.differences):
-        return None
-    if found.unexplained or sum(_gross(each) for each in found.differences) > most_wrong:
-        return None
     later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
-    wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in found.differences]
-    amounts = np.array([[each.other - each.one for each in found.differences]])
+    own = [each for each in found.differences if each.column in LINKS]
+    wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in own]
     moved = robot.replace(
         offset=robot.offset + found.zeros,
         direction=np.where(found.reverses, -1.0, 1.0) * robot.direction,
         base=np.linalg.inv(found.base) @ robot.base,
     )
-    start = robot_of(shifted(tables_of(moved), wrong, amounts), 0, moved)
+    table = shifted(tables_of(moved), wrong, np.array([[each.other - each.one for each in own]]))
+    return found, robot_of(table, 0, moved), wrong
+
+
+def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
+    """What :func:`conventions_of` finds where entries differ that are off by more than the lines' tolerances, or by a
+    finer part of them."""
+    _, _, signed, widest = lines
+    tolerances = Tolerances(finer * widest.length, finer * widest.angle)
+    found, start, wrong = _matched(robot, stated, lines, tolerances)
+    if any(each.column not in LINKS for each in found.differences):
+        return None
+    if found.unexplained or sum(_gross(each) for each in found.differences) > MAX_WRONG:
+        return None
     flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
     starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
     return _fitted_to(robot, starts, wrong, stated, tolerances)

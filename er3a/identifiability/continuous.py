@@ -29,6 +29,7 @@ from er3a.numerics.arrays import Flags, Reals
 WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
+PRINTED = 3  # decimals of mm and deg, with which a table that was led to is as good as with all
 A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
 MAX_ROWS = 1 << 15
 SPREAD, WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
@@ -183,6 +184,29 @@ class Extents:
     def met_by(self) -> Tables:
         """The table; where some requirements have standard deviations, the one near it that is likeliest."""
         return self.region.tables(self.direction[None], self.start[None])
+
+    def led_to(self, other: Tables) -> Tables | None:
+        """A table near another one that meets the requirements, in the rows that are nearest to the given table.
+
+        Parameters
+        ----------
+        other : a batch of one
+
+        Returns
+        -------
+        table : a batch of one, entries that nothing reacts to as they are given if that will do, to few decimals if
+            these will do, so that parallel axes are parallel; None if steps from ``other`` lead to none
+        """
+        direction, amounts = self._rewritten(*self._amounts(other))
+        watched = np.isin(np.arange(len(amounts)), self.watched)
+        for start in (np.where(watched, amounts, 0.0), amounts):
+            found, met = self.region.reached(direction[None], start[None], inner=0.0)
+            units = np.array([10.0**-PRINTED / each.in_unit for each in self.region.entries])
+            given = np.array([each.of(self.table)[0] for each in self.region.entries])
+            for amounts in (np.round((given + found[0]) / units) * units - given, found[0]) if met[0] else ():
+                if self.region.confirmed(direction, amounts, np.ones(len(amounts), dtype=bool)) is not None:
+                    return self.region.tables(direction[None], amounts[None])
+        return None
 
     def _amounts(self, other: Tables) -> tuple[Reals, Reals]:
         """Directions (n,) of another table, and what is to be added (k,) to the free entries to get it."""

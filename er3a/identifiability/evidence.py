@@ -20,7 +20,7 @@ from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import tables_of
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Limit, LimitExcess, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
@@ -144,7 +144,9 @@ def evidence_of(
     judge = _Judge(robot, references, documents, tolerance or Tolerance())
     if judge.meets_trusted:
         return judge.evidence(only)
-    for each in (*corrected, *described_by(robot, usable(judge.references))):
+    extents = judge.view(judge.trusted).extents
+    led = [extents.led_to(tables_of(each)) for each in described_by(robot, usable(judge.references))]
+    for each in (*corrected, *(robot_of(own, 0, robot) for own in led if own is not None)):
         other = _Judge(each, references, documents, judge.tolerance)
         if other.meets_trusted:
             return _of_stated(robot, each, other.evidence(only))
