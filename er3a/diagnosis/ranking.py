@@ -28,7 +28,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import Displayed, Sheet
 from er3a.comparison.entries import Entry
 from er3a.diagnosis import fitting
 from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
@@ -325,8 +324,8 @@ SHOWN = 10  # groups of hypotheses
 UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Ranking(Displayed):
+@dataclass(frozen=True, eq=False)
+class Ranking:
     """Hypotheses in order.
 
     Attributes
@@ -346,18 +345,6 @@ class Ranking(Displayed):
     groups: tuple[tuple[int, ...], ...]
     before: Reals
     references: tuple[Reference, ...]
-
-    def sheet(self) -> Sheet:
-        """What the notebook shows: how many hypotheses were tried, and how many groups of them explain something.
-
-        Returns
-        -------
-        sheet : one line
-        """
-        tried, stated = len(self.pool.faults), len(self.references)
-        return Sheet(
-            f"Ranking of {tried} hypotheses by {stated} references: {len(self.groups)} groups explain them better"
-        )
 
 
 def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
