@@ -45,6 +45,7 @@ HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no dig
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 NEAR_ROW = 1e-5  # m, and of a turn, by which base or flange may miss what a row of the table can hold
 ROUNDED = 4  # decimals of mm and deg in a corrected table
+SHOWN = 6  # of differences
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # mm
 RAD = math.degrees(1.0)
 ANGLE_UNITS = {"deg": 1.0, "rad": RAD, "gon": 0.9, "π/180 deg": 1 / RAD, "180/π rad": RAD**2}
@@ -295,7 +296,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     reverses, coupled = _joints_paired(robot_a, robot_b, found)
     reversed_rows = tuple((np.flatnonzero(found.reverses) + 1).tolist())
     directions = DirectionLayer(not reversed_rows, reversed_rows)
-    at_ends = _ends_as_entries(robot_a, _rows_at_ends(robot_a, found, tolerances))
+    at_ends = _ends_as_entries(robot_a, rows_at_ends(robot_a, found, tolerances))
     base, flange = (_placement(T, entries, tolerances) for T, entries in zip((found.base, found.flange), at_ends))
     joint_zeros = _joint_zeros(robot_a, found)
     layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
@@ -408,14 +409,17 @@ def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
 ANGLES = "alpha", "beta", "theta"
 
 
+def _difference(name: str, one: float, other: float, alike: tuple[str, ...] = ()) -> Difference:
+    """A difference of an entry's values in m or rad, rounded in its unit."""
+    scale, unit = (1000.0, "mm") if name[0] in "ad" and name[:2] != "al" else (RAD, "deg")
+    own, there = (round(scale * value, SHOWN) + 0.0 for value in (one, other))
+    return Difference(name, own, there, there - own, unit, alike)
+
+
 def _named(robot: Robot, found: mechanism.EntryDifference) -> Difference:
-    """A difference by its name, values and unit in A's own table."""
-    column, link = found.column, found.link
-    angle = column in ANGLES
-    scale = np.degrees(1.0) if angle else 1000.0
-    one, other = (float(np.round(scale * value, 6)) + 0.0 for value in (found.one, found.other))
+    """A difference by its name in A's own table."""
     alike = tuple(_name(robot, *each) for each in found.alike)
-    return Difference(_name(robot, column, link), one, other, other - one, "deg" if angle else "mm", alike)
+    return _difference(_name(robot, found.column, found.link), found.one, found.other, alike)
 
 
 def _name(robot: Robot, column: str, link: int) -> str:
@@ -431,10 +435,10 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
     """The entries of A that slips of single numbers, or in single rows, have changed."""
     for name in (name for cause in known.slips for name in cause.entries if cause.side == "a"):
         column, row = name.rstrip("0123456789"), int(name.lstrip("abdefhlopst")) - 1
-        scale, unit = (RAD, "deg") if column in ("alpha", "offset") else (1000.0, "mm")
-        own, meant = (round(scale * float(getattr(each, column)[row]), ROUNDED) + 0.0 for each in (robot, known.one))
-        if own != meant:
-            yield Difference(name, own, meant, meant - own, unit)
+        own, meant = (float(getattr(each, column)[row]) for each in (robot, known.one))
+        found = _difference(name, own, meant)
+        if found.difference:
+            yield found
 
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
@@ -888,9 +892,21 @@ Row = tuple[tuple[str, int, float], ...]
 """Columns, rows (from 0) and values, m and rad, of entries that change."""
 
 
-def _rows_at_ends(robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> tuple[Row, Row]:
-    """The entries of the first row that hold what base differs by, and of the last row what flange does; none where
-    they can't: of a standard table the first row's ``Rz Tz`` and all of the last, of a modified one the reverse."""
+def rows_at_ends(robot: Robot, found: mechanism.Match, tolerances: mechanism.Tolerances) -> tuple[Row, Row]:
+    """The entries of the first row that hold what base differs by, and of the last row what flange does.
+
+    Of a standard table the first row's ``Rz Tz`` and all of the last can, of a modified one the reverse.
+
+    Parameters
+    ----------
+    robot : the first of two arms
+    found : their match
+    tolerances : m and rad; what differs by less is left as it is
+
+    Returns
+    -------
+    rows : of each end columns, rows (from 0) and values, m and rad; empty where they can't hold it
+    """
     before = np.linalg.inv(robot.base) @ np.linalg.inv(found.base) @ robot.base
     behind = robot.flange @ found.flange @ np.linalg.inv(robot.flange)
     standard, rows = robot.convention == "standard", []
@@ -931,15 +947,10 @@ def _of_row(M: Reals, sign: int) -> tuple[float, float, float, float] | None:
 
 
 def _ends_as_entries(robot: Robot, rows: tuple[Row, Row]) -> list[tuple[Difference, ...]]:
-    found = []
-    for row in rows:
-        own = []
-        for column, k, value in row:
-            scale, unit = (RAD, "deg") if column in ("offset", "alpha") else (1000.0, "mm")
-            one, other = (round(scale * x, ROUNDED) + 0.0 for x in (float(getattr(robot, column)[k]), value))
-            own.append(Difference(f"{column}{k + 1}", one, other, other - one, unit))
-        found.append(tuple(own))
-    return found
+    return [
+        tuple(_difference(f"{column}{k + 1}", float(getattr(robot, column)[k]), value) for column, k, value in row)
+        for row in rows
+    ]
 
 
 def _ends_corrected(
@@ -947,7 +958,7 @@ def _ends_corrected(
 ) -> tuple[Reals, Reals]:
     """Base and flange as the other arm has them; where the first or last row can hold the difference, that is changed
     in ``columns`` instead."""
-    rows = _rows_at_ends(robot, found, tolerances)
+    rows = rows_at_ends(robot, found, tolerances)
     base, flange = robot.base, robot.flange
     if not (rows[0] or mechanism.is_identity(found.base, tolerances)):
         base = _rounded_pose(np.linalg.inv(found.base) @ robot.base)

@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from er3a.comparison import mechanism
+from er3a.comparison.changes import Change, changed, exchanged, in_order, other_convention, swapped, times
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.robot import Robot
 
@@ -46,8 +47,6 @@ TOGETHER, KEPT, MATCHED = 3, 6, 6
 CLEARLY = 2.0
 FAR = 4.0
 UPRIGHT = 1 - 1e-6
-Columns = dict[str, Any]
-Undone = Callable[[Robot], Columns]
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class Cause:
 class _Edit:
     slip: Cause
     price: float
-    undone: Undone
+    undone: Change
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +156,9 @@ def _follows(own: tuple[_Edit, ...], edit: _Edit, edits: list[_Edit]) -> bool:
 def _undone(one: Robot, other: Robot, edits: Sequence[_Edit]) -> tuple[Robot, Robot]:
     for edit in edits:
         if edit.slip.side == "a":
-            one = one.replace(**edit.undone(one))
+            one = changed(one, edit.undone)
         else:
-            other = other.replace(**edit.undone(other))
+            other = changed(other, edit.undone)
     return one, other
 
 
@@ -186,19 +185,19 @@ def _with_alternatives(slips: tuple[Cause, ...], tied: Sequence[tuple[_Edit, ...
 def _edits(one: Robot, other: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
     """All slips that could be undone, those of single numbers first."""
     yield from _signs(one, tolerances)
-    yield _Edit(Cause("all_alphas_negated"), WHOLE, lambda robot: {"alpha": -robot.alpha})
+    yield _Edit(Cause("all_alphas_negated"), WHOLE, times(-1.0, ("alpha",)))
     yield from _of_offsets(one, tolerances)
     sides: tuple[Literal["a", "b"], ...] = "a", "b"
     for side in sides:
-        yield _Edit(Cause("other_convention", side), WHOLE, _other_convention)
+        yield _Edit(Cause("other_convention", side), WHOLE, other_convention)
     for row in range(one.rows):
         if abs(one.a[row] - one.d[row]) > tolerances.length:
-            yield _Edit(Cause("a_and_d_swapped", "a", (f"a{row + 1}", f"d{row + 1}")), WHOLE, _swapped(row))
-    yield _Edit(Cause("a_and_d_swapped"), WHOLE, lambda robot: {"a": robot.d, "d": robot.a})
+            yield _Edit(Cause("a_and_d_swapped", "a", (f"a{row + 1}", f"d{row + 1}")), WHOLE, swapped(row))
+    yield _Edit(Cause("a_and_d_swapped"), WHOLE, swapped())
     yield from _exchanges(one)
     yield from _scales(one, other)
     for rows, names in itertools.product((1, -1), SHIFTED):
-        yield _Edit(Cause("rows_shifted", "a", (), float(rows), ", ".join(names)), WHOLE, _rolled(names, rows))
+        yield _Edit(Cause("rows_shifted", "a", (), float(rows), ", ".join(names)), WHOLE, _rolled(one, names, rows))
 
 
 def _signs(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
@@ -209,17 +208,17 @@ def _signs(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
         code: CauseCode = "one_alpha_negated" if column == "alpha" else "one_length_negated"
         for row in np.flatnonzero(size > least).tolist():
             if not (column == "d" and robot.sliding[row]):
-                yield _Edit(Cause(code, "a", (f"{column}{row + 1}",)), 1.0, _negated(column, row))
+                yield _Edit(Cause(code, "a", (f"{column}{row + 1}",)), 1.0, times(-1.0, (column,), row))
 
 
 def _of_offsets(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
     """Mistakes in all offsets at once, which leave some other than 0 between the ends."""
     inner = ~robot.sliding & (np.arange(robot.rows) > 0) & (np.arange(robot.rows) < robot.rows - 1)
-    mistakes: list[tuple[Cause, Undone]] = [(Cause("offsets_negated"), lambda each: {"offset": -each.offset})]
+    mistakes = [(Cause("offsets_negated"), times(-1.0, ("offset",)))]
     for rows in (1, -1):
-        mistakes.append((Cause("rows_shifted", "a", (), float(rows), "offset"), _rolled(("offset",), rows)))
+        mistakes.append((Cause("rows_shifted", "a", (), float(rows), "offset"), _rolled(robot, ("offset",), rows)))
     for slip, undone in mistakes:
-        meant = undone(robot)["offset"]
+        meant = changed(robot, undone).offset
         if np.abs(wrap_to_pi(meant))[inner].max(initial=0.0) > tolerances.angle:
             yield _Edit(slip, 1.0, undone)
 
@@ -233,7 +232,7 @@ def _exchanges(robot: Robot) -> Iterator[_Edit]:
             if robot.sliding[list(pair)].any():
                 continue
             entries = tuple(f"{name}{row + 1}" for row in pair for name in names)
-            yield _Edit(Cause("rows_exchanged", "a", entries), WHOLE, _exchanged(names, *pair))
+            yield _Edit(Cause("rows_exchanged", "a", entries), WHOLE, in_order(exchanged(robot.rows, *pair), names))
 
 
 def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:
@@ -242,37 +241,8 @@ def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:
     longest = [max(np.abs(each.a).max(initial=0.0), np.abs(each.d).max(initial=0.0)) for each in arms]
     ratio = float(longest[1] / longest[0]) if min(longest) > 0 else 1.0
     if abs(math.log(ratio)) > SAME_RATIO:
-        yield _Edit(Cause("scale", "a", (), ratio), WHOLE, lambda robot: {"a": robot.a * ratio, "d": robot.d * ratio})
+        yield _Edit(Cause("scale", "a", (), ratio), WHOLE, times(ratio, ("a", "d")))
 
 
-def _other_convention(robot: Robot) -> Columns:
-    return {"convention": "modified" if robot.convention == "standard" else "standard"}
-
-
-def _negated(column: str, row: int) -> Undone:
-    def undone(robot: Robot) -> Columns:
-        values = getattr(robot, column)
-        return {column: np.where(np.arange(len(values)) == row, -values, values)}
-
-    return undone
-
-
-def _swapped(row: int) -> Undone:
-    def undone(robot: Robot) -> Columns:
-        own = np.arange(robot.rows) == row
-        return {"a": np.where(own, robot.d, robot.a), "d": np.where(own, robot.a, robot.d)}
-
-    return undone
-
-
-def _exchanged(names: Sequence[str], one: int, other: int) -> Undone:
-    def undone(robot: Robot) -> Columns:
-        order = np.arange(robot.rows)
-        order[[one, other]] = other, one
-        return {name: getattr(robot, name)[order] for name in names}
-
-    return undone
-
-
-def _rolled(names: Sequence[str], rows: int) -> Undone:
-    return lambda robot: {name: np.roll(getattr(robot, name), rows) for name in names}
+def _rolled(robot: Robot, names: Sequence[str], rows: int) -> Change:
+    return in_order(np.roll(np.arange(robot.rows), rows).tolist(), names)

@@ -12,17 +12,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from er3a.comparison.axis_table import table_from_axes
+from er3a.comparison.compare import rows_at_ends
 from er3a.comparison.entries import Entry, shifted
 from er3a.comparison.mechanism import (
     EntryDifference,
     Match,
     Tolerances,
+    is_identity,
     match,
     mechanism_of,
     turn_of,
@@ -69,14 +71,13 @@ SIGNS: tuple[Literal[1, -1], ...] = (-1, 1)
 @dataclass(frozen=True, eq=False)
 class Conventions:
     """A table's geometry is the references', but for few entries; ``faults`` is what is wrong or defined otherwise,
-    ``corrected`` the table with it as they have it; ``left`` : what stays at most, in half-widths of the references."""
+    ``corrected`` the table with it as they have it."""
 
     faults: Faults
     corrected: Robot
-    left: float
 
 
-def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions | None:
+def conventions_of(robot: Robot, references: Sequence[Reference]) -> list[Conventions]:
     """How references define zeros, directions, base and flange of a table otherwise.
 
     Parameters
@@ -85,16 +86,15 @@ def conventions_of(robot: Robot, references: Sequence[Reference]) -> Conventions
 
     Returns
     -------
-    conventions : None if that is not the reason why references are missed, or if they don't state all joint axes
+    conventions : one; none if that is not the reason why references are missed, or if they don't state all joint axes
     """
     if robot.coupling is not None or robot.rows != robot.joints or robot.sliding.any():
-        return None
+        return []
     stated = [r for r in references if r.quantity.depends_on_table]
     lines = _lines(stated, robot.joints)
     found = (_conventions(robot, stated, lines, finer) for finer in FINER) if lines else ()
-    best = next((each for each in found if each is not None), None)
-    chosen = best and _with_limits(robot, best, references)
-    return chosen if chosen and chosen.faults else None
+    chosen = [_with_limits(robot, each, references) for each in itertools.islice(filter(None, found), 1)]
+    return [each for each in chosen if each.faults]
 
 
 def counted_from_ground(
@@ -124,11 +124,11 @@ def counted_from_ground(
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
             for sign, ends in itertools.product(SIGNS if along else (), (False, True)):
                 fault = fact("counted_from_ground", joint=joint + 1, along=tuple(k + 1 for k in along), sign=sign)
-                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends), MEETS)
+                own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends))
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
                 off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
                 if np.abs(off).max() <= MEETS:
-                    found.setdefault(fault, replace(own, left=float(np.abs(off).max())))
+                    found.setdefault(fault, own)
     return list(found.values())
 
 
@@ -141,6 +141,45 @@ def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal
         lower[joint] -= sign * (most if sign > 0 else least)
         upper[joint] -= sign * (least if sign > 0 else most)
     return robot.replace(coupling=coupling, lower=lower, upper=upper)
+
+
+def described_by(robot: Robot, references: Sequence[Reference]) -> list[Robot]:
+    """The table corrected by comparison with the arm whose axes references state, however much of it is wrong.
+
+    Parameters
+    ----------
+    references : that all state a value
+
+    Returns
+    -------
+    robots : one, with base and flange as they are as far as rows can hold what differs; none if axes are not all stated
+    """
+    lines = _lines(references, robot.joints) if robot.rows == robot.joints else None
+    if lines is None:
+        return []
+    found, start, _ = _matched(robot, references, lines, lines[-1])
+    table = tables_of(start)
+    for column, row, value in itertools.chain(*rows_at_ends(robot, found, lines[-1])):
+        table = table.with_column(column, [row], np.array([[value]]))
+    return [robot_of(table, 0, start)]
+
+
+def _matched(
+    robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
+) -> tuple[Match, Robot, list[Entry]]:
+    """The match with the arm that lines describe, the table with it, and the entries that differ."""
+    other = _arm_of(lines, _zero_flange(stated))
+    found = match(mechanism_of(robot.without_tool()), mechanism_of(other), tolerances)
+    later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
+    own = [each for each in found.differences if each.column in LINKS]
+    wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in own]
+    moved = robot.replace(
+        offset=robot.offset + found.zeros,
+        direction=np.where(found.reverses, -1.0, 1.0) * robot.direction,
+        base=np.linalg.inv(found.base) @ robot.base,
+    )
+    table = shifted(tables_of(moved), wrong, np.array([[each.other - each.one for each in own]]))
+    return found, robot_of(table, 0, moved), wrong
 
 
 def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer: float) -> Conventions | None:
@@ -156,36 +195,6 @@ def _conventions(robot: Robot, stated: Sequence[Reference], lines: Lines, finer:
     flips = itertools.product(*([1.0] if sure else [1.0, -1.0] for sure in signed))
     starts = [start.replace(direction=start.direction * np.array(flip)) for flip in flips]
     return _fitted_to(robot, starts, wrong, stated, tolerances)
-
-
-def described_by(robot: Robot, references: Sequence[Reference]) -> Robot | None:
-    """The table corrected by comparison with the arm whose axes references state.
-
-    Parameters
-    ----------
-    references : those that do not depend on the table are left out
-
-    Returns
-    -------
-    robot : with its base moved to the stated one
-        None if they don't state all axes, or for arms with coupled or sliding joints
-    """
-    stated = [r for r in references if r.quantity.depends_on_table]
-    lines = None if robot.coupling is not None or robot.rows != robot.joints else _lines(stated, robot.joints)
-    return _matched(robot, stated, lines, lines[-1])[1] if lines and not robot.sliding.any() else None
-
-
-def _matched(
-    robot: Robot, stated: Sequence[Reference], lines: Lines, tolerances: Tolerances
-) -> tuple[Match, Robot, list[Entry]]:
-    """The match with the arm that lines describe, the table with it, and the entries that differ."""
-    other = _arm_of(lines, _zero_flange(stated))
-    found = match(mechanism_of(robot.without_tool()), mechanism_of(other), tolerances)
-    later = int(robot.convention == "modified")  # rows of a and alpha are those of the next joint
-    own = [each for each in found.differences if each.column in LINKS]
-    wrong = [Entry(each.column, each.link + later * (each.column != "d") + 1) for each in own]
-    table = shifted(tables_of(_moved(robot, found)), wrong, np.array([[each.other - each.one for each in own]]))
-    return found, robot_of(table, 0, _moved(robot, found)), wrong
 
 
 def _fitted_to(
@@ -212,14 +221,13 @@ def _fitted_to(
     best = min((each for each in tried if each[0] <= least + 0.5), key=lambda each: each[1])[2]
     best = _fitted(best, wrong, off)
     best = _plain(robot, best, off, tolerances)
-    left = float(np.abs(off(best)).max())
-    if left > MEETS:
+    if np.abs(off(best)).max() > MEETS:
         return None
     faults = (
         *(rounded(wrong_number(each, *(float(each.of(tables_of(arm))[0]) for arm in (robot, best)))) for each in wrong),
         *_differences(robot, best, tolerances),
     )
-    return Conventions(faults, best, left)
+    return Conventions(faults, best)
 
 
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
@@ -234,7 +242,7 @@ def _with_limits(given: Robot, found: Conventions, references: Sequence[Referenc
             ends[joint] = math.radians(stated)
             if given.states("limits"):
                 faults.append(fact("wrong_limit", joint=joint + 1, side=side, given_deg=own, fits_deg=stated))
-    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper), found.left)
+    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper))
 
 
 def _gross(found: EntryDifference) -> bool:
@@ -285,13 +293,6 @@ def _zero_flange(stated: Sequence[Reference]) -> Reals:
         elif isinstance(quantity, FlangeTurn) and quantity.pose == ZERO_POSE:
             T[:3, :3] = quantity.stated
     return T
-
-
-def _moved(robot: Robot, found: Match) -> Robot:
-    """The table with the match's zeros, directions and base."""
-    offset = robot.offset + found.zeros
-    direction = np.where(found.reverses, -1.0, 1.0) * robot.direction
-    return robot.replace(offset=offset, direction=direction, base=np.linalg.inv(found.base) @ robot.base)
 
 
 def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
@@ -346,12 +347,10 @@ def _plain(given: Robot, fitted: Robot, off: Misfit, tolerances: Tolerances) -> 
     moved = np.degrees(wrap_to_pi(fitted.offset - given.offset))
     snapped = np.where(np.abs(moved - np.round(moved)) < 2 * np.degrees(tolerances.angle), np.round(moved), moved)
     arm = kept(fitted, fitted.replace(offset=wrap_to_pi(given.offset + np.radians(snapped))))
-    shift = np.linalg.inv(given.flange) @ arm.flange
-    if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
-        arm = kept(arm, arm.replace(flange=given.flange))
-    shift = np.linalg.inv(given.base) @ arm.base
-    if np.linalg.norm(shift[:3, 3]) < 2 * tolerances.length and turn_of(shift) < 2 * tolerances.angle:
-        arm = kept(arm, arm.replace(base=given.base))
+    near = Tolerances(2 * tolerances.length, 2 * tolerances.angle)
+    for end in ("flange", "base"):
+        if is_identity(np.linalg.inv(getattr(given, end)) @ getattr(arm, end), near):
+            arm = kept(arm, arm.replace(**{end: getattr(given, end)}))
     return arm
 
 
@@ -366,19 +365,10 @@ def _differences(given: Robot, found: Robot, tolerances: Tolerances) -> Faults:
             faults.append(
                 fact("wrong_offset", joint=k + 1, given_deg=float(np.degrees(given.offset[k])), fits_deg=fits)
             )
-    base = found.base @ np.linalg.inv(given.base)
-    if np.linalg.norm(base[:3, 3]) > tolerances.length or turn_of(base) > tolerances.angle:
-        faults.append(
-            fact("base_elsewhere", shift_mm=_shift(base), turn_deg=float(np.round(np.degrees(turn_of(base)), 4)))
-        )
-    flange = np.linalg.inv(given.flange) @ found.flange
-    if np.linalg.norm(flange[:3, 3]) > tolerances.length or turn_of(flange) > tolerances.angle:
-        faults.append(
-            fact("flange_elsewhere", shift_mm=_shift(flange), turn_deg=float(np.round(np.degrees(turn_of(flange)), 4)))
-        )
+    ends = {"base": found.base @ np.linalg.inv(given.base), "flange": np.linalg.inv(given.flange) @ found.flange}
+    for end, T in ends.items():
+        if not is_identity(T, tolerances):
+            x, y, z = (np.round(T[:3, 3] * MM, 3) + 0.0).tolist()
+            turn = float(np.round(np.degrees(turn_of(T)), 4))
+            faults.append(fact(f"{end}_elsewhere", shift_mm=(x, y, z), turn_deg=turn))
     return tuple(faults)
-
-
-def _shift(T: Reals) -> tuple[float, float, float]:
-    x, y, z = (np.round(T[:3, 3] * MM, 3) + 0.0).tolist()
-    return x, y, z

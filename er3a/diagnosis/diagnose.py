@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.comparison.entries import Entry
 from er3a.diagnosis import conclusions
-from er3a.diagnosis.defined_otherwise import Conventions, conventions_of, counted_from_ground
+from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
-from er3a.diagnosis.fitting import ANGLES, MEETS, moved
+from er3a.diagnosis.fitting import ANGLES, MEETS, free_numbers, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
 from er3a.finding import fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
@@ -46,27 +46,13 @@ def unseen_of(case: Case) -> tuple[str, ...]:
     -------
     names : such as ``alpha6`` and ``direction5``; all entries if no reference is about the arm's shape
     """
-    before = case.difference(case.given)[0]
-    entries = [number for number in case.numbers if number.joint]
-    if not entries:
-        rows = range(1, case.given.d.shape[-1] + 1)
-        names = [f"{name}{row}" for name in ("a", "alpha", "d", "offset") for row in rows]
-    else:
-        sizes = {number: np.array(TRIED_RAD if number.column in ANGLES else TRIED_M) for number in entries}
-        seen = {number: missed(case, number, np.concatenate([own, -own]), before) for number, own in sizes.items()}
-        names = [number.name for number, own in seen.items() if not own.any()]
-    return (*names, *_reversible(case, before))
-
-
-def _reversible(case: Case, before: Reals) -> list[str]:
-    """Joints that could be reversed without a difference to references leaving ``before`` by more than their
-    uncertainty."""
-    found = []
-    for joint in range(case.given.direction.shape[-1]):
-        turned = case.given.with_column("direction", [joint], -case.given.direction[:, [joint]])
-        if (np.abs(case.difference(turned)[0] - before) <= case.uncertainty * MEETS).all():
-            found.append(f"direction{joint + 1}")
-    return found
+    before, rows = case.difference(case.given)[0], case.given.direction.shape[-1]
+    tried = {
+        each: np.outer([1, -1], TRIED_RAD if each.column in ANGLES else TRIED_M).ravel()
+        for each in free_numbers(rows)[1:]
+    }
+    tried |= {Entry("direction", k + 1): -2 * case.given.direction[:, k] for k in range(rows)}
+    return tuple(each.name for each, amounts in tried.items() if not missed(case, each, amounts, before).any())
 
 
 def missed(case: Case, number: Entry, amounts: Reals, before: Reals | float = 0.0) -> Flags:
@@ -209,24 +195,8 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hy
         than the table as it is. What it could not examine is in ``not_examined``, and extremes over the limits that
         the table misses in ``missed``
     """
-    stated = usable(references)
-    unseen = unseen_of(case_of(robot, stated)) if stated else every_entry(robot)
+    unseen = unseen_of(case_of(robot, usable(references)))
     return Hypotheses(diagnosis_of(robot, references).hypotheses, unseen, extremes_missed(robot, references))
-
-
-def every_entry(robot: Robot) -> tuple[str, ...]:
-    """Names of all entries and directions of a table.
-
-    Parameters
-    ----------
-    robot : with m rows
-
-    Returns
-    -------
-    names : 5 m, such as ``a1`` and ``direction6``
-    """
-    names = ("a", "alpha", "d", "offset", "direction")
-    return tuple(f"{name}{row}" for name in names for row in range(1, robot.rows + 1))
 
 
 def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
@@ -274,25 +244,24 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     ranking = rank_case(case)
     if not ranking:
         return Diagnosis(fact("met", references=len(stated)), len(stated), 0, ())
-    hypotheses = tuple(_described(ranking, group, robot) for group in ranking.groups)
+    hypotheses = tuple(_of_group(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains
-    from_ground = counted_from_ground(robot, stated) or (
-        [] if explained else counted_from_ground(robot, stated, limits_besides=True)
-    )
-    chosen = from_ground[0] if from_ground else None
-    if chosen is None and _may_be_chosen(robot, hypotheses):
-        chosen = conventions_of(robot, stated)
-    if chosen is not None:
-        difference = predict_tables(tables_of(chosen.corrected), chosen.corrected, quantities_of(stated))[0]
-        left = difference - expected_of(stated)[0]
-        first = _defined_otherwise(ranking, chosen, left, hypotheses)
-        if first.explains or not explained:
-            alike = tuple(each.faults for each in from_ground[1:])
-            first = replace(first, indistinguishable_from=(*alike, *first.indistinguishable_from))
-            conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())
-            if conclusion is not None:
-                return Diagnosis(conclusion, len(stated), tried, (first, *hypotheses[: SHOWN - 1]))
+    choices = counted_from_ground(robot, stated)
+    if not (choices or explained):
+        choices = counted_from_ground(robot, stated, limits_besides=True)
+    from_ground = bool(choices)
+    if not choices and _may_be_chosen(robot, hypotheses):
+        choices = conventions_of(robot, stated)
+    if choices:
+        arm = choices[0].corrected
+        left = predict_tables(tables_of(arm), arm, quantities_of(stated))[0] - expected_of(stated)[0]
+        alike = [each.faults for each in choices[1:]]
+        alike += [hypotheses[0].faults, *hypotheses[0].indistinguishable_from] if explained else []
+        first = _hypothesis(ranking, choices[0].faults, arm, left, tuple(alike))
+        conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())
+        if conclusion and (first.explains or not explained):
+            return Diagnosis(conclusion, len(stated), tried, (first, *hypotheses[: SHOWN - 1]))
     conclusion = _conclusion(case, ranking, hypotheses)
     return Diagnosis(conclusion, len(stated), tried, hypotheses)
 
@@ -304,32 +273,6 @@ def _may_be_chosen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> bool:
     ends = {f"{column}{row}" for column in ("d", "offset") for row in (1, robot.rows)}
     ends |= {f"{column}{1 if robot.convention == 'modified' else robot.rows}" for column in ("a", "alpha")}
     return all(entry_of(fault) in ends for fault in hypotheses[0].faults)
-
-
-def _defined_otherwise(ranking: Ranking, chosen: Conventions, left: Reals, others: Sequence[Hypothesis]) -> Hypothesis:
-    """The hypothesis that the table is the references' arm, with other conventions."""
-    before, bound, units = residuals(ranking, ranking.before)
-    after, _, _ = residuals(ranking, left)
-    of_unit = np.array([each == "mm" for each in units])
-    unit: Unit = "mm"
-    if not of_unit.any() or not (before[of_unit] > bound[of_unit]).any():
-        missed = [each for each, own, allowed in zip(units, before, bound) if own > allowed]
-        unit = missed[0] if missed else units[0]
-        of_unit = np.array([each == unit for each in units])
-    _, uncertainty = expected_of(ranking.references)
-    half_widths = float(np.abs(left / uncertainty).max())
-    alike = others[0] if others and others[0].explains else None
-    return Hypothesis(
-        faults=chosen.faults,
-        residual_before=float(before[of_unit].max()),
-        residual_after=float(after[of_unit].max()),
-        unit=unit,
-        explains=half_widths <= MEETS,
-        half_widths=half_widths,
-        indistinguishable_from=(alike.faults, *alike.indistinguishable_from) if alike else (),
-        score=0.0,
-        corrected=chosen.corrected,
-    )
 
 
 def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusions.Conclusion | None:
@@ -359,62 +302,46 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
             tried=tried,
         )
     best = hypotheses[0]
-    before, after, unit = best.residual_before, best.residual_after, best.unit
-    named = _concluded(best, best.indistinguishable_from)
-    return named or fact(
+    return _concluded(best, best.indistinguishable_from) or fact(
         "unexplained",
         tried=tried,
-        residual_before=before,
-        residual_after=after,
-        unit=unit,
-        least=_best_left(ranking, unit),
+        residual_before=best.residual_before,
+        residual_after=best.residual_after,
+        unit=best.unit,
+        least=float(_largest(ranking, ranking.pool.difference, best.unit).min()),
     )
 
 
-def _best_left(ranking: Ranking, unit: Unit) -> float:
-    """The minimum over hypotheses of the largest difference that remains in a unit."""
-    left, _, units = residuals(ranking, ranking.pool.difference)
-    return float(left[:, [each == unit for each in units]].max(axis=1).min())
+def _largest(ranking: Ranking, difference: Reals, unit: Unit) -> Reals:
+    """The largest (...,) of differences (..., n) in a unit; the coordinates of one point count as one distance."""
+    of_unit = [own for own in vectors_of(ranking.references) if ranking.references[own[0]].unit == unit]
+    largest: Reals = lengths_of(difference, of_unit).max(axis=-1)
+    return largest
 
 
-def residuals(ranking: Ranking, difference: Reals) -> tuple[Reals, Reals, list[Unit]]:
-    """Differences as lengths of vectors: the coordinates of one point are one residual.
-
-    Parameters
-    ----------
-    difference : (..., n), to the ranking's references, in their units
-
-    Returns
-    -------
-    residual, uncertainty, units : (..., m), (m,) and m units; a vector's uncertainty is the largest of its coordinates'
-    """
-    vectors = vectors_of(ranking.references)
+def _hypothesis(
+    ranking: Ranking,
+    faults: Faults,
+    corrected: Robot,
+    after: Reals,
+    alike: tuple[Faults, ...],
+    *,
+    score: float = 0.0,
+) -> Hypothesis:
+    """A hypothesis by what is left (n,) between its table and the references."""
     _, uncertainty = expected_of(ranking.references)
-    bound = np.array([uncertainty[list(places)].max() for places in vectors])
-    units = [ranking.references[places[0]].unit for places in vectors]
-    return lengths_of(difference, vectors), bound, units
-
-
-def _described(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypothesis:
-    pool, best = ranking.pool, group[0]
-    _, uncertainty = expected_of(ranking.references)
-    after = pool.difference[best]
-    before_lengths, _, units = residuals(ranking, ranking.before)
-    after_lengths, _, _ = residuals(ranking, after)
     unit = _worst_unit(ranking, after, uncertainty)
-    of_unit = np.array([each == unit for each in units])
-    greatest = [float(lengths[of_unit].max()) for lengths in (before_lengths, after_lengths)]
-    return Hypothesis(
-        faults=pool.faults[best],
-        residual_before=greatest[0],
-        residual_after=greatest[1],
-        unit=unit,
-        explains=bool(ranking.explains[best]),
-        half_widths=float(np.abs(after / uncertainty).max()),
-        indistinguishable_from=tuple(pool.faults[i] for i in group[1:]),
-        score=float(ranking.score[best]),
-        corrected=robot_of(pool.tables, best, robot),
-    )
+    residual_before, residual_after = (float(_largest(ranking, each, unit)) for each in (ranking.before, after))
+    half_widths = float(np.abs(after / uncertainty).max())
+    explains = half_widths <= MEETS
+    return Hypothesis(faults, residual_before, residual_after, unit, explains, half_widths, alike, score, corrected)
+
+
+def _of_group(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypothesis:
+    pool, best = ranking.pool, group[0]
+    alike, corrected = tuple(pool.faults[i] for i in group[1:]), robot_of(pool.tables, best, robot)
+    score = float(ranking.score[best])
+    return _hypothesis(ranking, pool.faults[best], corrected, pool.difference[best], alike, score=score)
 
 
 def _worst_unit(ranking: Ranking, after: Reals, uncertainty: Reals) -> Unit:

@@ -5,12 +5,13 @@ with a free number are in :mod:`er3a.diagnosis.fitting`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, cast
 
 import numpy as np
 
+from er3a.comparison.changes import Change, exchanged, in_order, other_convention, swapped, times
 from er3a.comparison.entries import LENGTHS, Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import COLUMNS, Tables
@@ -30,6 +31,15 @@ Faults = tuple[Fault, ...]
 
 CONVENTIONS = "wrong_offset", "reversed_direction", "base_elsewhere", "flange_elsewhere", "counted_from_ground"
 """What can be chosen without changing the arm."""
+
+
+DIGITS = {"given_mm": 6, "given_deg": 6, "factor": 6, "fits_mm": 4, "fits_deg": 4}
+COLUMN_OF = {
+    "wrong_offset": "offset",
+    "wrong_alpha": "alpha",
+    "wrong_alpha_sign": "alpha",
+    "reversed_direction": "direction",
+}
 
 
 def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
@@ -66,13 +76,9 @@ def rounded(fault: Fault) -> Fault:
     -------
     fault : unchanged if it has no such numbers; the scale's factor to six digits
     """
-    if is_one(fault, "wrong_length"):
-        return fault.but(given_mm=_digits(fault.given_mm, 6), fits_mm=_digits(fault.fits_mm, 4))
-    if is_one(fault, "wrong_offset", "wrong_alpha", "wrong_alpha_sign", "wrong_limit"):
-        return fault.but(given_deg=_digits(fault.given_deg, 6), fits_deg=_digits(fault.fits_deg, 4))
-    if is_one(fault, "wrong_scale"):
-        return fact("wrong_scale", factor=_digits(fault.factor, 6))
-    return fault
+    return fault.but(
+        **{name: _digits(fault.params[name], count) for name, count in DIGITS.items() if name in fault.params}
+    )
 
 
 def entry_of(fault: Fault) -> str | None:
@@ -86,20 +92,10 @@ def entry_of(fault: Fault) -> str | None:
     -------
     name : such as ``d4``, ``alpha3`` or ``lower2``; None if it is in several
     """
-    match fault:
-        case Finding(code="wrong_length", joint=joint, column=column):
-            return f"{column}{joint}"
-        case Finding(code="wrong_offset", joint=joint):
-            return f"offset{joint}"
-        case Finding(code="wrong_alpha", joint=joint) | Finding(code="wrong_alpha_sign", joint=joint):
-            return f"alpha{joint}"
-        case Finding(code="reversed_direction", joint=joint):
-            return f"direction{joint}"
-        case Finding(code="wrong_limit", joint=joint, side=side):
-            return f"{side}{joint}"
-        case Finding(code="wrong_limits", joint=int(joint), fault="lower_sign" | "upper_sign" as sign):
-            return f"{sign.removesuffix('_sign')}{joint}"
-    return None
+    column = COLUMN_OF.get(fault.code) or fault.params.get("column") or fault.params.get("side")
+    if is_one(fault, "wrong_limits") and fault.joint and fault.fault in ("lower_sign", "upper_sign"):
+        column = fault.fault.removesuffix("_sign")
+    return f"{column}{fault.joint}" if column else None
 
 
 def place_of(fault: Fault) -> str | Fault:
@@ -124,8 +120,6 @@ SIDES: tuple[Side, ...] = ("lower", "upper")
 RADIANS_PER_DEGREE = np.pi / 180
 SAME = 1e-12
 DECIMALS = 9
-
-Change = Callable[[Tables], Tables]
 
 
 @dataclass(frozen=True)
@@ -161,15 +155,15 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
         *limit_repairs(given, references),
         *_units(),
         *(
-            Repair(fact("wrong_alpha_sign", joint=j + 1, given_deg=alpha, fits_deg=-alpha), _negated("alpha", j))
+            Repair(fact("wrong_alpha_sign", joint=j + 1, given_deg=alpha, fits_deg=-alpha), times(-1.0, ("alpha",), j))
             for j, alpha in enumerate(alphas)
         ),
         *_swaps(joints),
         *_offsets(given, joints),
-        *(Repair(fact("reversed_direction", joint=j + 1), _negated("direction", j)) for j in joints),
+        *(Repair(fact("reversed_direction", joint=j + 1), times(-1.0, ("direction",), j)) for j in joints),
         Repair(
             fact("wrong_convention", read_as="modified" if given.modified[0] else "standard"),
-            lambda tables: replace(tables, modified=~tables.modified),
+            other_convention,
         ),
         *_limits(joints),
     ]
@@ -254,19 +248,11 @@ _MISREAD_ANGLES: tuple[tuple[float, Misread], ...] = (
 
 def _units() -> list[Repair]:
     return [
-        Repair(fact("wrong_unit", entries=entries, misread=misread), _scaled(columns, factor))
+        Repair(fact("wrong_unit", entries=entries, misread=misread), times(factor, columns))
         for places, misreadings in ((_LENGTHS, _MISREAD_LENGTHS), (_ANGLES, _MISREAD_ANGLES))
         for entries, columns in places
         for factor, misread in misreadings
     ]
-
-
-def _scaled(columns: tuple[str, ...], factor: float) -> Change:
-    return lambda tables: replace(tables, **{name: getattr(tables, name) * factor for name in columns})
-
-
-def _negated(column: str, joint: int) -> Change:
-    return lambda tables: tables.with_column(column, [joint], -getattr(tables, column)[:, [joint]])
 
 
 _SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] = (
@@ -278,31 +264,18 @@ _SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] 
 
 
 def _swaps(joints: range) -> list[Repair]:
-    found = [Repair(fact("swapped_entries", joint=j + 1), _columns_swapped([j])) for j in joints]
-    found.append(Repair(fact("swapped_entries", joint=None), _columns_swapped(list(joints))))
+    rows = len(joints)
+    found = [Repair(fact("swapped_entries", joint=j + 1), swapped(j)) for j in joints]
+    found.append(Repair(fact("swapped_entries", joint=None), swapped()))
     for i, j in combinations(joints, 2):
-        order = list(joints)
-        order[i], order[j] = j, i
-        found.append(Repair(fact("swapped_rows", first=i + 1, second=j + 1), _reordered(("a", "alpha", "d"), order)))
-        found.append(Repair(fact("swapped_limits", first=i + 1, second=j + 1), _reordered(("lower", "upper"), order)))
+        order, pair = exchanged(rows, i, j), {"first": i + 1, "second": j + 1}
+        found.append(Repair(fact("swapped_rows", **pair), in_order(order, ("a", "alpha", "d"))))
+        found.append(Repair(fact("swapped_limits", **pair), in_order(order, ("lower", "upper"))))
     for entries, columns in _SHIFTS:
-        found.append(
-            Repair(fact("shifted_rows", entries=entries, toward="down"), _reordered(columns, list(np.roll(joints, -1))))
-        )
-        found.append(
-            Repair(fact("shifted_rows", entries=entries, toward="up"), _reordered(columns, list(np.roll(joints, 1))))
-        )
+        for toward, by in (("down", -1), ("up", 1)):
+            order = np.roll(joints, by).tolist()
+            found.append(Repair(fact("shifted_rows", entries=entries, toward=toward), in_order(order, columns)))
     return found
-
-
-def _columns_swapped(joints: list[int]) -> Change:
-    return lambda tables: tables.with_column("a", joints, tables.d[:, joints]).with_column(
-        "d", joints, tables.a[:, joints]
-    )
-
-
-def _reordered(columns: tuple[str, ...], order: list[int]) -> Change:
-    return lambda tables: replace(tables, **{name: getattr(tables, name)[:, order] for name in columns})
 
 
 def _offsets(given: Tables, joints: range) -> list[Repair]:

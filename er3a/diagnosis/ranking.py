@@ -21,14 +21,13 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.by_value import Displayed, Sheet
 from er3a.comparison.entries import Entry
 from er3a.diagnosis import fitting
 from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
@@ -176,13 +175,9 @@ def single_faults(case: Case) -> Pool:
     -------
     pool : repairs first, then free numbers
     """
-    repairs = case.repairs
-    pools = [case.pool(join([repair.apply(case.given) for repair in repairs]), *_named([(each,) for each in repairs]))]
-    if case.numbers:
-        search = case.search(case.given)
-        fits = fitting.scanned(search, [(place,) for place in range(len(case.numbers))], fitting.FINE)
-        pools.append(_fitted(case, case.given, [()], fitting.meet(search, fitting.descend(search, fits, MANY_PASSES))))
-    return joined_pools(pools)
+    alone = [(each,) for each in case.repairs]
+    tables = join([repair.apply(case.given) for repair in case.repairs])
+    return joined_pools([case.pool(tables, *_named(alone)), *_with_numbers(case, [()], 1, fitting.FINE)])
 
 
 def double_faults(case: Case) -> Pool:
@@ -196,7 +191,9 @@ def double_faults(case: Case) -> Pool:
     -------
     pool : two repairs, a repair and a number, two numbers
     """
-    return joined_pools([_two_repairs(case), *((_repair_and_number(case), _two_numbers(case)) if case.numbers else ())])
+    alone = [(each,) for each in case.repairs]
+    one, two = _with_numbers(case, alone, 1, fitting.COARSE), _with_numbers(case, [()], 2, fitting.PAIRED)
+    return joined_pools([_two_repairs(case), *one, *two])
 
 
 def every_pair_refitted(case: Case) -> Pool:
@@ -212,7 +209,9 @@ def every_pair_refitted(case: Case) -> Pool:
     -------
     pool : a repair and a number, two numbers
     """
-    return joined_pools([_repair_and_number(case, thorough=True), _two_numbers(case, thorough=True)])
+    alone = [(each,) for each in case.repairs]
+    one = _with_numbers(case, alone, 1, fitting.FINE, thorough=True)
+    return joined_pools([*one, *_with_numbers(case, [()], 2, fitting.DENSE, thorough=True)])
 
 
 def joined_pools(pools: Sequence[Pool]) -> Pool:
@@ -235,18 +234,10 @@ def joined_pools(pools: Sequence[Pool]) -> Pool:
 
 
 def _two_repairs(case: Case) -> Pool:
-    """Every two repairs, and the other way round where that leads to a table that no two lead to otherwise."""
     repairs = case.repairs
     singles = [repair.apply(case.given) for repair in repairs]
-    places = list(combinations(range(len(repairs)), 2))
-    one_way = [first.apply(join(singles[i + 1 :])) for i, first in enumerate(repairs[:-1])]
-    other_way = [last.apply(join(singles[:j])) for j, last in enumerate(repairs) if j]
-    turned = [(j, i) for j in range(len(repairs)) for i in range(j)]
-    tables = join([*one_way, *other_way])
-    first, group = _alike(tables)
-    kept = np.flatnonzero((first[group] >= len(places)) | (np.arange(len(tables)) < len(places)))
-    pairs = [(*places, *turned)[k] for k in kept.tolist()]
-    return case.pool(tables[kept], *_named([(repairs[i], repairs[j]) for i, j in pairs]))
+    tables = join([first.apply(join(singles[i + 1 :])) for i, first in enumerate(repairs[:-1])])
+    return case.pool(tables, *_named(list(combinations(repairs, 2))))
 
 
 def _alike(tables: Tables, without: Sequence[str] = ()) -> tuple[Integers, Integers]:
@@ -257,23 +248,19 @@ def _alike(tables: Tables, without: Sequence[str] = ()) -> tuple[Integers, Integ
     return first, group.reshape(-1)
 
 
-def _repair_and_number(case: Case, thorough: bool = False) -> Pool:
-    starts = join([repair.apply(case.given) for repair in case.repairs])
+def _with_numbers(
+    case: Case, chosen: Sequence[tuple[Repair, ...]], count: int, grid: fitting.ScanGrid, thorough: bool = False
+) -> list[Pool]:
+    """Hypotheses that some free numbers are wrong, each with one of the chosen repairs, or none."""
+    if not case.numbers:
+        return []
+    starts = join([own[0].apply(case.given) if own else case.given for own in chosen])
     first, group = _alike(starts, ("lower", "upper"))
-    places = [(place,) for place in range(len(case.numbers))]
-    fits = _searched(case, starts[first], places, fitting.FINE if thorough else fitting.COARSE, thorough)
+    places = list(combinations(range(len(case.numbers)), count))
+    fits = _searched(case, starts[first], places, grid, thorough)
     rows = [np.flatnonzero(fits.start == shape) for shape in group]
     start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
-    every = fits[np.concatenate(rows)]
-    return _fitted(
-        case, starts, [(r,) for r in case.repairs], fitting.Fits(start, every.which, every.amounts, every.left)
-    )
-
-
-def _two_numbers(case: Case, thorough: bool = False) -> Pool:
-    pairs = list(combinations(range(len(case.numbers)), 2))
-    fits = _searched(case, case.given, pairs, fitting.DENSE if thorough else fitting.PAIRED, thorough)
-    return _fitted(case, case.given, [()], fits)
+    return [_fitted(case, starts, chosen, replace(fits[np.concatenate(rows)], start=start))]
 
 
 def _searched(
@@ -337,8 +324,8 @@ SHOWN = 10  # groups of hypotheses
 UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Ranking(Displayed):
+@dataclass(frozen=True, eq=False)
+class Ranking:
     """Hypotheses in order.
 
     Attributes
@@ -358,18 +345,6 @@ class Ranking(Displayed):
     groups: tuple[tuple[int, ...], ...]
     before: Reals
     references: tuple[Reference, ...]
-
-    def sheet(self) -> Sheet:
-        """What the notebook shows: how many hypotheses were tried, and how many groups of them explain something.
-
-        Returns
-        -------
-        sheet : one line
-        """
-        tried, stated = len(self.pool.faults), len(self.references)
-        return Sheet(
-            f"Ranking of {tried} hypotheses by {stated} references: {len(self.groups)} groups explain them better"
-        )
 
 
 def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
@@ -405,7 +380,7 @@ def rank_case(case: Case) -> Ranking | None:
     pool = single_faults(case)
     if not pool.explains(case.uncertainty).any():
         pool = joined_pools([pool, double_faults(case)])
-        if pool.explains(case.uncertainty).any() and case.numbers:
+        if case.numbers and pool.explains(case.uncertainty).any():
             pool = joined_pools([pool, every_pair_refitted(case)])
     per_fault = np.log(len(stated)) + np.log(len(pool.faults))
     units = np.array([reference.unit for reference in stated])
@@ -430,7 +405,7 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
     expected, _ = expected_of(stated)
     measured = [(type(each), tuple(vars(each).values())) for each in quantities_of(stated)]
     first = {key: each for key, each in reversed(list(zip(measured, quantities_of(stated))))}
-    column = np.array([list(first).index(key) for key in measured])
+    column = np.array([list(first).index(key) for key in measured], dtype=np.int64)
 
     def difference(tables: Tables) -> Reals:
         return predict_tables(tables, robot, list(first.values()))[:, column] - expected

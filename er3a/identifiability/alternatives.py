@@ -11,12 +11,13 @@ They are not near the table, so linearisation can't find them: they and their co
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, islice
 
 import numpy as np
 
 from er3a.by_value import ByValue
+from er3a.comparison.changes import other_convention, times
 from er3a.comparison.entries import Entry
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.feasible import MET
@@ -70,12 +71,12 @@ class Flip:
         tables : H, rad
         """
         if self.entry is None:
-            return replace(table, modified=~table.modified)
+            return other_convention(table)
         j = self.entry.joint - 1
         own: Reals = getattr(table, self.entry.column)[:, [j]]
         if self.kind == "half_turn":
             return table.with_column(self.entry.column, [j], half_turn(own))
-        changed = table.with_column(self.entry.column, [j], -own)
+        changed = times(-1.0, (self.entry.column,), j)(table)
         if self.about_deg:
             shift = 2 * own * np.radians(self.about_deg)
             changed = changed.with_column("offset", [j], table.offset[:, [j]] + shift)
@@ -183,7 +184,6 @@ def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
 
 
 CHUNK = 1024  # combinations that are tried at once
-NO_WORSE = 1e-6  # half-widths, by which an alternative may miss more than the table does
 SAME_TOOL = 4.0  # mm, and thousandths: what moves a tool by less is none of another robot
 MAX_COMPOSED = 2048
 
@@ -197,13 +197,11 @@ class Alternative(ByValue):
     entries : names of those that differ, and their values there, in their units
     off : how far its tool is off the table's
     table : a batch of one
-    repairs : whether it meets all requirements, of which the table misses some
     """
 
     entries: tuple[tuple[str, float], ...]
     off: ToolOff
     table: Tables
-    repairs: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -257,11 +255,11 @@ def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) 
 def alternatives_to(table: Tables, asked: Asked, tool: ToolRange) -> list[Alternative]:
     """Minimal alternatives to a table that requirements allow.
 
-    All that the table meets are met, and none is missed by more; without those that move no tool.
+    Without those that move no tool.
 
     Parameters
     ----------
-    table : a batch of one
+    table : a batch of one, that meets them
 
     Returns
     -------
@@ -286,8 +284,6 @@ class _AlternativeSearch:
 
     def __init__(self, table: Tables, asked: Asked, tool: ToolRange, flips: Sequence[Flip]):
         self.table, self.asked, self.tool, self.flips = table, asked, tool, flips
-        own = asked.violation(asked.off(table)) if len(asked) else np.empty(0)
-        self.own, self.bound = own, np.maximum(MET, own + NO_WORSE)
         self.composed: list[tuple[int, ...]] = [()]
         self.signatures = tool.signature(table)
         self.found: list[Alternative] = []
@@ -311,7 +307,7 @@ class _AlternativeSearch:
     def _plain_allowed(self, tables: Tables) -> tuple[Flags, Flags]:
         """Which tables (H,) meet the requirements on the arm, and which of these miss an entry measured by itself."""
         violation = self.asked.violation(self.asked.plain_off(tables))
-        met = violation <= self.bound[: violation.shape[1]]
+        met = violation <= MET
         by_itself = np.array([isinstance(each.quantity, TableEntry) for each in self.asked.plain], dtype=bool)
         return np.asarray(met[:, ~by_itself].all(axis=1)), np.asarray(~met[:, by_itself].all(axis=1))
 
@@ -323,12 +319,11 @@ class _AlternativeSearch:
             self.allowed.append(chosen)  # the same robot, or one that others compose
             return
         violation = self.asked.violation(self.asked.off(table)) if len(self.asked) else np.empty(0)
-        if not (violation <= self.bound)[len(self.asked.plain) :].all():
+        if not (violation <= MET)[len(self.asked.plain) :].all():
             return
         if not barred:
-            repairs = bool((self.own > MET).any() and (violation <= MET).all())
             self.allowed.append(chosen)
-            self.found.append(self._described(chosen, table, self.tool.off(table), repairs))
+            self.found.append(self._described(chosen, table, self.tool.off(table)))
         self._compose(chosen)
 
     def _compose(self, chosen: tuple[int, ...]) -> None:
@@ -343,7 +338,7 @@ class _AlternativeSearch:
         self.signatures = np.concatenate([self.signatures, _signatures(self.tool, self.table, self.flips, new)])
         self.composed += new
 
-    def _described(self, chosen: tuple[int, ...], table: Tables, off: ToolOff, repairs: bool) -> Alternative:
+    def _described(self, chosen: tuple[int, ...], table: Tables, off: ToolOff) -> Alternative:
         entries: list[tuple[str, float]] = []
         for i in chosen:
             entry = self.flips[i].entry
@@ -353,7 +348,7 @@ class _AlternativeSearch:
             entries.append((entry.name, float(getattr(table, entry.column)[0, entry.joint - 1] * entry.in_unit)))
             if self.flips[i].about_deg:
                 entries.append((f"offset{entry.joint}", float(np.degrees(table.offset[0, entry.joint - 1]))))
-        return Alternative(tuple(entries), off, table, repairs)
+        return Alternative(tuple(entries), off, table)
 
 
 def _signatures(tool: ToolRange, table: Tables, flips: Sequence[Flip], sets: Sequence[tuple[int, ...]]) -> Reals:

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from itertools import combinations
 from math import isnan
 
 import numpy as np
@@ -30,6 +29,7 @@ from er3a.numerics.arrays import Flags, Reals
 WIDEST_M, WIDEST_RAD = 0.4, np.pi
 REACTS = 1e-9
 FAR = 3.0  # of an entry's scale
+PRINTED = 3  # decimals of mm and deg, with which a table that was led to is as good as with all
 A_LENGTH_M, REVERSED_RAD, UNWATCHED, ROUNDED = 0.3, 0.3, 0.01, 6
 MAX_ROWS = 1 << 15
 SPREAD, WIDTHS = 192, (0.02, 0.1, 0.3, 1.0)
@@ -127,14 +127,12 @@ class Extent:
     Attributes
     ----------
     off : how far the tool is off at most if it alone is anywhere in there
-    excluded : whether the table's value is not
     at_least : whether more may be left open: tables far away were found, and how far they go was not
     """
 
     low: float
     high: float
     off: ToolOff
-    excluded: bool
     at_least: bool = False
 
     @property
@@ -150,12 +148,11 @@ class Extents:
     ----------
     table : the table (a batch of one) whose entries they are
     entries : all that can take any value; relevant : places of those to which a requirement reacts
-    nearer : tables from which one that meets the requirements is looked for where the table misses them
     tolerance : how far the tool may be off for what counts as settled
 
     Attributes
     ----------
-    met : whether a table that meets the requirements was found; table_meets : whether the table does
+    met : whether the table meets the requirements; where it does not, nothing is known of any entry
     far : tables far away that meet them, too, once these were searched for: how far such go was not
     goes_far : whether these differ in most entries: then no search tells where any entry ends
     """
@@ -169,7 +166,6 @@ class Extents:
         gauge: Gauge,
         tool: ToolRange,
         *,
-        nearer: Sequence[Tables] = (),
         tolerance: Tolerance | None = None,
     ):
         self.tolerance, self.entries, self.tool, self.table = tolerance or Tolerance(), tuple(entries), tool, table
@@ -177,11 +173,8 @@ class Extents:
         self.places = sorted(seen - set(gauge.chosen))
         self.region = Region(asked, table, [entries[k] for k in self.places])
         self.watched = [n for n, k in enumerate(self.places) if k in set(relevant)]
-        self.table_meets = not relevant or asked.missed_by(table) <= MET
+        self.met = not relevant or asked.missed_by(table) <= MET
         self.direction, self.start = table.direction[0], np.zeros(len(self.places))
-        self.met = self.table_meets
-        if not self.table_meets:
-            self._begin(nearer)
         self._fit_likelihood()
         self.far: list[tuple[Reals, Reals]] = []
         self.goes_far = False
@@ -189,68 +182,31 @@ class Extents:
 
     @property
     def met_by(self) -> Tables:
-        """The table, or if it does not meet the requirements, one near it that does."""
+        """The table; where some requirements have standard deviations, the one near it that is likeliest."""
         return self.region.tables(self.direction[None], self.start[None])
 
-    def _begin(self, nearer: Sequence[Tables]) -> None:
-        """A table that meets the requirements, of those given, else by a change of one entry, else of any, with
-        joints reversed; else the one to where steps from the table lead."""
-        k, own = len(self.places), self.table.direction[0]
-        starts = [(own, self.start), *(self._amounts(each) for each in nearer)]
-        if self._chose(starts, np.ones((len(starts), k), dtype=bool)) or self._chose(
-            starts[:1] * k, ~np.eye(k, dtype=bool)
-        ):
-            return
-        turned = [
-            np.where(np.isin(np.arange(len(own)), each), -1.0, 1.0)
-            for n in range(4)
-            for each in combinations(range(len(own)), n)
-        ]
-        for some in (
-            [(turn * each, begun) for each, begun in starts for turn in turned],
-            [*zip(*_spread(self.region, own, self.start))],
-        ):
-            if self._chose(some):
-                return
-        self.start = self.region.reached(own[None], self.start[None])[0][0]
+    def led_to(self, other: Tables) -> Tables | None:
+        """A table near another one that meets the requirements, in the rows that are nearest to the given table.
 
-    def _chose(self, starts: Sequence[tuple[Reals, Reals]], held: Flags | None = None) -> bool:
-        """Take the nearest of the tables to which starts lead that meet the requirements; whether there is one."""
-        direction = np.array([each for each, _ in starts])
-        amounts, met = self.region.reached(direction, np.array([own for _, own in starts]), held)
-        found = [self._rewritten(direction[i], amounts[i]) for i in np.flatnonzero(met)]
-        plain = [(each, np.where(np.isin(np.arange(len(own)), self.watched), own, 0.0)) for each, own in found]
-        found += [
-            each
-            for each in plain
-            if self.region.reached(each[0][None], each[1][None], np.ones((1, len(each[1])), dtype=bool))[1][0]
-        ]
-        found.sort(key=lambda each: self._distance(*each))
-        for each in found:
-            if (start := self.region.confirmed(*each)) is not None:
-                self.direction, self.start, self.met = each[0], self._without_untold_turns(each[0], start), True
-                self._centre()
-                return True
-        return False
+        Parameters
+        ----------
+        other : a batch of one
 
-    def _centre(self) -> None:
-        """Go on from the edge of what is met, where steps end, to the table that fits requirements best."""
-        found, met = self.region.reached(self.direction[None], self.start[None], inner=0.0)
-        best = self.region.confirmed(self.direction, found[0]) if met[0] else None
-        self.start = self.start if best is None else best
-
-    def _without_untold_turns(self, direction: Reals, amounts: Reals) -> Reals:
-        """Amounts (k,) without half turns of angles that requirements, led to again, don't tell from none."""
-        for n in np.flatnonzero(np.abs(np.abs(amounts) - np.pi) < UNTOLD).tolist():
-            own = np.arange(len(amounts)) == n
-            found, met = self.region.reached(direction[None], np.where(own, 0.0, amounts)[None], own[None])
-            confirmed = self.region.confirmed(direction, found[0], own) if met[0] else None
-            amounts = amounts if confirmed is None else confirmed
-        return amounts
-
-    def _distance(self, direction: Reals, amounts: Reals) -> float:
-        """Of a table from the given one: angles turned, a reversed joint being half a turn; lengths by a metre."""
-        return float(np.abs(amounts).sum() + np.pi * (direction != self.table.direction[0]).sum())
+        Returns
+        -------
+        table : a batch of one, entries that nothing reacts to as they are given if that will do, to few decimals if
+            these will do, so that parallel axes are parallel; None if steps from ``other`` lead to none
+        """
+        direction, amounts = self._rewritten(*self._amounts(other))
+        watched = np.isin(np.arange(len(amounts)), self.watched)
+        for start in (np.where(watched, amounts, 0.0), amounts):
+            found, met = self.region.reached(direction[None], start[None], inner=0.0)
+            units = np.array([10.0**-PRINTED / each.in_unit for each in self.region.entries])
+            given = np.array([each.of(self.table)[0] for each in self.region.entries])
+            for amounts in (np.round((given + found[0]) / units) * units - given, found[0]) if met[0] else ():
+                if self.region.confirmed(direction, amounts, np.ones(len(amounts), dtype=bool)) is not None:
+                    return self.region.tables(direction[None], amounts[None])
+        return None
 
     def _amounts(self, other: Tables) -> tuple[Reals, Reals]:
         """Directions (n,) of another table, and what is to be added (k,) to the free entries to get it."""
@@ -302,17 +258,14 @@ class Extents:
         if not own[watched].any():
             return self._anything(first, value, self._off(first, self._widest(first)))
         if not self.met:
-            return Extent(np.nan, np.nan, NOT_OFF, bool(abs(own @ self.start) > first.scale))
+            return Extent(np.nan, np.nan, NOT_OFF)
         low, high = self._end(own)
         reached = [float(own @ amounts) for _, amounts in self.elsewhere]
-        excluded = not (self.table_meets or low - REACTS <= 0 <= high + REACTS or self._could_stay(own))
-        low, high = min([low, *reached]), max([high, *reached])
-        if not excluded:
-            low, high = min(low, 0.0), max(high, 0.0)
+        low, high = min([low, 0.0, *reached]), max([high, 0.0, *reached])
         off = self._off(first, low).worse(self._off(first, high))
         ends = (value + low) * first.in_unit, (value + high) * first.in_unit
         at_least = self.goes_far or (bool(self.far) and not off.within(self.tolerance.mm, self.tolerance.deg))
-        return Extent(*ends, off, excluded, at_least)
+        return Extent(*ends, off, at_least)
 
     def free_choice(self, entry: Entry) -> Extent:
         """The interval of an entry that moves no tool if others are changed with it.
@@ -329,7 +282,7 @@ class Extents:
 
     def _anything(self, entry: Entry, value: float, off: ToolOff) -> Extent:
         widest = self._widest(entry)
-        return Extent((value - widest) * entry.in_unit, (value + widest) * entry.in_unit, off, False)
+        return Extent((value - widest) * entry.in_unit, (value + widest) * entry.in_unit, off)
 
     def _widest(self, entry: Entry) -> float:
         return largest_length(self.table) if entry.unit == "mm" else np.pi
@@ -434,20 +387,6 @@ class Extents:
         entry = self.region.entries[place]
         one = self._off(entry, entry.scale)
         return entry.scale / max(one.mm / self.tolerance.mm, one.deg / self.tolerance.deg, FAR / 1e3)
-
-    def _could_stay(self, weights: Reals) -> bool:
-        """Whether some table with a combination as the table has it meets all requirements."""
-        places = [
-            (self.table.direction[0], np.zeros(len(weights))),
-            (self.direction, self.start),
-            *self.elsewhere[:STAYS_FROM],
-        ]
-        toward = weights / (weights @ weights)
-        begun = np.array([amounts - toward * (weights @ amounts) for _, amounts in places])
-        direction, held = np.array([each for each, _ in places]), np.tile(weights != 0, (len(places), 1))
-        reached, met = self.region.reached(direction, begun, held)
-        rows = np.flatnonzero(met)
-        return any(self.region.confirmed(direction[i], reached[i], held[i]) is not None for i in rows)
 
     def may_reverse(self, joint: int) -> bool:
         """Whether a joint may turn the other way.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import Literal
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
@@ -139,7 +138,7 @@ class Evidence(ByValue, Displayed):
             f"Evidence of {self.robot.name}: {len(judged)} entries, "
             f"tolerance {shortly(self.tolerance.mm)} mm, {shortly(self.tolerance.deg)} deg",
             ("status", "count", "entries"),
-            tuple((status, str(len(found)), _in_short(found)) for status, found in names.items() if found),
+            tuple((status, str(len(found)), " ".join(found)) for status, found in names.items() if found),
             facts=(
                 f"table_meets: {shortly(self.table_meets)}; conflicts: {len(self.conflicts)}; "
                 f"readings: {len(self.readings)}, allowed: {len(self.allowed)}",
@@ -158,21 +157,3 @@ _SHOWN: tuple[Status, ...] = (
     "settled_up_to_signs",
     "settled",
 )
-
-
-def _in_short(names: list[str]) -> str:
-    """Names of entries, those of a column together: ``a1-3,5 d4 d2+d3``."""
-    parts = []
-    for column, found in groupby(names, key=column_of):
-        numbers = [name.removeprefix(column) for name in found]
-        if not all(number.isdigit() for number in numbers):
-            parts += [name.replace(" ", "") for name in (column + number for number in numbers)]
-            continue
-        runs: list[list[int]] = []
-        for number in map(int, numbers):
-            if runs and runs[-1][-1] == number - 1:
-                runs[-1].append(number)
-            else:
-                runs.append([number])
-        parts.append(column + ",".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs))
-    return " ".join(parts)

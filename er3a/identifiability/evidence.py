@@ -11,6 +11,7 @@ import numpy as np
 
 from er3a.comparison.entries import Entry, shifted, wrapped_between
 from er3a.diagnosis.defined_otherwise import described_by
+from er3a.diagnosis.ranking import usable
 from er3a.identifiability.alternatives import Alternative, alternatives_to, flips_of, gauge_flips, with_readings
 from er3a.identifiability.continuous import Extent, Extents, turned_once
 from er3a.identifiability.entries import column_of, continuous_of, document_of, entries_of, gauge_of
@@ -19,7 +20,7 @@ from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import Limit, LimitExcess, Speed, value_at
 from er3a.references.reference import Documents, Reference, conflicts
@@ -125,8 +126,9 @@ def evidence_of(
 ) -> Evidence:
     """What independent references settle of a robot's table.
 
-    A table that misses them is judged from a corrected one that meets them, as diagnosis or comparison gives it, with
-    its base and flange: entries that differ are contradicted, of all others it is asked what that arm leaves open.
+    A table that misses them is judged from a corrected one that meets them, as diagnosis gives it, else as comparison
+    with the arm whose axes they state does: entries that differ are contradicted, of all others it is asked what that
+    arm leaves open. Where there is no such table, nothing is settled and no interval is known.
 
     Parameters
     ----------
@@ -140,11 +142,14 @@ def evidence_of(
     evidence : the same for the same input
     """
     judge = _Judge(robot, references, documents, tolerance or Tolerance())
-    if corrected and not judge.meets_trusted:
-        for each in corrected:
-            other = _Judge(each, references, documents, judge.tolerance)
-            if other.meets_trusted:
-                return _of_stated(robot, each, other.evidence(only))
+    if judge.meets_trusted:
+        return judge.evidence(only)
+    extents = judge.view(judge.trusted).extents
+    led = [extents.led_to(tables_of(each)) for each in described_by(robot, usable(judge.references))]
+    for each in (*corrected, *(robot_of(own, 0, robot) for own in led if own is not None)):
+        other = _Judge(each, references, documents, judge.tolerance)
+        if other.meets_trusted:
+            return _of_stated(robot, each, other.evidence(only))
     return judge.evidence(only)
 
 
@@ -165,6 +170,12 @@ def _of_stated(robot: Robot, corrected: Robot, found: Evidence) -> Evidence:
         if each.entry not in values:
             return each
         entry = by_name[each.entry]
+        if (
+            each.status in OUTRIGHT_OR_NOT
+            and each.interval
+            and each.interval[0] <= values[each.entry] <= each.interval[1]
+        ):
+            return replace(each, value=values[each.entry])
         if entry.column in LIMITS and not robot.states("limits"):
             return replace(each, value=values[each.entry], status="open")
         amount = np.array([[(values[each.entry] - entry.value(corrected)) / entry.in_unit]])
@@ -185,75 +196,30 @@ class _View:
     Attributes
     ----------
     own : places of those that ask for something of the tool's place
-    alternatives : what else they allow: discrete changes of the table, or of one near it that meets them
-    repairs : discrete changes by which a table that misses them misses less
+    extents : intervals of all free entries; alternatives : discrete changes of a table that meets them
     """
 
     def __init__(self, judge: _Judge, asked: Asked, own: tuple[int, ...]):
         self.judge, self.asked, self.own = judge, asked, own
 
     @cached_property
-    def repairs(self) -> list[Alternative]:
-        """Discrete changes by which a table that misses references misses less, smallest first; else none."""
-        if self.asked.missed_by(self.judge.table) <= MET:
-            return []
-        found = alternatives_to(self.judge.table, self.asked, self.judge.tool)
-        return sorted((each for each in found if each.repairs), key=lambda each: len(each.entries))
-
-    @cached_property
     def extents(self) -> Extents:
         """Intervals of all free entries under these references."""
         judge = self.judge
         relevant = [k for k, entry in enumerate(judge.free) if judge.relevant(entry, self.own)]
-        nearer = [each.table for each in self.repairs[:1]]
-        if not nearer and self.asked.missed_by(judge.table) > MET:
-            described = described_by(judge.robot, [judge.references[i] for i in self.own])
-            nearer = [*judge.met_by, *([] if described is None else [tables_of(described)])]
-        found = Extents(
-            self.asked,
-            judge.table,
-            judge.free,
-            relevant,
-            judge.gauge,
-            judge.tool,
-            nearer=nearer,
-            tolerance=judge.tolerance,
+        return Extents(
+            self.asked, judge.table, judge.free, relevant, judge.gauge, judge.tool, tolerance=judge.tolerance
         )
-        judge.met_by += [found.met_by] if found.met and not found.table_meets else []
-        return found
 
     @cached_property
     def alternatives(self) -> list[Alternative]:
-        """Discrete changes that these references allow, of the table or of one near it that meets them."""
-        extents = self.extents
-        tool = self.judge.tool if extents.table_meets else ToolRange(self.judge.robot, extents.met_by)
-        return alternatives_to(extents.met_by, self.asked, tool)
+        """Discrete changes of the table that these references allow, too; none if they are missed."""
+        return alternatives_to(self.judge.table, self.asked, self.judge.tool) if self.extents.met else []
 
     @property
     def open_names(self) -> set[str]:
         """Entries that some alternative changes."""
         return {name for each in self.alternatives for name in each.names}
-
-    @property
-    def repaired(self) -> set[str]:
-        """Entries that a discrete change sets right: those in every smallest change that repairs most."""
-        fewest = [set(each.names) for each in self.repairs if len(each.entries) == len(self.repairs[0].entries)]
-        return set.intersection(*fewest) if fewest else set()
-
-    def excludes(self, entry: Entry) -> bool:
-        """Whether the references exclude the table's value of an entry.
-
-        Parameters
-        ----------
-        entry : of the table
-
-        Returns
-        -------
-        excluded : True also for an entry that every smallest discrete repair changes
-        """
-        if entry.name in self.repaired:
-            return True
-        return entry.column != "direction" and not self.extents.table_meets and self.extents.of(entry).excluded
 
 
 class _Judge:
@@ -271,7 +237,6 @@ class _Judge:
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
         self.conflicts = conflicts(self.references)
         self.same = gauge_flips(self.tool, flips_of(robot, []))
-        self.met_by: list[Tables] = []
         self._views: dict[tuple[int, ...], _View] = {}
         self._readings: dict[Alternative, OtherReading] = {}
 
@@ -305,13 +270,11 @@ class _Judge:
             readings=tuple({each.entries: each for own in views for each in own.alternatives}.values()),
             allowed=tuple(trusted.alternatives),
             unmet=tuple(sorted(unmet)),
-            table_meets=all(each.extents.table_meets for each in views),
+            table_meets=all(each.extents.met for each in views),
             other=self._other(trusted),
         )
 
     def _other(self, trusted: _View) -> OtherTable | None:
-        if not trusted.extents.table_meets:
-            return OtherTable(trusted.extents.met_by, "described") if trusted.extents.met else None
         table, taken = self.table, set[str]()
         for each in trusted.alternatives:
             changed = with_readings(table, self.robot, [each])
@@ -390,12 +353,9 @@ class _Judge:
         status: Status = "weak"
         if gauge:
             status = "gauge"
-        elif extent.excluded or entry.name in view.repaired:
-            status = "contradicted"
         elif not relevant:
             consistent = self.relevant(entry, self.every)
             status = "consistent" if consistent and not open_anyway else "open"
-            status = "contradicted" if consistent and self.view(self.trusted).excludes(entry) else status
         elif open_anyway:
             status = "open"
         elif not concerned and view.extents.met and self._small(extent):
@@ -405,29 +365,17 @@ class _Judge:
     def _direction(self, entry: Entry, own: tuple[int, ...], relevant: tuple[int, ...], view: _View) -> EntryEvidence:
         concerned = [each for each in view.alternatives if entry.name in each.names]
         value, extents, trusted = self.values[entry.name], view.extents, self.view(self.trusted)
-        reversed_ = extents.met_by.direction[0, entry.joint - 1] != value
         doubtful = bool(own) and extents.met and (bool(concerned) or extents.may_reverse(entry.joint))
         status: Status = "weak" if relevant or doubtful else "open"
-        if entry.name in view.repaired or (reversed_ and extents.met and not concerned):
-            status = "contradicted"
-        elif concerned and entry.name in trusted.open_names:
+        if concerned and entry.name in trusted.open_names:
             status = "open"
         elif concerned and not relevant:
-            status = "contradicted" if trusted.excludes(entry) else "consistent"
+            status = "consistent"
         elif own and extents.met and not doubtful:
             status = self._settled(view, [entry.name])
         ends = (-1.0, 1.0) if doubtful or concerned else (value, value)
-        ends = (-value, -value) if status == "contradicted" and not concerned else ends
-        if status in OUTRIGHT_OR_NOT and not relevant:
-            relevant = self._relevant_at(extents.met_by, entry, own)
         off = _worst([each.off for each in concerned])
-        return self._described(entry, status, Extent(*ends, off, False), concerned, relevant)
-
-    def _relevant_at(self, table: Tables, entry: Entry, among: Sequence[int]) -> tuple[int, ...]:
-        """References that react to an entry of another table (a batch of one), as they may not do at the robot's."""
-        references = [self.references[i] for i in among]
-        reacts = reactions(robot_of(table, 0, self.robot), references, [entry])[:, 0]
-        return tuple(i for i, own in zip(among, reacts) if own)
+        return self._described(entry, status, Extent(*ends, off), concerned, relevant)
 
     def _bound(self, entry: Entry, relevant: tuple[int, ...]) -> EntryEvidence:
         every = self.relevant(entry, self.every)
@@ -499,9 +447,7 @@ class _Judge:
             sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
         )
         status: Status = "weak"
-        if extent.excluded:
-            status = "contradicted"
-        elif not relevant:
+        if not relevant:
             status = "consistent" if every else "open"
         elif view.extents.met and self._small(extent):
             status = self._settled(view, [entry.name for entry, _ in factors])

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.entries import Entry, shifted
 from er3a.diagnosis.conclusions import Conclusion
-from er3a.diagnosis.ranking import rank
+from er3a.diagnosis.diagnose import diagnosis_of
+from er3a.diagnosis.faults import entry_of
+from er3a.diagnosis.ranking import usable
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import rotation_angle
 from er3a.identifiability.entries import continuous_of, document_of, entries_of
@@ -21,11 +22,8 @@ from er3a.kinematics.table_batch import Tables, frames_of, join, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import MM
-from er3a.references.reference import Documents, Reference, ReferenceSet, conflicts, lengths_of, vectors_of
+from er3a.references.reference import Documents, Reference, ReferenceSet, conflicts
 from er3a.robots.robot import Robot
-
-QUARTERS = (-1, 1, 2)
-MAX_FAULTS = 2
 
 
 def is_unexplained(conclusion: Conclusion | None) -> bool:
@@ -57,41 +55,28 @@ def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bo
     return failed > total / 2 and is_unexplained(conclusion)
 
 
-def not_the_robot_described(robot: Robot, references: ReferenceSet) -> Finding | None:
+def not_the_robot_described(robot: Robot, references: ReferenceSet, conclusion: Conclusion | None) -> Finding | None:
     """Whether trusted documents of another origin describe another robot.
 
     Parameters
     ----------
-    references : of which authoritative ones count that were not made from the table
+    references : of which those count that a diagnosis rests on and that were not made from the table
+    conclusion : of the diagnosis
 
     Returns
     -------
     statement : lengths in mm; None if they don't, or if a correction or two would make it theirs
     """
-    foreign = [
-        reference
-        for reference in references.checkable
-        if reference.is_authoritative and not made_from_table(robot, reference.document, references.documents)
-    ]
-    ranking = rank(robot, foreign) if foreign else None
-    if ranking is None:
+    documents = dict.fromkeys(reference.document for reference in usable(references) if reference.is_authoritative)
+    foreign = [each for each in documents if not made_from_table(robot, each, references.documents)]
+    if not (foreign and is_one(conclusion, "unexplained") and conclusion.unit == "mm"):
         return None
-    lengths = [reference.unit == "mm" for reference in ranking.references]
-    stated = [reference for reference, own in zip(ranking.references, lengths) if own]
-    vectors = vectors_of(stated)
-    before = lengths_of(ranking.before[lengths], vectors).max(initial=0.0)
-    few = ranking.pool.count <= MAX_FAULTS
-    left = lengths_of(ranking.pool.difference[few][:, lengths], vectors).max(axis=1, initial=0.0)
-    allowed = max((reference.uncertainty for reference in stated), default=0.0)
-    if left.min() <= allowed * np.sqrt(3):
-        return None
-    named = dict.fromkeys(title_of(reference.document, references.documents) for reference in ranking.references)
     return fact(
         "not_the_robot_described",
-        against=tuple(named),
-        mismatch_mm=float(before),
-        left_mm=float(left.min()),
-        tried=int(few.sum()),
+        against=tuple(dict.fromkeys(title_of(each, references.documents) for each in foreign)),
+        mismatch_mm=conclusion.residual_before,
+        left_mm=conclusion.least,
+        tried=conclusion.tried,
     )
 
 
@@ -119,40 +104,22 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Findin
     missed = int((asked.violation(asked.off(tables_of(robot))) > MET).sum())
     if not missed:
         return None
-    named = tuple(dict.fromkeys(title_of(reference.document, references.documents) for reference in own))
-    entry, table = _one_change(robot, asked)
-    if entry is None or table is None:
-        return fact(
-            "inconsistent_with_own_text", entry=None, given=None, needed=None, unit="", against=named, missed=missed
-        )
-    needed = float(getattr(table, entry.column)[0, entry.joint - 1] * entry.in_unit)
-    return fact(
+    found = fact(
         "inconsistent_with_own_text",
-        entry=entry.name,
-        given=entry.value(robot),
-        needed=round(needed, 9),
-        unit=entry.unit,
-        against=named,
+        entry=None,
+        given=None,
+        needed=None,
+        unit="",
+        against=tuple(dict.fromkeys(title_of(reference.document, references.documents) for reference in own)),
         missed=missed,
     )
-
-
-def _one_change(robot: Robot, asked: Asked) -> tuple[Entry | None, Tables | None]:
-    """The first single change, quarter turns of offsets first, with which all is met."""
-    table = tables_of(robot)
-    turning = [entry for entry in entries_of(robot) if entry.column in ("offset", "alpha", "direction")]
-    turning.sort(key=lambda entry: ("offset", "direction", "alpha").index(entry.column))
-    for entry in turning:
-        at = [entry.joint - 1]
-        changed = (
-            [table.with_column("direction", at, -table.direction[:, at])]
-            if entry.column == "direction"
-            else [shifted(table, [entry], np.array([[quarters * np.pi / 2]])) for quarters in QUARTERS]
-        )
-        for each in changed:
-            if asked.missed_by(each) <= MET:
-                return entry, each
-    return None, None
+    by_name = {entry.name: entry for entry in entries_of(robot)}
+    for each in diagnosis_of(robot, own).hypotheses:
+        entry = by_name.get(entry_of(each.faults[0]) or "") if len(each.faults) == 1 else None
+        if entry and asked.missed_by(tables_of(each.corrected)) <= MET:
+            given, needed = (entry.value(arm) for arm in (robot, each.corrected))
+            return found.but(entry=entry.name, given=given, needed=needed, unit=entry.unit)
+    return found
 
 
 def _documents_of(robot: Robot) -> Sequence[str]:

@@ -171,7 +171,7 @@ def test_tables_far_away_meet_the_drawing():
     every, gauge = continuous_of(robot), gauge_of(robot, continuous_of(robot))
     speaking = [k for k, entry in enumerate(every) if entry in free]
     extents = Extents(Asked(robot, requirements_of(drawn)), table, every, speaking, gauge, ToolRange(robot, table))
-    assert extents.table_meets
+    assert extents.met
     assert extents.elsewhere
     for direction, amounts in extents.elsewhere:
         arm = extents.region.tables(direction[None], amounts[None])

@@ -96,8 +96,8 @@ TEXTS = texts(
         ),
         "inconsistent_with_own_text": (
             "The table contradicts its own text ({against:own; })[, which asks for {entry} = {needed:g} "
-            "{unit:unit}, not {given:g}. The text is no evidence about a real robot.][; no single sign or quarter "
-            "turn mends it.{entry:!}]"
+            "{unit:unit}, not {given:g}. The text is no evidence about a real robot.][; no single correction "
+            "mends it.{entry:!}]"
         ),
     }
 )

@@ -23,7 +23,6 @@ from er3a.identifiability.statements import (
     ToolOff,
     inconsistent_with_own_text,
     is_another_arm,
-    is_unexplained,
     not_the_robot_described,
 )
 from er3a.kinematics import round_trips
@@ -368,7 +367,7 @@ def set_summaries(
                 grades=tuple(sorted({reference.grade for reference in references.references})),
                 counts=counts,
                 another_arm=is_another_arm(failed, total, conclusion),
-                described=not_the_robot_described(robot, references) if is_unexplained(conclusion) else None,
+                described=not_the_robot_described(robot, references, conclusion),
                 own_text=inconsistent_with_own_text(robot, references),
                 zero_pose_flange_off_mm=_zero_pose_error(poses, references.name),
             )
