@@ -224,16 +224,17 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     entries = evidence.entries if evidence else ()
     unsettled = [each for each in entries if each.status in ("open", "weak", "consistent")]
     steps = []
-    if any(column_of(each.entry) == "direction" for each in unsettled):
-        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#table-entries"))
+    if not entries or any(column_of(each.entry) == "direction" for each in unsettled):
+        panel = f"{chosen.name}/teach.html"
+        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), panel))
     left = [each.entry for each in unsettled if column_of(each.entry) in (*CONTINUOUS, "beta")]
-    if left:
-        named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "")
+    if left or not entries:
+        named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
-        steps.append((text, f"{address}#table-entries"))
+        steps.append((text, f"{address}#table-entries" if left else address))
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
-    if any(part.settled + part.up_to_signs < part.entries for part in limits):
-        steps.append((tr("Enter limits and speeds from the controller."), f"{address}#table-entries"))
+    if not entries or any(part.settled + part.up_to_signs < part.entries for part in limits):
+        steps.append((tr("Enter limits and speeds from the controller."), address))
     return steps
 
 

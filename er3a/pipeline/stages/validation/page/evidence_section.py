@@ -89,6 +89,14 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     )
 
 
+def plain_table(robot: Robot) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of a table that no document speaks of, as the page shows them: mm and deg."""
+    kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or robot.beta.any()]
+    rows = zip(*(getattr(robot, kind) * IN_UNIT[kind] for kind in kinds))
+    columns = [tr("joint"), *(f"{tr(COLUMNS[kind])}>" for kind in kinds)]
+    return columns, [[str(joint), *(_plain(float(value)) for value in row)] for joint, row in enumerate(rows, 1)]
+
+
 def _other_value(found: OtherTableFound, each: EntryEvidence) -> float:
     """An entry's value in the other table, as rounded as its evidence allows."""
     kind = column_of(each.entry)

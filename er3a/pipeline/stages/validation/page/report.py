@@ -26,6 +26,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
     evidence_section,
     other_robot,
+    plain_table,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix
@@ -127,9 +128,10 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         study,
         stored,
         output,
-        _answer(summary, instead),
+        _answer(stored.robot, summary, instead),
         arms=_both_arms(robot, study.robot(instead) if instead else other_robot(robot, summary.evidence)),
-        at_side=evidence is not None,
+        at_side=True,
+        plain_table=None if evidence else plain_table(robot),
         head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         table_evidence=evidence,
@@ -158,7 +160,7 @@ def _both_arms(robot: Robot, other: Robot | None) -> Markup:
     return side_view(arms, least_wide=UPRIGHT)
 
 
-def _answer(summary: model.ValidationSummary, instead: str | None) -> Answer:
+def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
@@ -181,6 +183,8 @@ def _answer(summary: model.ValidationSummary, instead: str | None) -> Answer:
         fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
     elif isinstance(found, model.LeftOpen) and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
+    elif isinstance(found, model.NothingToCompare):
+        fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     else:
         fix = None
     return Answer(headline, rest, "", keys, (), fix)
