@@ -94,7 +94,11 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
         zero = {"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]}
         zero_rows.append({"joint": k + 1, **zero, **_origins(robot, "zero", k + 1)})
-        row = {"a_mm": _tidy(robot.a[k] * 1000), "alpha_deg": angles["alpha"], "d_mm": _tidy(robot.d[k] * 1000)}
+        row: dict[str, Any] = {
+            "a_mm": _tidy(robot.a[k] * 1000),
+            "alpha_deg": angles["alpha"],
+            "d_mm": _tidy(robot.d[k] * 1000),
+        }
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
         dh_rows.append({"joint": k + 1, **row, "beta_deg": angles["beta"] or None, **_origins(robot, "dh", k + 1)})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
