@@ -128,7 +128,7 @@ def read(folder: Path, repositories: dict[str, str], source: str, ends: str) -> 
     path, *arguments = place.split()
     base, tip = ends.split() or (None, None)
     with plain(folder / repositories[key].replace("/", "+") / path, arguments) as (urdf, off):
-        robot, _ = urdf_table(urdf, base=base, tip=tip)
+        robot, _, _ = urdf_table(urdf, base=base, tip=tip)
         found = columns_of(robot)
         chain = read_chain(urdf, base, tip, False).joints
         entry = robot_of_row(dict.fromkeys(COLUMNS, "") | {"name": "arm"} | found, {})

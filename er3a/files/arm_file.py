@@ -12,7 +12,7 @@ from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.printed_table import table_text
 from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
-from er3a.formats.urdf import import_urdf, urdf_groups, urdf_table
+from er3a.formats.urdf import import_urdf, urdf_table
 from er3a.formats.urdf_tree import plain_urdf, tip_after
 from er3a.robots.robot import Convention, Robot, robot_name
 
@@ -77,8 +77,7 @@ def read_arm(
             if whole:
                 imported = import_urdf(plain, base=base, tip=tip)
                 return ReadArm(imported.robot.replace(name=robot_name(path)), False, imported.notes)
-            robot, assumed = urdf_table(plain, base=base, tip=tip)
-            beside = urdf_groups(plain, base=base, tip=tip)
+            robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
         return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
     robot = load_robot(source)

@@ -133,7 +133,12 @@ def import_urdf(
     return UrdfImport(robot, said, float(misfit), names, first, last)
 
 
-def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = None) -> tuple[Robot, tuple[str, ...]]:
+UrdfGroup = Literal["envelopes", "inertia", "drives"]
+
+
+def urdf_table(
+    path: str | Path, *, base: str | None = None, tip: str | None = None
+) -> tuple[Robot, tuple[str, ...], frozenset[UrdfGroup]]:
     """D-H table, limits and speeds alone of a URDF; no meshes are read.
 
     Parameters and errors are those of :func:`import_urdf`.
@@ -142,36 +147,20 @@ def urdf_table(path: str | Path, *, base: str | None = None, tip: str | None = N
     -------
     robot : a standard table, without shapes and masses
     notes : what was assumed or changed on the way, in words
-    """
-    path = Path(path)
-    chain = urdf_tree.read_chain(path, base, tip, False)
-    robot, *_, notes = _robot_of_chain(path, chain)
-    return robot, (*chain.notes, *notes)
-
-
-def urdf_groups(
-    path: str | Path, *, base: str | None = None, tip: str | None = None
-) -> frozenset[Literal["envelopes", "inertia", "drives"]]:
-    """Groups other than those of :func:`urdf_table` of which a URDF states anything; no meshes are read.
-
-    Parameters and errors are those of :func:`import_urdf`.
-
-    Returns
-    -------
-    groups : envelopes if a link of the chain has a collision shape, inertia if one has a body. Drives if a moving joint
-        has friction, damping or an effort.
+    groups : of which the URDF states anything, too: envelopes if a link of the chain has a collision shape, inertia if
+        one has a body; drives if a moving joint has friction, damping or an effort
     """
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
+    robot, *_, notes = _robot_of_chain(path, chain)
     names = {name for joint in chain.joints for name in (joint.parent, joint.child)}
     links = [link for link in root.findall("link") if link.get("name") in names]
-    moving = [joint.name for joint in chain.joints if joint.moves]
-    stated: dict[Literal["envelopes", "inertia", "drives"], bool] = {
+    stated: dict[UrdfGroup, bool] = {
         "envelopes": any(link.find("collision") is not None for link in links),
         "inertia": any(link.find("inertial") is not None for link in links),
-        "drives": urdf_tree.drives_of(root, moving) is not None,
+        "drives": urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]) is not None,
     }
-    return frozenset(group for group, there in stated.items() if there)
+    return robot, (*chain.notes, *notes), frozenset(group for group, there in stated.items() if there)
 
 
 def _robot_of_chain(
