@@ -221,9 +221,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
         return [(tr("Validate the table."), address)]
     finding, evidence = results.summary.verdict.finding, results.summary.evidence
     steps = []
-    open_ = (
-        [each.entry for each in evidence.entries if each.status in ("open", "weak", "consistent")] if evidence else []
-    )
+    open_ = evidence.unconfirmed if evidence else []
     unsettled = [*open_, *getattr(finding, "unbounded", ())] if isinstance(finding, LeftOpen) else open_
     if any(name.startswith("direction") for name in unsettled):
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), f"{address}#table-entries"))
