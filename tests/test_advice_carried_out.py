@@ -62,7 +62,7 @@ CARRIED_OUT = {
     "measure_entry": MEASURED,
     "look_at_motion": "test_what_a_proposal_lets_see_is_what_the_arm_does_and_the_reversed_arm_does_not",
     "more_positions": "test_too_few_positions_ask_for_poses_that_settle_more",
-    "collision.shapes_overlap": "test_shapes_in_error_are_an_error_of_the_shapes",
+    **dict.fromkeys(("collision.shapes_overlap", "why.overlaps"), "test_shapes_in_error_are_an_error_of_the_shapes"),
     "collision.base_in_solid": "test_a_scene_corrected_as_advised_leaves_the_base_free",
     "ambiguous_tilt": "test_a_board_seen_head_on_leaves_its_tilt_open_until_it_is_nearer_or_tilted",
     "other_convention": OF_SETS,
@@ -80,10 +80,10 @@ NOT_CARRIED_OUT = {  # a person looks at the controller, the cell or the file, o
     *("centre_outside", "unlikely_density", "unlikely_inertia", "unexplained_residuals"),
     *("no_correction_fits", "contradiction", "advice.no_part"),
     *("read_limit", "time_joint"),
-    *("payload", "payload.ask"),
+    *("payload", "why.guessed"),
     *("validation.off", "validation.no_reference", "validation.defined_otherwise", "far_from_table"),
 }
-NO_ADVICE = {"not_of_this_arm", "below_limit", "trajectory.paths"}
+NO_ADVICE = {"below_limit", "trajectory.paths"}
 
 
 MOVES_ARM_OR_PART = re.compile(
@@ -97,7 +97,6 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Evidence contradicts this table",
         "Run no path or program on the arm",
     ),  # that forbid something
-    "Stop: neither table is the arm",  # likewise
     "Try other guesses",  # quoted from the article
     "Move the joints and watch the tool",  # the teach panel's use
 }

@@ -54,7 +54,10 @@ return [controls.indexOf(document.activeElement), outlineStyle !== "none" && par
 """
 
 
-@pytest.mark.parametrize("page", STAGE_PAGES_OF_EACH_KIND)
+WITH_FIGURES = [page for page in STAGE_PAGES_OF_EACH_KIND if not page.endswith(("validation.html", "inverse.html"))]
+
+
+@pytest.mark.parametrize("page", WITH_FIGURES)
 def test_figures_enlarge_and_give_the_focus_back(browser, small_study, page):
     browser.get((small_study.folder / "reports" / page).as_uri())
     browser.execute_script(UNFOLD)
@@ -90,7 +93,7 @@ def test_a_row_of_the_list_shows_its_own_part(browser, small_study, stage):
 
 
 def test_every_plot_with_axes_answers_the_pointer(browser, small_study):
-    for stage in ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics", "vision"):
+    for stage in ("workspace", "collision", "trajectory", "dynamics", "vision"):
         browser.get((small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri())
         silent, axes = browser.execute_script(SILENT_AXES)
         assert axes, stage
@@ -209,8 +212,8 @@ def test_words_are_found_over_all_pages_and_on_each(browser, small_study):
 @pytest.mark.parametrize(
     ("page", "text"),
     [
-        ("er3a_c60/validation.html", "c and s are cosine and sine"),  # a paragraph of a folded section
-        ("er3a_c60_article/validation.html", "most that the entry moves the tool"),  # open on a page that is folded
+        ("er3a_c60/validation.html", "Intervals are found by search"),  # a paragraph of a folded section
+        ("er3a_c60_article/validation.html", "A document counts for an entry only if"),  # open on a page that is folded
         ("er3a_c60/trajectory.html", "Motions are timed with joint speeds"),
         ("er3a_c60/teach.html", "Drag to turn"),
     ],

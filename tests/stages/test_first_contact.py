@@ -131,7 +131,7 @@ def test_text_fault_table_player_and_program_say_the_same_moment(made):
     for path in results.summary.paths:
         (part,) = path.collisions
         at, first = part.t0_s, part.cause.touches[0]
-        assert path_text(path).startswith(f"{at:.4g} s: link {first.pair.link} and")
+        assert path_text(path).startswith(f"from {at:.4g} s: link {first.pair.link} and")
         assert f'data-play="{path.name}" data-t="{at}">{at:.3f}</a>' in page
         (event,) = (each for each in played[path.name]["events"] if each["text"].startswith("collision"))
         assert event["t"] == at

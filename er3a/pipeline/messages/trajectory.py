@@ -85,7 +85,7 @@ TEXTS = texts(
         "path.shown": "the figure shows the straight joint move",
         "path.harmless": "passes singular poses, which joint moves may: {places}",
         "path.no_fault": "no fault",
-        "path.from": "{t:.4g} s: {text}",
+        "path.from": "from {t:.4g} s: {text}",
         "path.passed": "{type} within {distance} at t = {when} s",
         "path.stretch": "from t = {start:.4g} to {end:.4g} s",
         "path.worst": "{cause} at t = {t} s",

@@ -40,9 +40,7 @@ def glance(results: object) -> Glance:
 def _(results: ValidationResults) -> Glance:
     summary = results.summary
     counts, evidence = summary.counts.independent, summary.evidence
-    status = [each.status for each in evidence.entries if each.value is not None] if evidence else []
-    bad = status.count("contradicted")
-    open_ = sum(each in ("open", "weak", "consistent") for each in status)
+    bad, open_ = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     value = f"{counts.passed}/{counts.total}" if counts.total else "–"
     if summary.verdict.status == "fail":
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)

@@ -221,19 +221,18 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     if not isinstance(results, ValidationResults):
         return [(tr("Validate the table."), address)]
     evidence = results.summary.evidence
-    entries = evidence.entries if evidence else ()
-    unsettled = [each for each in entries if each.status in ("open", "weak", "consistent")]
+    unsettled = evidence.unconfirmed if evidence else []
     steps = []
-    if not entries or any(column_of(each.entry) == "direction" for each in unsettled):
+    if not evidence or any(column_of(entry) == "direction" for entry in unsettled):
         panel = f"{chosen.name}/teach.html"
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), panel))
-    left = [each.entry for each in unsettled if column_of(each.entry) in (*CONTINUOUS, "beta")]
-    if left or not entries:
+    left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
+    if left or not evidence:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
         text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
         steps.append((text, f"{address}#table-entries" if left else address))
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
-    if not entries or any(part.settled + part.up_to_signs < part.entries for part in limits):
+    if not evidence or any(part.settled + part.up_to_signs < part.entries for part in limits):
         steps.append((tr("Enter limits and speeds from the controller."), address))
     return steps
 

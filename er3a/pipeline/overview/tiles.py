@@ -66,14 +66,14 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
     robot = study.robot(name)
-    entries = evidence_section(robot, results.summary.evidence)
-    status = [each.status for each in results.summary.evidence.entries if each.value is not None]
-    bad, open_ = status.count("contradicted"), sum(each in ("open", "weak", "consistent") for each in status)
+    evidence = results.summary.evidence
+    entries, bad = evidence_section(robot, evidence), evidence.contradicted
+    count = sum(each.value is not None for each in evidence.entries)
     title = tr("Which numbers of {robot} are wrong?", robot=own_title(robot.title))
     answer = (
-        tr("{count} of {all} contradicted.", count=bad, all=len(status))
+        tr("{count} of {all} contradicted.", count=bad, all=count)
         if bad
-        else tr("None contradicted; {count} unconfirmed.", count=open_)
+        else tr("None contradicted; {count} unconfirmed.", count=len(evidence.unconfirmed))
     )
     return Tile(title, answer, f"{name}/validation.html", name, entries=entries)
 

@@ -432,6 +432,16 @@ class TableEvidence:
     table_meets: bool
     other: OtherTableFound | None
 
+    @property
+    def contradicted(self) -> int:
+        """How many entries of the table evidence excludes."""
+        return sum(each.status == "contradicted" for each in self.entries)
+
+    @property
+    def unconfirmed(self) -> list[str]:
+        """The entries of the table that no independent document settles or excludes."""
+        return [each.entry for each in self.entries if each.status in ("open", "weak", "consistent")]
+
 
 class ValidationSummary(Summary):
     """The stage's summary.

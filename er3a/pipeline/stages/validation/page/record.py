@@ -15,7 +15,7 @@ from er3a.pipeline.messages.say import say
 from er3a.pipeline.player.motions import Weight
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation.model import Axes, Checks, KeyPoses, ValidationResults, model_of
-from er3a.pipeline.stages.validation.page.validation_figures import corrected_robot
+from er3a.pipeline.stages.validation.page.diagnosis_section import corrected_robot
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb

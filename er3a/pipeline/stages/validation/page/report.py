@@ -21,9 +21,8 @@ from er3a.pipeline.messages.say import bracketed, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
-from er3a.pipeline.stages.validation.page import validation_figures
+from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
-    SETTLED,
     evidence_section,
     other_robot,
     plain_table,
@@ -119,7 +118,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     failed.sort(key=lambda check: check.tolerances_off, reverse=True)
     source = robot.sources.get("dh")
     contradicted = summary.verdict.status == "fail"
-    corrected, _ = validation_figures.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
+    corrected, _ = diagnosis_section.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
@@ -135,7 +134,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         table_evidence=evidence,
-        diagnoses=validation_figures.diagnosis_stories(summary),
+        diagnoses=diagnosis_section.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
@@ -164,21 +163,14 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
-    status = [each.status for each in evidence.entries if each.value is not None] if evidence else []
-    bad, unsure = (
-        status.count("contradicted"),
-        sum(each not in SETTLED for each in status) - status.count("contradicted"),
-    )
+    bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
     passed = tr("{passed} of {total}", passed=counts.passed, total=counts.total)
     keys = [(passed, tr("checks pass"))] if counts.total else []
-    keys += (
-        [(str(bad), tr("entries contradicted"))]
-        if bad
-        else [(str(unsure), tr("entries unconfirmed"))]
-        if status
-        else []
-    )
+    if bad:
+        keys.append((str(bad), tr("entries contradicted")))
+    elif evidence:
+        keys.append((str(unsure), tr("entries unconfirmed")))
     if instead:
         fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
     elif isinstance(found, model.LeftOpen) and found.next_measurement:
