@@ -99,13 +99,11 @@ class Execution(ByValue):
     ----------
     steps : of all ways; each names the one before it
     endings : one for each way
-    entered : names of the routines that a way came to
     """
 
     program: Program
     steps: tuple[Step, ...]
     endings: tuple[Ending, ...]
-    entered: frozenset[str] = frozenset()
 
     @property
     def complete(self) -> bool:

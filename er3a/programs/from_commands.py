@@ -54,7 +54,6 @@ def listing_of(
     robot: Robot,
     start: Reals,
     name: str = "path",
-    title: str = "",
     *,
     ends: Reals | None = None,
     load: Load | None = None,
@@ -100,7 +99,7 @@ def listing_of(
         case _:
             assert_never(command)
     findings = (fact("written_half_turns_split", lines=making.split),) if making.split else ()
-    return PathListing(Listing(name, tuple(making.found), title), start, findings)
+    return PathListing(Listing(name, tuple(making.found)), start, findings)
 
 
 class _Making:

@@ -310,7 +310,6 @@ class Listing:
 
     name: str
     instructions: tuple[Instruction, ...]
-    title: str = ""
     repeats_from: int | None = None
     language: str = ""
     one_sided: int = 0

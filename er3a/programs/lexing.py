@@ -375,7 +375,6 @@ class ProgramText:
 
     path: Path
     text: str
-    encoding: str
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -394,16 +393,14 @@ def read_program_text(path: Path) -> ProgramText:
     raw = given_bytes(path, MAX_PROGRAM_BYTES, "Programs are small text files")
     if raw.startswith(b"PK\x03\x04"):
         raise InputError(path, None, "is a ZIP archive", "Unpack it, and name a program in its folder")
-    text, encoding = decoded(raw, path)
-    text = text.replace("\r\n", "\n")
-    text = text.replace("\r", "\n")
+    text = decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
     control = re.search(r"[\x00-\x08\x0e-\x19\x1b-\x1f]", text)
     if control is not None:
         line = text.count("\n", 0, control.start()) + 1
         raise InputError(
             path, f"line {line}", "holds control characters, so it is not text", "Export the program as text"
         )
-    return ProgramText(path, text.rstrip("\x1a"), encoding)
+    return ProgramText(path, text.rstrip("\x1a"))
 
 
 def data_file_of(path: Path, suffix: str) -> Path | None:
@@ -443,8 +440,8 @@ def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Pa
     return next((folder / each for each in held if each.lower() == wanted.lower()), None)
 
 
-def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
-    """Text and encoding: by its mark, as UTF-8, as GBK, or as Windows-1252.
+def decoded(raw: bytes, path: Path | None = None) -> str:
+    """A text by the mark of its encoding, as UTF-8, as GBK, or as Windows-1252.
 
     Raises
     ------
@@ -454,21 +451,14 @@ def decoded(raw: bytes, path: Path | None = None) -> tuple[str, str]:
     for mark, encoding in MARKS:
         if raw.startswith(mark):
             try:
-                return raw[len(mark) :].decode(encoding), encoding
+                return raw[len(mark) :].decode(encoding)
             except UnicodeDecodeError as error:
                 problem = f"begins as {encoding}, but is not"
                 raise InputError(path, f"byte {error.start}", problem, "Save the file as UTF-8") from None
-    try:
-        text = raw.decode("utf-8")
-    except UnicodeDecodeError:
-        text = ""
-    if text and "\x00" not in text:
-        return text, "utf-8"
-    if text or not raw:
-        return text, "utf-8"
-    if all(len(run) % 2 == 0 for run in HIGH_RUNS.findall(raw)):
+    in_pairs = all(len(run) % 2 == 0 for run in HIGH_RUNS.findall(raw))
+    for encoding in ("utf-8", "gb18030") if in_pairs else ("utf-8",):
         try:
-            return raw.decode("gb18030"), "gb18030"
+            return raw.decode(encoding)
         except UnicodeDecodeError:
-            pass
-    return raw.decode("cp1252", errors="replace"), "windows-1252"
+            continue
+    return raw.decode("cp1252", errors="replace")

@@ -175,7 +175,7 @@ class Machine:
             each if each.repeats_from is None else replace(each, repeats_from=after.get(each.repeats_from))
             for each in self.endings
         )
-        return Execution(self.program, tuple(self.steps), tuple(endings), frozenset(self.entered))
+        return Execution(self.program, tuple(self.steps), tuple(endings))
 
     def _entries(self) -> Iterator[str]:
         """The program's beginning, and the routines of its file that nothing that was followed has come to."""

@@ -140,7 +140,6 @@ class WriteOptions(ByValue):
 
     robot: Robot | None = None
     start: Reals | None = None
-    arc_deviation: float = ARC_DEVIATION
     notes: tuple[Finding, ...] = ()
     head: tuple[str, ...] = ()
     assumed_speed: Reals | None = None
@@ -458,7 +457,7 @@ class Writer(ABC):
                     "written_arcs_split",
                     arcs=count["arcs"],
                     lines=count["chords"],
-                    deviation_mm=1000 * self.options.arc_deviation,
+                    deviation_mm=1000 * ARC_DEVIATION,
                 )
             )
         if self.listing.one_sided:

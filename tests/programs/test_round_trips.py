@@ -143,11 +143,11 @@ def test_poses_come_back_to_the_digits_printed(language, tmp_path):
 def test_arcs_become_lines_within_the_deviation_that_is_said(language, tmp_path):
     q, command = tool_path(2)
     path = listing_of(command, ROBOT, q)
-    written = write_program(path.listing, language, WriteOptions(ROBOT, arc_deviation=2e-4))
+    written = write_program(path.listing, language, WriteOptions(ROBOT))
     split = next(each for each in written.findings if is_one(each, "written_arcs_split"))
     assert split.arcs == 1
     text = next(iter(written.files.values()))
-    assert f"1 arc(s) as {split.lines} lines that stay within 0.2 mm" in text
+    assert f"1 arc(s) as {split.lines} lines that stay within 0.1 mm" in text
     moves = read_back(tmp_path, written).listing().motions
     ends = np.array([forward(ROBOT, each.target.joints)[:3, 3] for each in moves[-split.lines - 1 :]])
     start, via, end = ends[0], command.segments[1].via, ends[-1]
@@ -158,9 +158,9 @@ def test_arcs_become_lines_within_the_deviation_that_is_said(language, tmp_path)
     middles = (ends[1:] + ends[:-1]) / 2
     for points in (ends, middles):
         off = np.abs(np.linalg.norm(points - start - to_centre, axis=1) - radius)
-        assert off.max() < 2.01e-4
+        assert off.max() < 1.01e-4
     assert (
-        np.abs(np.linalg.norm(middles - start - to_centre, axis=1) - radius).max() > 0.5e-4
+        np.abs(np.linalg.norm(middles - start - to_centre, axis=1) - radius).max() > 0.25e-4
     )  # no more lines than need be
 
 

@@ -19,7 +19,7 @@ from er3a.planning.sequences import Arc
 from er3a.programs.instructions import FINE, ArmMotion, Listing, Output, Pause, PoseTarget, Zone, numbers_of
 from er3a.programs.rpl.dialect import SPEED, ZONE
 from er3a.programs.solving import way_of
-from er3a.programs.writing import ReadyMotion, WriteOptions, Writer, by_length, fixed, short
+from er3a.programs.writing import ARC_DEVIATION, ReadyMotion, WriteOptions, Writer, by_length, fixed, short
 
 DIGITS = 6
 MAX_LINES = 10_000  # for an arc
@@ -163,7 +163,7 @@ class RplWriter(Writer):
         motion = ready.motion
         joints = None
         if ready.pose is not None and ready.pose_before is not None and ready.via is not None:
-            poses = _chords(ready.pose_before, ready.via, ready.pose, self.options.arc_deviation)
+            poses = _chords(ready.pose_before, ready.via, ready.pose)
             frames = (motion.tool, motion.base)
             joints = None if poses is None else self.resolver.along(poses, frames, ready.joints_before)
         if joints is None:
@@ -317,13 +317,13 @@ def _text(item: RplItem) -> str:
     return f"{values[0].rstrip(';')};"
 
 
-def _chords(start: Reals, via: Reals, end: Reals, deviation: float) -> Reals | None:
-    """Ends (n, 4, 4) of lines that stay within a deviation (m) of an arc; None where the points are on a line."""
+def _chords(start: Reals, via: Reals, end: Reals) -> Reals | None:
+    """Ends (n, 4, 4) of lines that stay within ``ARC_DEVIATION`` of an arc; None where the points are on a line."""
     way = way_of(start, via, end)
     if not isinstance(way, Arc):
         return None
     # A chord over an angle w leaves its arc by radius (1 - cos(w / 2)).
-    widest = 2 * math.acos(max(1 - deviation / way.radius, 0.0))
+    widest = 2 * math.acos(max(1 - ARC_DEVIATION / way.radius, 0.0))
     count = min(max(math.ceil(way.angle / max(widest, 1e-6)), 1), MAX_LINES)
     return way.poses(np.arange(1, count + 1) / count)
 

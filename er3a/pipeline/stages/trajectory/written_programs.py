@@ -86,7 +86,7 @@ def written(
     if ends is not None and not np.isfinite(ends).all():
         ends = None
     load = motion.entry.part.load if isinstance(motion.entry, PartOfProgram) else None
-    made = listing_of(command, robot, start, motion.entry.name, motion.entry.title, ends=ends, load=load)
+    made = listing_of(command, robot, start, motion.entry.name, ends=ends, load=load)
     missed = missed_points(robot, motion.built)
     beside = (fact("written_beside_points", path=motion.entry.name, missed=missed),) if missed else ()
     options = WriteOptions(robot, start, notes=(*unsafe, *beside, *made.findings), head=head, assumed_speed=speed)
@@ -194,7 +194,7 @@ def _repair(
         return {".csv": write_csv(rows.t_s, rows.q_deg, poses, comments, joint_columns(robot))}, ()
     kept = needed_points(q, STRAIGHT)
     command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
-    made = listing_of(command, robot, q[0], repair_name(motion.entry.name), motion.entry.title)
+    made = listing_of(command, robot, q[0], repair_name(motion.entry.name))
     head = (
         comment,
         *_of_its_program(motion),
