@@ -388,7 +388,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
         "the upper arm stands 90° from the vertical where 0° is stated",
         "offset 2 is 0 deg, −90 deg fits. Residual: 1433 mm, corrected 0.0 mm.",
         "source&#39;s statements alone, which are no evidence about a real robot: don&#39;t use the corrected",
-        "turns the other way</td><td>no bound",
+        "turns the other way</td><td>1311 mm, 180 deg",
         "of one fault or two explains the data",
         "It is another arm, has more faults, or a reference is wrong",
         "Against er3a_c60: another arm",
