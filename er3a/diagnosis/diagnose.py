@@ -30,7 +30,7 @@ from er3a.references.reference import (
 )
 from er3a.robots.robot import Robot
 
-REACH_STARTS = 40  # local searches for each extreme
+REACH_STARTS = 16  # local searches for each extreme
 TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
 TRIED_M = 0.001, 0.01, 0.1, 0.5
 

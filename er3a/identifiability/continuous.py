@@ -1,11 +1,11 @@
 """What a set of requirements leaves open for each entry of a table, the other entries free.
 
-From the table, or from one that meets the requirements, each entry is pushed either way, by doubled and then halved
-steps, while the others follow it (:mod:`er3a.identifiability.feasible`): that is the interval about the table. Tables
-far away may meet the requirements as well, and at a table with right angles no small step leads there. So starts are
-spread near and far about it, some with joints reversed and angles turned round, and entries are pushed from the tables
-that are farthest. A table is written in the equivalent rows nearest to the given one: reversing the x axis of a frame,
-or the z axis with its joint, changes rows but not the robot.
+From a table that meets the requirements each entry is pushed either way, by doubled and then halved steps, while the
+others follow it (:mod:`er3a.identifiability.feasible`): that is the interval about the table. Tables far away may meet
+the requirements as well, and at a table with right angles no small step leads there. So starts are spread near and far
+about it, some with joints reversed and angles turned round, and entries are pushed from the tables that are farthest.
+A table is written in the equivalent rows nearest to the given one: reversing the x axis of a frame, or the z axis with
+its joint, changes rows but not the robot.
 """
 
 from __future__ import annotations
@@ -37,9 +37,7 @@ REVERSED, TURNED = 0.2, 0.15  # shares of joints reversed and angles turned roun
 PUSHES = 1.1, 3.0, 8.0  # of the tolerance's step
 FARTHER = 1.5  # times as far as known, for a table to be looked at
 ROUNDS, PUSHED_FROM, SEED = 3, 6, 20261121
-UNTOLD = 1e-2  # rad from half a turn
 STAYING = 0.9  # of a half-width, to within which spread starts are led
-STAYS_FROM = 4  # tables elsewhere, from which one with an entry as it is is looked for
 FIRST_PUSH, FINE, MOST_PUSHES = 0.1, 0.01, 26  # of an entry's scale; of what was reached
 
 

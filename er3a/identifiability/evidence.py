@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -144,13 +145,19 @@ def evidence_of(
     judge = _Judge(robot, references, documents, tolerance or Tolerance())
     if judge.meets_trusted:
         return judge.evidence(only)
-    extents = judge.view(judge.trusted).extents
-    led = [extents.led_to(tables_of(each)) for each in described_by(robot, usable(judge.references))]
-    for each in (*corrected, *(robot_of(own, 0, robot) for own in led if own is not None)):
+    for each in chain(corrected, _by_axes(judge)):
         other = _Judge(each, references, documents, judge.tolerance)
         if other.meets_trusted:
             return _of_stated(robot, each, other.evidence(only))
     return judge.evidence(only)
+
+
+def _by_axes(judge: _Judge) -> Iterator[Robot]:
+    """The table that the arm with the axes which references state has, led to what they ask, if there is any."""
+    for each in described_by(judge.robot, usable(judge.references)):
+        led = judge.view(judge.trusted).extents.led_to(tables_of(each))
+        if led is not None:
+            yield robot_of(led, 0, judge.robot)
 
 
 def _of_stated(robot: Robot, corrected: Robot, found: Evidence) -> Evidence:
@@ -170,11 +177,8 @@ def _of_stated(robot: Robot, corrected: Robot, found: Evidence) -> Evidence:
         if each.entry not in values:
             return each
         entry = by_name[each.entry]
-        if (
-            each.status in OUTRIGHT_OR_NOT
-            and each.interval
-            and each.interval[0] <= values[each.entry] <= each.interval[1]
-        ):
+        low, high = each.interval or (np.inf, -np.inf)
+        if each.status in OUTRIGHT_OR_NOT and low <= values[each.entry] <= high:  # documents leave both open
             return replace(each, value=values[each.entry])
         if entry.column in LIMITS and not robot.states("limits"):
             return replace(each, value=values[each.entry], status="open")

@@ -191,7 +191,7 @@ def _tool_off(each: EntryEvidence) -> str:
     if each.status == "consistent":
         return tr("no bound")
     if not each.off.moves:
-        return tr("no bound") if each.status == "contradicted" and column_of(each.entry) == "direction" else "–"
+        return "–"
     off = _off(each.off.mm, each.off.deg)
     return tr("at least {off}", off=off) if each.at_least else off
 
