@@ -53,7 +53,7 @@ schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic mod
 LOCALE := er3a/pipeline/messages/locale
 
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
-	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg -k tr --add-location=file --sort-by-file --omit-header \
+	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg -k tr --no-location --sort-by-file --omit-header \
 		--no-wrap -o $(LOCALE)/er3a.pot .
 	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) --no-wrap --ignore-obsolete \
 		--ignore-pot-creation-date
