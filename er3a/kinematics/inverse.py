@@ -106,7 +106,8 @@ class _Found(NamedTuple):
 
 def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     """Rows of an arm with a spherical wrist: each branch once per turn, and the nearest member of each self-motion."""
-    q, fault, gap = (batch[0] for batch in solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True))
+    q, fault, gap = solve_slots(robot, T[None], q_ref[None], keep_folds=True, keep_free=True)
+    q, fault, gap = q[0], fault[0], gap[0]
     slots = np.flatnonzero(fault == REACHED)
     if is_regular(robot, q):
         rows, of = equivalents_within(robot, q[slots], q_ref)
@@ -361,7 +362,10 @@ def _free_joints_near(robot: Robot, T: Reals, q: Reals, q_ref: Reals, continua: 
 def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[solutions.Unsolved, ...]:
     """Why a shoulder side has no branch: by that of its four slots which misses least."""
     found = []
-    for shoulder in np.flatnonzero((fault.reshape(2, 4) != REACHED).all(axis=1)).tolist():
+    sides = {slot // 4 for slot in np.flatnonzero(fault == REACHED).tolist()}
+    for shoulder in (0, 1):
+        if shoulder in sides:
+            continue
         part = slice(4 * shoulder, 4 * shoulder + 4)
         best = 4 * shoulder + int(np.argmin(gap[part]))
         found.append(
