@@ -54,6 +54,25 @@ return [controls.indexOf(document.activeElement), outlineStyle !== "none" && par
 """
 
 
+MENUS = """
+return [...document.querySelectorAll(".top .menu")].map((menu) => {
+  menu.open = true;
+  const { left, top, width, height } = menu.querySelector(":scope > :not(summary)").getBoundingClientRect();
+  const shown = document.elementFromPoint(left + width / 2, top + Math.min(height, 40) / 2);
+  menu.open = false;
+  return height > 20 && menu.contains(shown);
+});
+"""
+
+
+@pytest.mark.parametrize("page", [*STAGE_PAGES_OF_EACH_KIND, "er3a_c60/teach.html"])
+def test_what_the_menus_of_the_header_open_is_seen(browser, small_study, page):
+    browser.get((small_study.folder / "reports" / page).as_uri())
+    seen = browser.execute_script(MENUS)
+    assert seen
+    assert all(seen)
+
+
 WITH_FIGURES = [page for page in STAGE_PAGES_OF_EACH_KIND if not page.endswith(("validation.html", "inverse.html"))]
 
 

@@ -249,8 +249,14 @@ def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Resul
     return [tile for tile in found if tile]
 
 
+def _mark(stored: Stored[Any]) -> str:
+    """What a stage came to; of a table that evidence contradicts it counts for nothing."""
+    head = head_of(stored)
+    return "no_verdict" if head.no_verdict else head.status
+
+
 def _write_marks(stored: Mapping[str, Results], file: Path) -> None:
     """What each stage of each robot came to, for the marks in the headers of their pages."""
-    marks = {robot: {stage: head_of(each).status for stage, each in stages.items()} for robot, stages in stored.items()}
+    marks = {robot: {stage: _mark(each) for stage, each in stages.items()} for robot, stages in stored.items()}
     text = f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n"
     write_text(file, text)

@@ -32,7 +32,7 @@ from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
-from er3a.pipeline.viewing.page import render, run_command
+from er3a.pipeline.viewing.page import render, robots_with, run_command
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
@@ -291,6 +291,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         output,
         near=near,
         scene=study.scene(name, "trajectory"),
+        robots=robots_with(study, "teach"),
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
         head=program_head(validated if known else None),
@@ -307,6 +308,7 @@ def write_panel(
     provenance: Provenance,
     near: NearSingular = USUAL_NEAR,
     scene: Scene | None = None,
+    robots: Sequence[tuple[str, str, str]] = (),
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
     head: Sequence[str] | None = None,
@@ -316,7 +318,7 @@ def write_panel(
     Parameters
     ----------
     near : where the panel warns of a singularity
-    robot_pages : those that stand beside it; none outside of a study
+    robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything
     head : what files that the panel exports say first; None where nothing is known of the table
     """
@@ -333,6 +335,7 @@ def write_panel(
         _HERE / "teach.html.j2",
         output,
         robot=robot,
+        robots=robots,
         robot_pages=robot_pages,
         joint_names=joint_names(robot),
         joint_colours=JOINTS,

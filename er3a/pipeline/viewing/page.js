@@ -765,7 +765,7 @@ for (const link of document.querySelectorAll("[data-packed]")) {
 }
 
 // What each stage of this robot came to, where the index has left word of it.
-const SIGNS = { pass: "✓", caution: "▲", fail: "✕", conflict: "≠", no_reference: "○", not_computed: "–" };
+const SIGNS = { pass: "✓", caution: "▲", fail: "✕", conflict: "≠", no_reference: "○", not_computed: "–", no_verdict: "⊘" };
 for (const link of document.querySelectorAll("nav [data-stage]")) {
   const status = globalThis.MARKS?.[document.querySelector("main").dataset.name]?.[link.dataset.stage];
   if (!status) continue;
@@ -775,13 +775,20 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
 
 // The row of the list whose moment or picture is shown.
 const rows = [...document.querySelectorAll(".runs a")];
-const mark = (shown) => rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+const mark = (shown) => {
+  rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
+  for (const fix of document.querySelectorAll(".hero .fix.instead")) fix.toggleAttribute("hidden", shown !== rows[0]); // it is the first row's
+};
 rows.forEach((row) => row.addEventListener("click", () => {
   mark(row);
   dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
 }));
 const played = new URLSearchParams(location.search).get("play");
-mark(rows.find((row) => (played ? row.dataset.play === played : row.hash === location.hash)) ?? rows[0]);
+const pictured = document.querySelector(".hero [data-one-of] > :not([hidden]) h2")?.id.replace(/-solutions$/, "");
+mark(
+  rows.find((row) => (played ? row.dataset.play === played : row.hash === location.hash))
+    ?? rows.find((row) => pictured && decodeURIComponent(row.hash.slice(1)) === pictured) ?? rows[0],
+);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

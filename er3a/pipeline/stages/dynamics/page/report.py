@@ -157,11 +157,12 @@ def _answer(summary: model.DynamicsSummary) -> Answer:
     keys = [
         (with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))
     ]
-    rows = [_row(motor, worst.peak) for motor in summary.motors]
+    rows = [_row(motor, worst.peak) for motor in sorted(summary.motors, key=lambda motor: -motor.peak)]
+    holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
-        tr("J{joint} needs most: {torque}.", joint=worst.joint, torque=most),
-        rest,
+        tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
         "",
+        rest,
         keys,
         (Group(tr("Greatest torque on the paths"), rows),),
     )
@@ -176,7 +177,7 @@ def _mark(motor: model.MotorNeed) -> Mark:
 
 def _row(motor: model.MotorNeed, most: float) -> ListRow:
     """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    size = with_unit(number(motor.peak, 3), motor.unit)
+    size = with_unit(number(motor.peak if motor.peak > model.NOTHING_HELD else 0.0, 3), motor.unit)
     limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
     full = motor.peak_limit or most or 1.0
     note = joined([size, limit or tr("holding {value}", value=with_unit(number(motor.holding, 3), motor.unit))], ", ")

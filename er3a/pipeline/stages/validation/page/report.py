@@ -166,7 +166,7 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
     passed = tr("{passed} of {total}", passed=counts.passed, total=counts.total)
-    keys = [(passed, tr("checks pass"))] if counts.total else []
+    keys = [(passed, tr("independent checks pass"))] if counts.total else []
     if bad:
         keys.append((str(bad), tr("entries contradicted")))
     elif evidence:

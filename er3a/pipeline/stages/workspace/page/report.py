@@ -8,7 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from er3a.collision.scene import Scene
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
@@ -72,9 +72,9 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: b
     holes = summary.enclosed_voids
     litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
     rest = (
-        tr("One hole, {size}.", size=litres)
+        tr("One hole, at least {size}.", size=litres)
         if len(holes) == 1
-        else tr("{count} holes, {size}.", count=len(holes), size=litres)
+        else tr("{count} holes, at least {size}.", count=len(holes), size=litres)
     )
     heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
     keys = [
@@ -105,11 +105,10 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     if placing is None:
         return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
     rows = []
-    for k, tried in enumerate(placing.tried, start=1):
+    for tried in placing.tried:
         blocked = sum(map(len, placing.hindered(tried).values()))
         note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
-        name = own_title(tried.tray.below.name) if tried.tray.below else tr("place {k}", k=k)
-        rows.append(ListRow("caution" if blocked else "pass", name, note, "#placement"))
+        rows.append(ListRow("caution" if blocked else "pass", tried.tray.where, note, "#placement"))
     return rows
 
 

@@ -356,11 +356,13 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
         axes.axhline(floor_mm, color=MUTED, linewidth=1.2)
         axes.text(-1.05 * wide, floor_mm - 8, tr("floor"), color=MUTED, va="top", fontsize=10)
     if tray is not None:
-        bottom, upper = (1000 * corner for corner in tray.corners)
-        from_axis = np.hypot(*((bottom + upper) / 2)[:2])
-        half = (upper - bottom)[0] / 2
-        axes.add_patch(Rectangle((from_axis - half, upper[2] - 50), 2 * half, 50, color=VERDICTS["pass"], zorder=8))
-        labels.append((tr("tray"), (from_axis, upper[2] - 25), VERDICTS["pass"]))
+        x, y, height = (1000 * value for value in tray.place.centre_m)
+        wide_x, wide_y, tall = (1000 * value for value in tray.place.size_m)
+        away = float(np.hypot(x, y))
+        half = (abs(x) * wide_x + abs(y) * wide_y) / max(2 * away, 1.0)  # along the line from the axis to it
+        corner = (away - half, height - tall / 2)
+        axes.add_patch(Rectangle(corner, 2 * half, tall, color=VERDICTS["pass"], zorder=4))
+        labels.append((tr("tray, turned into view"), (away, height), VERDICTS["pass"]))
     _name(axes, labels, 1.12 * wide, (low, top))
     axes.set_xlim(-1.08 * wide, 1.55 * wide)
     axes.set_ylim(low - 80, 1.06 * top)
