@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.report import path_groups
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.page.evidence_section import OTHER_COLUMNS, evidence_section
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
@@ -65,15 +65,14 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     results = stored["validation"].results if "validation" in stored else None
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
-    robot = study.robot(name)
     evidence = results.summary.evidence
-    entries, bad = evidence_section(robot, evidence), evidence.contradicted
+    entries, bad = evidence_section(study.robot(name), evidence, OTHER_COLUMNS), evidence.contradicted
     count = sum(each.value is not None for each in evidence.entries)
-    title = tr("Which numbers of {robot} are wrong?", robot=own_title(robot.title))
+    title = tr("Which numbers are wrong?")
     answer = (
-        tr("{count} of {all} contradicted.", count=bad, all=count)
+        tr("{robot}: {count} of {all} contradicted, limits included.", robot=name, count=bad, all=count)
         if bad
-        else tr("None contradicted; {count} unconfirmed.", count=len(evidence.unconfirmed))
+        else tr("{robot}: none; {count} unconfirmed.", robot=name, count=len(evidence.unconfirmed))
     )
     return Tile(title, answer, f"{name}/validation.html", name, entries=entries)
 
