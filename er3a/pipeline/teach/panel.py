@@ -41,10 +41,6 @@ from er3a.robots.robot import Robot
 
 WORDS: dict[str, Any] = {
     "title": N_("teach panel"),
-    "lead": N_(
-        "Move the joints and watch the tool: its pose, the limits, how near the arm comes to a singularity, and which "
-        "other joint angles reach the same pose."
-    ),
     "no_script": N_("This page computes in the browser; it needs JavaScript."),
     "view": N_("The arm"),
     "picture": N_(
