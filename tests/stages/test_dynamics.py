@@ -264,7 +264,7 @@ def test_paths_that_may_not_be_run_count_for_nothing(full, tmp_path):
     assert {use.path for use in summary.uses} == {None, "joint_move", "line_clean"}
     report(study, found, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    own = page[page.index("why it may not be run") :]
+    own = page[page.index("May not be run as they are") :]
     assert own.index("line_shoulder") < own.index("line_out")
     known = {each.reason for each in summary.assumed}.isdisjoint(("link_masses", "load", "friction"))
     assert ("; for sizing motors and gears" in page, "not for sizing motors and gears" in page) == (known, not known)
