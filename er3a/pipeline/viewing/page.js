@@ -785,10 +785,8 @@ rows.forEach((row) => row.addEventListener("click", () => {
 }));
 const played = new URLSearchParams(location.search).get("play");
 const pictured = document.querySelector(".hero [data-one-of] > :not([hidden]) h2")?.id.replace(/-solutions$/, "");
-mark(
-  rows.find((row) => (played ? row.dataset.play === played : row.hash === location.hash))
-    ?? rows.find((row) => pictured && decodeURIComponent(row.hash.slice(1)) === pictured) ?? rows[0],
-);
+const called = (name) => rows.find((row) => name && decodeURIComponent(row.hash.slice(1)) === name);
+mark((played ? rows.find((row) => row.dataset.play === played) : rows.find((row) => row.hash === location.hash)) ?? called(pictured) ?? rows[0]);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

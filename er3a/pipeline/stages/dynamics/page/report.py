@@ -177,10 +177,13 @@ def _mark(motor: model.MotorNeed) -> Mark:
 
 def _row(motor: model.MotorNeed, most: float) -> ListRow:
     """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    size = with_unit(number(motor.peak if motor.peak > model.NOTHING_HELD else 0.0, 3), motor.unit)
+    size, held = (
+        with_unit(number(value if value > model.NOTHING_HELD else 0.0, 3), motor.unit)
+        for value in (motor.peak, motor.holding)
+    )
     limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
     full = motor.peak_limit or most or 1.0
-    note = joined([size, limit or tr("holding {value}", value=with_unit(number(motor.holding, 3), motor.unit))], ", ")
+    note = joined([size, limit or tr("holding {value}", value=held)], ", ")
     return ListRow(
         _mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")]
     )

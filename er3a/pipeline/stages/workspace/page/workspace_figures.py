@@ -361,6 +361,8 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
         away = float(np.hypot(x, y))
         half = (abs(x) * wide_x + abs(y) * wide_y) / max(2 * away, 1.0)  # along the line from the axis to it
         corner = (away - half, height - tall / 2)
+        if tray.floor is not None:
+            axes.plot([away, away], [1000 * tray.floor, corner[1]], color=VERDICTS["pass"], linewidth=3, zorder=4)
         axes.add_patch(Rectangle(corner, 2 * half, tall, color=VERDICTS["pass"], zorder=4))
         labels.append((tr("tray, turned into view"), (away, height), VERDICTS["pass"]))
     _name(axes, labels, 1.12 * wide, (low, top))
