@@ -8,13 +8,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence
 from er3a.pipeline.messages.pages import Caveat
 from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.overview.search import TextOfPage
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.page.evidence_section import rounded_within
+from er3a.pipeline.stages.validation.page.evidence_section import OTHER_COLUMNS, rounded_within
 from er3a.pipeline.study import load_study
 from er3a.pipeline.viewing.page import Head, Numbering, _tray_edges, linked
 from tests.conftest import ROOT
@@ -53,7 +54,7 @@ def test_a_value_is_rounded_as_far_as_documents_leave_open(value, interval, show
 
 
 def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(small_results, tmp_path):
-    """By the summary alone: class, value and what the evidence gives instead, and no entry is left out."""
+    """By the summary alone: class, value and what the evidence gives instead; limits are left to the page."""
     study, name = load_study("config/small.yaml"), "er3a_c60_article"
     for robot in study.robots:
         (tmp_path / robot).mkdir()
@@ -61,7 +62,8 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
-    for entry in (each for each in evidence.entries if each.value is not None):
+    shown = [each for each in evidence.entries if column_of(each.entry) in OTHER_COLUMNS and each.value is not None]
+    for entry in shown:
         link = re.escape(f'<a href="{name}/validation.html#entry-{entry.entry}">')
         (status, value, rest) = re.search(
             rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
@@ -73,7 +75,8 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
         else:
             assert "→" not in rest
     wrong = sum(each.status == "contradicted" for each in evidence.entries if each.value is not None)
-    assert f"<b>{wrong} of {sum(each.value is not None for each in evidence.entries)} contradicted.</b>" in page
+    count = sum(each.value is not None for each in evidence.entries)
+    assert f"<b>{name}: {wrong} of {count} contradicted, limits included.</b>" in page
     assert json.loads((tmp_path / "marks.js").read_text().split(" = ")[1].rstrip(";\n"))[name]["validation"] == "fail"
 
 

@@ -157,6 +157,7 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
         (fault.name, seen or 0.0) if motion else None,
         length if motion else 0.0,
         bar_of(motion, duration_s) if motion else (),
+        fix_of([fault]),
     )
 
 
@@ -169,6 +170,7 @@ def opened(faults: Iterable[Fault]) -> tuple[str, float] | None:
 def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
-        if fault.instead and fault.to_do:
-            return Fix(joined((fault.name, first_sentence(fault.to_do)[0]), ": "), fault.instead[1])
+        if fault.to_do:
+            place = fault.instead[1] if fault.instead else f"#{fault.name}"
+            return Fix(joined((fault.name, first_sentence(fault.to_do)[0]), ": "), place)
     return None

@@ -43,6 +43,7 @@ class ListRow:
     play : the motion that the page's player shows then, and the time (s); None where nothing is played
     length : of the bar, in parts of the longest
     parts : of the bar; without a length there is none
+    fix : what to do instead, shown above the list while this row is the chosen one
     """
 
     mark: Mark
@@ -52,6 +53,7 @@ class ListRow:
     play: tuple[str, float] | None = None
     length: float = 0.0
     parts: Sequence[Part] = ()
+    fix: Fix | None = None
 
 
 @dataclass(frozen=True)

@@ -775,9 +775,12 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
 
 // The row of the list whose moment or picture is shown.
 const rows = [...document.querySelectorAll(".runs a")];
+const fix = rows.length && document.querySelector(".hero .fix.instead");
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
-  for (const fix of document.querySelectorAll(".hero .fix.instead")) fix.toggleAttribute("hidden", shown !== rows[0]); // it is the first row's
+  if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
+  fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
+  fix.querySelector("a").href = shown.dataset.instead;
 };
 rows.forEach((row) => row.addEventListener("click", () => {
   mark(row);

@@ -12,13 +12,13 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from er3a.finding import is_one
-from er3a.pipeline.language import first_sentence, tr, with_unit
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
-from er3a.pipeline.messages.say import bracketed, joined, say
+from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import limits_assumed
-from er3a.pipeline.player.motions import Fault, PlayedMotion, opened, row_of
+from er3a.pipeline.player.motions import Fault, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -34,7 +34,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -87,12 +87,8 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     headline, rest = may_run(len(sound), len(known) - caught, caught, tr("programs"))
     clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    mended = next((each for each in wrong if each.to_do), None)
-    fix = None
-    if mended:
-        fix = Fix(joined((mended.name, first_sentence(mended.to_do)[0]), ": "), f"#{mended.name}")
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
-    return Answer(headline, rest, "", keys, groups, fix)
+    return Answer(headline, rest, "", keys, groups, fix_of(wrong))
 
 
 def _in_few_words(fault: Fault) -> str:

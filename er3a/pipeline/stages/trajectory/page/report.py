@@ -130,6 +130,8 @@ def answer_of(
         for path in paths
         if path.name in wrong
     }
+    for name in (name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met):
+        fault_rows[name] = replace(fault_rows[name], fix=None)
     mended = [row for path in paths if path.chosen and (row := fault_rows.get(path.name))]
     others = [path for path in paths if path.name not in wrong]
     sound = [path for path in others if is_met(path) or not path.expect]
