@@ -98,7 +98,6 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Run no path or program on the arm",
     ),  # that forbid something
     "Try other guesses",  # quoted from the article
-    "Move the joints and watch the tool",  # the teach panel's use
 }
 
 

@@ -441,7 +441,7 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
         for each in (found.counts.independent, found.counts.consistency, found.counts.claims)
     }
     assert set(shown) <= scheme
-    key = re.search(r"<dd>(\d+) of (\d+)</dd><dt>checks pass</dt>", page)
+    key = re.search(r"<dd>(\d+) of (\d+)</dd><dt>independent checks pass</dt>", page)
     assert key.groups() == (str(counts["independent"].passed), str(counts["independent"].total))
     failed = sum(check.status == "fail" for check in summary.checks)
     assert re.findall(r"<summary>(\d+) that fails?</summary>", page) == [str(failed)] * bool(failed)
@@ -504,7 +504,7 @@ def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_ho
     def advised(folder: Path) -> bool:
         """Whether the page advises that table."""
         page = page_of(study, replace(found, folder=folder / "validation"), tmp_path)
-        fix = re.search(r'<p class="fix">(.*?)</p>', page)
+        fix = re.search(r'<p class="fix"[^>]*>(.*?)</p>', page)
         return bool(fix and 'href="../er3a_c60/validation.html"' in fix[1])
 
     assert not advised(tmp_path / "x")
