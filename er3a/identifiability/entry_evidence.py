@@ -133,17 +133,12 @@ class Evidence(ByValue, Displayed):
         """
         judged = (*self.entries, *self.combinations)
         names = {status: [each.entry for each in judged if each.status == status] for status in _SHOWN}
-        more = {status: " ..." if len(found) > NAMED else "" for status, found in names.items()}
         kept = {"other_table": self.other.code if self.other else None, "unmet": self.unmet or None}
         return Sheet(
             f"Evidence of {self.robot.name}: {len(judged)} entries, "
             f"tolerance {shortly(self.tolerance.mm)} mm, {shortly(self.tolerance.deg)} deg",
             ("status", "count", "entries"),
-            tuple(
-                (status, str(len(found)), " ".join(found[:NAMED]) + more[status])
-                for status, found in names.items()
-                if found
-            ),
+            tuple((status, str(len(found)), _first_named(found)) for status, found in names.items() if found),
             facts=(
                 f"table_meets: {shortly(self.table_meets)}; conflicts: {len(self.conflicts)}; "
                 f"readings: {len(self.readings)}, allowed: {len(self.allowed)}",
@@ -163,3 +158,7 @@ _SHOWN: tuple[Status, ...] = (
     "settled_up_to_signs",
     "settled",
 )
+
+
+def _first_named(names: list[str]) -> str:
+    return " ".join(names[:NAMED]) + (" ..." if len(names) > NAMED else "")
