@@ -693,6 +693,7 @@ def test_two_poses_at_a_place_count_once(random):
     assert found.left_out.mean_mm == pytest.approx(2 * np.sqrt(2 / np.pi) * deviation, rel=0.15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "count", "least"), [("place", 1, 3), ("plane", 2, 7), ("plane", 60, None)])
 def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     """A thing that is touched too seldom beside others is named, and changes nothing."""

@@ -154,7 +154,6 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
     [
         ("d4", 0.15, "settled_up_to_signs"),
         ("d4", 0.5, "contradicted"),
-        ("alpha3", 180.0, "contradicted"),
         ("lower1", 10.0, "contradicted"),
     ],
 )
@@ -181,7 +180,6 @@ def test_a_sign_that_its_own_document_excludes_is_contradicted():
     ("name", "entry"),
     [
         ("er3_600", "direction5"),
-        ("er3_600", "upper4"),
         ("er3a_c60", "offset6"),
     ],
 )

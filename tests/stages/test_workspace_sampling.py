@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 from scipy.stats import qmc
@@ -113,7 +113,6 @@ lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)
 angles = st.lists(st.floats(-3.2, 3.2), min_size=6, max_size=6)
 
 
-@settings(max_examples=40)
 @given(a=lengths, d=lengths, alpha=angles, q=angles, tool=st.tuples(lengths, angles), modified=st.booleans())
 def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
     robot = load_robot("er3_600").replace(

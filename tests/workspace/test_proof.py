@@ -251,7 +251,6 @@ def test_filled_holds_for_an_offset_tool_and_a_short_joint_4(random):
 
 
 @pytest.mark.long
-@settings(max_examples=200)
 @given(st.lists(st.tuples(st.floats(-20, 20), st.floats(0, 7)), max_size=8), st.booleans())
 def test_arcs_agree_with_a_fine_grid(cuts, more):
     arcs = np.full((MAX_ARCS, 2), np.nan)
