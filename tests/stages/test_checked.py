@@ -974,6 +974,7 @@ def test_grasps_are_refused_where_arms_without_branches_are_near_singular(study)
     assert study.vision.least_singular_value == MIN_SINGULAR_VALUE
 
 
+@pytest.mark.long
 @given(
     status=st.sampled_from(["pass", "caution", "fail", "no_reference"]),
     parts=st.lists(st.tuples(st.sampled_from(CHECKS), st.integers(0, 3), st.integers(0, 3)), unique_by=lambda p: p[0]),

@@ -62,9 +62,7 @@ def two_links(tool: float = 0.1, **changes) -> Robot:
     ).replace(**changes)
 
 
-@pytest.fixture(
-    scope="module", params=["er3a_c60", "er3a_c60_article", pytest.param("er3_600", marks=pytest.mark.long)]
-)
+@pytest.fixture(scope="module", params=["er3a_c60_article", pytest.param("er3a_c60", marks=pytest.mark.long)])
 def proven(request):
     robot = load_robot(request.param)
     return robot, prove_robot(robot, 2000, 1)
