@@ -38,22 +38,21 @@ LONGEST_S = 900
 MOST_FAST_S, SHOWN_SLOW = 0.4, 20  # processor time of a test of the fast set
 LONGEST_FILES = (
     "integration/test_wheel.py",
-    "kinematics/test_by_class.py",
-    "integration/test_pipeline.py",
     "identifiability/test_evidence.py",
-    "identifiability/test_oracle.py",
+    "browser/test_page_use.py",
+    "browser/test_teach_page.py",
     "integration/test_killed_run.py",
-    "robots/test_urdf_round_trip.py",
+    "integration/test_pipeline.py",
+    "integration/test_strangers_study.py",
     "viewing/test_article.py",
-    "integration/test_sweep.py",
-    "stages/test_workspace.py",
-    "workspace/test_sliding_first.py",
-    "test_documents.py",
-    "stages/test_trajectory.py",
-    "workspace/test_general.py",
+    "browser/test_pages.py",
+    "identifiability/test_oracle.py",
     "calibration/test_points.py",
+    "stages/test_checked.py",
+    "robots/test_urdf_round_trip.py",
+    "kinematics/test_by_class.py",
+    "comparison/test_compare.py",
     "integration/test_offices.py",
-    "test_command_line.py",
 )
 ROOT = Path(__file__).resolve().parents[1]
 ALL_LONG = re.compile(r"^pytestmark = (\[\s*)?pytest\.mark\.long\b", re.MULTILINE)

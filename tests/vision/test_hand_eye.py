@@ -511,6 +511,7 @@ SLID, ELSEWHERE, TURNED = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("setup", "last", "what", "step"),
     [
