@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,8 +13,7 @@ from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.scene import Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import solid_pieces
+from er3a.collision.scene import Plane, Scene
 from er3a.finding import Finding
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -35,14 +33,13 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
 from er3a.pipeline.stages.workspace.page.workspace_figures import slide_names
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.drawn import outlines
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
 def tray_rows(
@@ -186,13 +183,6 @@ def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
             continue
         for outline in outlines(solid, shown):
             axes.add_artist(Polygon(1000 * outline, **_STYLE))
-
-
-def outlines(solid: Solid, shown: list[int]) -> list[Reals]:
-    """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
-    if isinstance(solid, Sphere):
-        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
-    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
 
 
 SHADES = "viridis_r"
