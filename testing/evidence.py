@@ -36,6 +36,7 @@ PAGES = (
     "fleet",
     "comparison",
     "arms",
+    "confirm",
     "programs",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md"}

@@ -149,7 +149,7 @@ def read_table(
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:
-    """What a robot file holds, checked, with the triangles of the STL files that it names.
+    """What a robot file holds, checked, with the triangles of the STL files that it names; or a D-H table's content.
 
     Returns
     -------
@@ -160,6 +160,11 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     InputError
         naming file, field and remedy; also if the robot is not named as its file, or an STL file has another checksum
     """
+    if holds_table(path):
+        content, notes = read_dh_table(path, robot_name(path))
+        if notes:
+            warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=2)
+        return content
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
@@ -168,7 +173,7 @@ def read_robot(path: Path) -> robot_file.RobotFile:
 
 
 def robot_path(name_or_path: str | Path) -> Path:
-    """The file that a robot's name, or a path ending in .yaml or .yml, refers to.
+    """The file that a robot's name, or the path of a robot file or D-H table, refers to.
 
     Parameters
     ----------
@@ -184,7 +189,7 @@ def robot_path(name_or_path: str | Path) -> Path:
         for a name without a file; the names that exist are listed
     """
     text = str(name_or_path)
-    if text.endswith((".yaml", ".yml")):
+    if text.endswith((".yaml", ".yml")) or ("." in text and holds_table(text)):
         return Path(text)
     path = _named_file(text)
     if path is None and text in known_arms():

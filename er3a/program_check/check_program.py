@@ -53,7 +53,7 @@ from er3a.programs.machine import execute
 from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
 
-ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
+ASSUMED_SPEED = np.radians(180.0)  # rad/s
 
 Check = Literal["limits", "reach", "configuration", "singularity", "rates", "self-collision", "scene", "tool"]
 CHECKS: tuple[Check, ...] = ("limits", "reach", "configuration", "singularity", "rates", "self-collision")
@@ -206,10 +206,10 @@ def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
 
     Returns
     -------
-    limits : those of the options if they have any; else the robot's speeds, with 180 deg/s or 0.5 m/s for unknown ones,
+    limits : those of the options if they have any; else the robot's speeds, with 180 deg/s for unknown ones,
         and accelerations that reach them in ``ACCELERATION_TIME``
     """
-    assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED)
+    assumed = np.full(robot.joints, ASSUMED_SPEED)
     return options.joint_limits or joint_limits(robot, assumed, ACCELERATION_TIME)
 
 

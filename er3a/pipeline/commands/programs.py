@@ -26,7 +26,7 @@ ProgramFiles = Annotated[
     list[Path],
     typer.Argument(
         callback=given_files,
-        help="robot programs (the language is detected), or tables of joint values over time (.csv)",
+        help="robot programs (the language is detected)",
     ),
 ]
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
