@@ -850,7 +850,7 @@ def test_a_line_whose_tilt_the_arms_joints_leave_off_is_no_pass(tmp_path, monkey
     rows = ["1,revolute,325,0,400,-130,130,,", "2,revolute,275,180,0,-140,140,,", "3,prismatic,0,0,0,,,0,200"]
     head = "joint,type,a_mm,alpha_deg,d_mm,lower_deg,upper_deg,lower_mm,upper_mm"
     (tmp_path / "scara.csv").write_text("\n".join([head, *rows, "4,revolute,0,0,50,-360,360,,"]), encoding="utf-8")
-    write_study(arm_of(None, tmp_path / "scara.csv", None), tmp_path)
+    write_study(arm_of(tmp_path / "scara.csv"), tmp_path)
     written = load_study("config/config.yaml")
     for tilt, named in (([180, 0, 0], ()), ([165, 0, 0], ("tilted",))):
         ends = {
