@@ -258,6 +258,7 @@ def test_a_unit_that_makes_two_tables_equal_is_named_with_its_table(columns, fac
     assert er3a.compare(found.corrected, right).verdict == "equal"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("heading", "own", "told"),
     [

@@ -462,6 +462,7 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     return content | ({"units_checked": True} if confirmed else {})
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize("confirmed", [False, True])
 @pytest.mark.parametrize(
