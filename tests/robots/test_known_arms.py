@@ -66,7 +66,7 @@ def test_names_resolve_after_files_of_that_name(tmp_path, monkeypatch):
 
 
 def test_a_study_says_where_the_numbers_are_from():
-    arm = arm_of(None, None, "irb120", name="mine")
+    arm = arm_of("irb120", "mine")
     sources = arm.robot.sources
     assert (arm.robot.name, sources["dh"].grade) == ("mine", "export")
     assert "abb_irb120_support" in arm.text
