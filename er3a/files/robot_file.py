@@ -856,7 +856,7 @@ class RobotFile(InputFile):
             raise ValueError(f"home_deg: {len(self.home_deg)} joint values | The arm has {len(self.limits.rows)}")
         for row, value in zip(self.limits.rows, self.home_deg or ()):
             low, high = (row.lower_deg, row.upper_deg) if row.lower_mm is None else (row.lower_mm, row.upper_mm)
-            if not row.continuous and not low <= value <= high:
+            if low is not None and high is not None and not low <= value <= high:
                 raise ValueError(f"home_deg: J{row.joint} at {value:g} is outside its limits | Give a pose it can take")
         return self
 
