@@ -22,7 +22,7 @@ KEY_FIGURES = {
     "watched_pairs": N_("Pairs of links that can collide, and are checked"),
     "undecided_pairs": N_("Pairs undecided"),
 }
-HOMES = {"study": N_("as the study has it"), "zero": N_("joints at 0"), "chosen": N_("chosen away from singular poses")}
+HOMES = {"study": N_("as given"), "zero": N_("joints at 0"), "chosen": N_("chosen away from singular poses")}
 STATES: dict[PairState, str] = {
     "never": N_("never collide"),
     "joined": N_("adjacent"),
