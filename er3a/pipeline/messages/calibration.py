@@ -13,29 +13,33 @@ from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstima
 from er3a.calibration.cross_validation import TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
-from er3a.pipeline.language import N_, as_text, tr
+from er3a.pipeline.language import as_text, tr, words
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
 MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
 CONTRADICTING = 3.0
 """Times the error at poses left out: positions held back that are farther off are not where the model puts them."""
-TERMS = {
-    "ratio": N_("ratio"),
-    "once": N_("once a turn"),
-    "twice": N_("twice a turn"),
-    "sag": N_("sag under a load"),
-    "weight": N_("sag under its own weight"),
-    "ripple": N_("{turns} times a turn"),
-    "coupling": N_("coupled to J{by}"),
-}
-KINDS = {"place": N_("place"), "plane": N_("plane")}
-VERDICTS = {
-    "taken": N_("taken"),
-    "not_lower": N_("left: poses left out are not met better"),
-    "noise": N_("left: noise may have made it"),
-    "wrong_way": N_("left: a load would have to lift the arm"),
-}
+TERMS = words(
+    {
+        "ratio": "ratio",
+        "once": "once a turn",
+        "twice": "twice a turn",
+        "sag": "sag under a load",
+        "weight": "sag under its own weight",
+        "ripple": "{turns} times a turn",
+        "coupling": "coupled to J{by}",
+    }
+)
+KINDS = words({"place": "place", "plane": "plane"})
+VERDICTS = words(
+    {
+        "taken": "taken",
+        "not_lower": "left: poses left out are not met better",
+        "noise": "left: noise may have made it",
+        "wrong_way": "left: a load would have to lift the arm",
+    }
+)
 
 
 def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Sequence[Measurement] = ()) -> str:
