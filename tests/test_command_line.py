@@ -89,6 +89,7 @@ def test_a_run_says_what_was_edited_meanwhile(call, monkeypatch):
     assert call("run", "results/other/workspace/summary.json").returncode == 0
 
 
+@pytest.mark.long
 def test_reading_a_program_ends_in_its_time_and_a_line_of_it_is_not_repeated_whole(call, tmp_path, monkeypatch):
     long = tmp_path / "long.src"
     long.write_text(f"DEF p( )\nPTP {{A1 {'1' * 900_000}}}\n{'X' * 900_000}\nEND\n", encoding="utf-8")

@@ -39,7 +39,7 @@ from er3a.pipeline.results import plain
 from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
 from er3a.pipeline.scope import Check as Checked
 from er3a.pipeline.stages.covered import covered_units, gaps_of_program
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
@@ -589,7 +589,7 @@ def programs_of(
             continue
         verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
         along = measured(surroundings, each.motion)
-        if collisions(along):
+        if along.contacts:
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
         rest = tuple(left for left in each.open if left.reason not in CHOSEN)
         elsewhere = language != "csv" and any(left.reason == "points_missed" for left in rest)

@@ -11,6 +11,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -49,6 +50,7 @@ from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
+from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
@@ -213,14 +215,21 @@ def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
     return options.joint_limits or joint_limits(robot, assumed, ACCELERATION_TIME)
 
 
-def check_program(program: Program, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
+def check_program(program: Program | str | Path, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
     """Follow a program and check each of its motions.
+
+    Parameters
+    ----------
+    program : its file, or what ``er3a.read_program`` read from it
 
     Raises
     ------
+    InputError
+        for a file that can't be read as a program
     ShapeError, PoseError
         for a start without one value for each joint, and a frame that is not a rigid transform
     """
+    program = program if isinstance(program, Program) else read_program(program)
     options = options or CheckOptions()
     judge = Judge(robot, CheckRules(options.near, assumed_limits(robot, options), options.assumed))
     execution = execute(program, robot, options.start, options.frames, options.limits, judge)

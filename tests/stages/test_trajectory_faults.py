@@ -12,6 +12,7 @@ import yaml
 from lxml import etree, html
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
@@ -313,6 +314,13 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     assert path.clear_until is None
     assert "End it" not in advice(path)
     assert fault.instead is None
+    assert (path.verdict, path.fails) == ("collides", False)  # no deeper than these shapes may be wrong
+
+
+def test_a_path_that_collides_by_more_than_assumed_shapes_may_be_wrong_fails(tmp_path):
+    (path,) = compute(study_of(tmp_path, "line_collides"), ROBOT).summary.paths
+    deepest = max(touch.depth_mm for part in path.collisions for touch in part.cause.touches)
+    assert (path.fails, deepest > 1000 * ASSUMED_MARGIN) == (True, True)
 
 
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):

@@ -1,4 +1,4 @@
-"""Commands for robot files: URDF import and export, calibration, hand-eye, meshes, schemas."""
+"""Commands for robot files: URDF import and export, calibration, hand-eye, schemas."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,6 @@ import typer
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands import options
 from er3a.pipeline.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
@@ -23,7 +23,6 @@ from er3a.pipeline.progress import shown_work
 if TYPE_CHECKING:
     from er3a.calibration.calibrate import Calibration
     from er3a.calibration.observations import Measurement
-    from er3a.files.pieces_file import PiecesFile
     from er3a.robots.robot import Robot
 
 
@@ -115,30 +114,6 @@ def import_calibration(
     print(f"{output}: written")
 
 
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
-def mesh(
-    file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
-    unit: Annotated[Unit, typer.Option(help="unit of the mesh's lengths: m or mm")],
-    output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
-    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="greatest concavity left in a piece")] = 0.05,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the search for cuts")] = 0,
-    as_json: options.AsJson = False,
-):
-    """Split a mesh into convex pieces, for robot and scene files."""
-    if output.suffix != ".json":
-        raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
-    with shown_work(f"{file}: splitting into convex pieces"):
-        found = import_mesh(file, output, unit, threshold, seed)
-    if as_json:
-        options.print_json(
-            found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)}
-        )
-        return
-    print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
-    print(f"the mesh sticks out of the pieces by at most {found.uncovered_mm:.3g} mm, added to the pieces as a margin")
-    print(f"the pieces stick out of the mesh by {found.excess_mm:.3g} mm, as measured")
-
-
 def _check_options(output: Path | None, words: str) -> None:
     """Before the long work begins: a language, a name for a robot."""
     if words not in LANGUAGES:
@@ -149,21 +124,27 @@ def _check_options(output: Path | None, words: str) -> None:
 
 
 def _measured(path: Path, arm: Robot) -> Sequence[Measurement]:
-    """Measured positions; of another table than er3a's own, those of the controller's poses in it."""
+    """Measured positions; of another table than er3a's own, the controller's poses in it, with orientations."""
     from er3a.calibration.observations import Measurement
     from er3a.confirmation.poses import read_pairs
+    from er3a.confirmation.screen import likeliest_form
     from er3a.files.by_name import load_measurements
     from er3a.files.csv_file import read_header
     from er3a.files.units import JOINT_COLUMN
+    from er3a.references.quantities import MM
     from er3a.robots.joint_limits import shown
 
     rows: Sequence[Measurement]
-    if any(map(JOINT_COLUMN.fullmatch, read_header(path))):
+    header = read_header(path)
+    if "point" in header and any(map(JOINT_COLUMN.fullmatch, header)):
         rows = load_measurements(path, arm)
     else:
         pairs = read_pairs(path, arm)
-        values = zip(pairs.lines.tolist(), shown(arm, pairs.q).tolist(), (1000 * pairs.xyz).tolist())
+        values = zip(pairs.lines.tolist(), shown(arm, pairs.q).tolist(), (MM * pairs.xyz).tolist())
         rows = [Measurement(line, tuple(q), "tool", (xyz[0], xyz[1], xyz[2])) for line, q, xyz in values]
+        if pairs.turns:
+            turns = pairs.turns[likeliest_form(arm, pairs)].tolist()
+            rows = [replace(row, turn=R) for row, R in zip(rows, turns)]
     return rows
 
 
@@ -206,7 +187,7 @@ def calibrate(
     The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
     best without such errors, and ratios and couplings as its coupling.
 
-    Poses that a controller shows can be given too, as er3a confirm reads them; their positions count. They repeat the
+    Poses that a controller shows can be given too, as er3a confirm reads them, with orientations. They repeat the
     controller's model, so er3a confirm answers first what is between both.
 
     Exit code 1 if measurements and table don't fit (what remains or is corrected is far beyond errors of arms and of
@@ -355,44 +336,3 @@ def schema(
     for file, content in schemas.items():
         write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     write_text(docs / "dictionary.md", data_dictionary())
-
-
-DIGITS = 6
-"""Of corners, in mm: a nanometre."""
-
-
-def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: int) -> PiecesFile:
-    """Split a mesh into convex pieces and write them to a file.
-
-    Raises
-    ------
-    InputError
-        for a mesh that can't be used, see :func:`er3a.formats.mesh_file.read_mesh`
-    """
-    import numpy as np
-
-    from er3a.collision.meshes import convex_pieces
-    from er3a.files.kept_files import sha256, write_text
-    from er3a.files.pieces_file import PiecesFile, checksum_of
-    from er3a.formats.mesh_file import read_mesh
-
-    mesh = read_mesh(source, unit)
-    found = convex_pieces(mesh.vertices, mesh.faces, threshold, seed)
-    rounded = [np.round(piece * 1000, DIGITS).tolist() for piece in found.pieces]
-    content = PiecesFile(
-        kind="pieces",
-        source=source.name,
-        source_sha256=sha256(source),
-        unit=unit,
-        triangles=len(mesh.faces),
-        threshold=threshold,
-        seed=seed,
-        # with what rounding the corners may take away
-        uncovered_mm=float(np.ceil(found.uncovered * 1000 * 10**DIGITS) + 2) / 10**DIGITS,
-        excess_mm=round(found.excess * 1000, DIGITS),
-        sha256=checksum_of(rounded),
-        pieces_mm=rounded,
-    )
-    text = json.dumps(content.model_dump(), indent=1) + "\n"
-    write_text(output, text)
-    return content

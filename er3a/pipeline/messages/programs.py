@@ -146,10 +146,7 @@ TEXTS = texts(
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
         "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
         "motion_collides": "collision ({assumed:shapes}): {touches:3; }",
-        "bodies_touch": (
-            "{pair} after {at:.4g}, {depth_mm:.1f} mm deep[{enlarged_mm:?} (shapes up to {enlarged_mm:.1f} mm larger "
-            "than their meshes)]"
-        ),
+        "bodies_touch": "{pair} after {at:.4g}, {depth_mm:.1f} mm deep",
         "speed_not_given": "no usable speed (given: {word:speed_given}); {assumed:g} assumed",
         "suspect_number": "{text} looks like {kind:suspect}; expected: {usual}",
         "frames_from_robot_file": (

@@ -35,7 +35,6 @@ from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, 
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RATES, rate_ratio
-from er3a.planning.names import FAULTS, PathVerdict
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -44,11 +43,6 @@ LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
 SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
-
-
-def weight_of(verdict: PathVerdict) -> Weight:
-    """How much a verdict weighs."""
-    return "fail" if verdict in FAULTS else "plain" if verdict == "safe" else "caution"
 
 
 def motions(
@@ -83,10 +77,8 @@ def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
 
 
 def _weight_of(path: model.PathSummary) -> Weight:
-    """That of its verdict, or of what was found in its program if that weighs more."""
-    weights: list[Weight] = [weight_of(path.verdict)]
-    weights += ["fail" if each.level == "fail" else "caution" for each in path.of_program]
-    return min(weights, key=RANKS.index)
+    """How much its verdict weighs, with what was found in its program."""
+    return "fail" if path.fails else "plain" if path.verdict == "safe" and not path.of_program else "caution"
 
 
 def faults(results: model.TrajectoryResults) -> list[Fault]:
@@ -229,7 +221,7 @@ def advised(path: model.PathSummary, rows: model.PathChecks) -> str:
     no_part = sentence("advice.no_part")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
         return joined([sentence("path.cause", event=no_part, pose=sentence("advice.near")), no_repair(path)], ". ")
-    return joined([no_repair(path), no_part if weight_of(path.verdict) == "fail" else ""], ". ")
+    return joined([no_repair(path), no_part if path.fails else ""], ". ")
 
 
 def _switch(path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> str:
@@ -247,12 +239,12 @@ def repaired(path: model.PathSummary) -> str:
 
 def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
+    weight = _weight_of(path)
     if path.verdict == "safe" and path.of_program:
-        weight = _weight_of(path)
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return weight_of(path.verdict), joined(map(outcome_word, path.outcomes), ", ")
+    return weight, joined(map(outcome_word, path.outcomes), ", ")
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> Finding | None:
