@@ -148,9 +148,13 @@ def _draw_cloud(axes: Axes, bars: model.Bars, points: Reals) -> QuadMesh:
 
 
 def _draw_proof(
-    axes: Axes, proof: model.ProofCells, bars: model.Bars | None, shades: Sequence[str] = tuple(PROOF.values())
+    axes: Axes,
+    proof: model.ProofCells,
+    bars: model.Bars | None,
+    shades: Sequence[str] = tuple(PROOF.values()),
+    sides: Sequence[int] = (1,),
 ) -> None:
-    """Cells of the proof, in a shade for each of its states."""
+    """Cells of the proof, in a shade for each of its states; on both sides of axis 1 for ``sides`` 1 and -1."""
     corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
     filled, empty = proof.filled_ratio, proof.empty_ratio
     if bars:  # their ends are empty
@@ -160,16 +164,19 @@ def _draw_proof(
     for kind, colour in enumerate(shades):
         a, b, c, d = corners[kinds == kind].T
         boxes = np.stack([np.stack([a, c], 1), np.stack([b, c], 1), np.stack([b, d], 1), np.stack([a, d], 1)], axis=1)
-        axes.add_collection(
-            PolyCollection(list(boxes), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
-        )
+        for side in sides:
+            corners_seen = list(boxes * [side, 1])
+            axes.add_collection(
+                PolyCollection(corners_seen, facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
+            )
     axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
 
 
-def _draw_border(axes: Axes, border: model.Border) -> None:
+def _draw_border(axes: Axes, border: model.Border, colour: str = INK, sides: Sequence[int] = (1,)) -> None:
     for each in np.unique(border.arc):
         line = border.take(border.arc == each)
-        axes.plot(line.rho_m * 1000, line.z_m * 1000, color=INK, linewidth=1.3)
+        for side in sides:
+            axes.plot(line.rho_m * 1000 * side, line.z_m * 1000, color=colour, linewidth=1.3)
 
 
 def _about(axis: model.AxisSummary, points: Reals) -> Reals:
@@ -276,21 +283,9 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
     """
     figure, axes = new_figure(1, 1, width=9.0, height=7.6)
     reach, axis = results.summary.reach_m, results.summary.axis
-    _draw_proof(axes, results.proof, None, shades=(PROOF_BLUE, PROOF_BLUE, PROOF_BLUE, "#ffffff"))
-    for found in list(axes.collections):
-        mirrored = PolyCollection(
-            [path.vertices[:4] * [-1, 1] for path in found.get_paths()],
-            facecolors=found.get_facecolor(),
-            edgecolors=found.get_facecolor(),
-            linewidths=0.2,
-            rasterized=True,
-        )
-        axes.add_collection(mirrored)
-    border = results.border
-    for each in np.unique(border.arc):
-        line = border.take(border.arc == each)
-        for side in (1000, -1000):
-            axes.plot(line.rho_m * side, line.z_m * 1000, color=MODEL, linewidth=1.2)
+    sides, shades = (1, -1), (PROOF_BLUE, PROOF_BLUE, PROOF_BLUE, "#ffffff")
+    _draw_proof(axes, results.proof, None, shades, sides)
+    _draw_border(axes, results.border, MODEL, sides)
     points = skeleton(robot, np.zeros(robot.joints))
     arm = np.stack([(points - axis.point_m)[:, 0], (points - axis.point_m) @ axis.direction], axis=1) * 1000
     axes.plot(*arm.T, color=INK, linewidth=11, solid_capstyle="round", solid_joinstyle="round", zorder=5)
