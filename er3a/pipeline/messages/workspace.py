@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_, as_text, tr, with_unit
+from er3a.pipeline.language import as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.numbers import at_least, at_most
 from er3a.pipeline.messages.say import FORMATS, joined, say, say_as, says, sentence, texts
@@ -14,16 +14,18 @@ from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
 from er3a.workspace.causes import VoidCause
 
-KEY_FIGURES = {
-    "greatest_reach": N_("greatest reach from axis 1"),
-    "enclosed_voids_lower": N_("enclosed voids, at least"),
-    "volume_lower": N_("reached volume, at least"),
-    "volume_upper": N_("reached volume, at most"),
-    "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),
-    "least_reach": N_("least distance from axis 1"),
-    "samples": N_("samples"),
-}
-VOID_KINDS = {"enclosed": N_("enclosed"), "open": N_("open pocket")}
+KEY_FIGURES = words(
+    {
+        "greatest_reach": "greatest reach from axis 1",
+        "enclosed_voids_lower": "enclosed voids, at least",
+        "volume_lower": "reached volume, at least",
+        "volume_upper": "reached volume, at most",
+        "hull_volume": "convex hull of the samples: holds voids and dents, misses the rim",
+        "least_reach": "least distance from axis 1",
+        "samples": "samples",
+    }
+)
+VOID_KINDS = words({"enclosed": "enclosed", "open": "open pocket"})
 
 
 TEXTS = texts(
