@@ -67,14 +67,10 @@ GLOSSARY = terms(
         ),
         "wrist centre": "the point in which the last three axes meet",
         "rank loss": "where axes become dependent, so that the tool can't move in some direction",
-        "admissible": "within the joint limits and free of collisions",
-        "singular segment": "the part of a path where joint speeds grow without bound or beyond the joints' limits",
         "avoidance strategy": (
             "what can be done about a path's singular segment: slow down, another branch, a via point, a joint "
             "detour, stop"
         ),
-        "most likely fault": "the table entry whose correction explains the differences best",
-        "authoritative": "of a source: official, CAD or exported; a verdict rests on such sources alone",
         "settled": "of a table entry: independent documents give it to within the tolerance",
         "but for signs": (
             "of a settled table entry: keep it, unless an open entry turns out otherwise, which may change a sign or "
@@ -88,18 +84,9 @@ GLOSSARY = terms(
         ),
         "void": "a region that the tool point can't reach: enclosed, or an open pocket",
         "undecided": "what the computed bounds can't decide; never called safe",
-        "allowed collision matrix": (
-            "which pairs of bodies are checked for collisions: all but those proven never to collide and neighbours at "
-            "their joint"
-        ),
-        "penetration tolerance": "the depth of overlap below which a contact between checked points may go unnoticed",
-        "acceleration time": "the time in which each joint is taken to reach its greatest speed",
-        "hand-eye calibration": "where a camera is: on the flange (eye-in-hand) or in the base (eye-to-hand)",
         "holding torque": "the torque or force by which a drive keeps a joint at rest in a pose",
         "RMS torque": "root-mean-square over a motion, which heats the motor; compared with the rated torque",
-        "armature": "the rotor's inertia at the joint: times the gear ratio squared",
         "utilisation": "a value divided by its limit, in percent",
-        "quasi-random": "spread more evenly than chance, as Sobol' points are",
     }
 )
 
