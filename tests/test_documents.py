@@ -64,7 +64,7 @@ STANDS_FOR = {
     "arms": {"WORD": "irb", "[WORD]": "irb"},
     "--help": {},
 }
-# Those of a study: tests/integration/test_wheel.py runs them, but for what a terminal or a desktop is needed.
+# Those of a study: tests/integration/test_wheel.py runs some, for others a terminal or a desktop is needed.
 OF_A_STUDY = {"new", "compute", "run", "verdicts", "view", "diff", "--install-completion"}
 
 

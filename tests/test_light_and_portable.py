@@ -98,8 +98,7 @@ def test_the_core_imports_without_the_libraries_of_extras():
 
 
 @pytest.mark.parametrize(
-    ("words", "extra"),
-    [(("run",), "study"), (("compare", "er3_600", "er3_600", "--html", "a.html"), ""), (("teach", "er3_600"), "")],
+    ("words", "extra"), [(("run",), "study"), (("compare", "er3_600", "er3_600", "--html", "a.html"), "")]
 )
 def test_a_command_says_in_one_line_which_extra_it_needs(tmp_path: Path, words: tuple[str, ...], extra: str):
     code = WITHOUT + "from er3a.__main__ import main\nsys.argv = ['er3a', *sys.argv[2:]]\nmain()"

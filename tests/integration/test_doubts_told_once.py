@@ -19,8 +19,9 @@ def test_a_doubtful_number_of_the_study_is_one_line_of_a_run(fresh_project):
     file = run.folder / STUDY
     study = yaml.safe_load(file.read_text(encoding="utf-8"))
     body = {"mass_kg": 1.0, "centre_mm": [0, 0, 0.3]}
-    entry = {"payload": {"source": "x", "grade": "cad", "body": body}, "stages": ["validation"]}
-    study["robots"] = {ROBOT: entry}
+    files = {key: study["robots"]["er3_600"][key] for key in ("targets", "paths")}
+    load = {"source": "x", "grade": "cad", "body": body}
+    study["robots"] = {ROBOT: files | {"payload": load, "stages": ["validation", "workspace"]}}
     file.write_text(yaml.safe_dump(study), encoding="utf-8")
     locks = run.folder / ".snakemake/locks"
     locks.mkdir(parents=True)
