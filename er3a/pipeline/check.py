@@ -107,26 +107,17 @@ def _check_vision(path: Path) -> None:
     _check_hand_eye(path.parent / load_vision(path).calibration)
 
 
-_CHECKS: dict[str, Callable[[Path], object]] = {
-    "study": lambda path: check_study(path),
-    "robot": _check_robot,
-    "targets": read_targets,
-    "paths": _check_paths,
-    "scene": load_scene,
-    "programs": _check_programs,
-    "hand_eye": _check_hand_eye,
-    "vision": _check_vision,
+_CHECKS: dict[str, tuple[str, Callable[[Path], object]]] = {
+    "study": ("a study", lambda path: check_study(path)),
+    "robot": ("a robot", _check_robot),
+    "targets": ("targets", read_targets),
+    "paths": ("paths", _check_paths),
+    "scene": ("a scene", load_scene),
+    "programs": ("programs", _check_programs),
+    "hand_eye": ("a calibration set", _check_hand_eye),
+    "vision": ("objects before a camera", _check_vision),
 }
-_WORDS = {
-    "robot": "a robot",
-    "study": "a study",
-    "targets": "targets",
-    "paths": "paths",
-    "scene": "a scene",
-    "programs": "programs",
-    "hand_eye": "a calibration set",
-    "vision": "objects before a camera",
-}
+"""By kind of file: what it is in words, and what reads it."""
 PROGRAM = "a robot program"
 
 
@@ -171,13 +162,14 @@ def check_file(path: Path) -> str:
     within = path if home == Path.cwd() else path.absolute().relative_to(home)
     with chdir(home):
         try:
-            _CHECKS[kind](within)
+            words, read = _CHECKS[kind]
+            read(within)
         except InputError as error:
             if kind == "study" or error.file is None or Path(error.file).name == path.name:
                 raise
             where = str(error.file) + (f": {error.field}" if error.field else "")
             raise InputError(path, where, error.problem, error.remedy) from None
-    return _WORDS[kind]
+    return words
 
 
 def _is_outside(folder: Path) -> bool:
@@ -189,7 +181,7 @@ def _check_csv(path: Path) -> str:
     """What a CSV is, by the folder that it stands in, its name or its columns."""
     if path.parent.name == "targets":
         read_targets(path)
-        return _WORDS["targets"]
+        return "targets"
     if path.parent.name == "paths":
         read_path_table(path)
         return "a path"
@@ -211,7 +203,7 @@ def _check_table(path: Path) -> str:
         return "a D-H table"
     if {"name", "x_mm"} <= set(header):
         read_targets(path)
-        return _WORDS["targets"]
+        return "targets"
     if {"q1_deg", "q1_mm", "x_mm"} & set(header):
         read_path_table(path)
         return "a path"

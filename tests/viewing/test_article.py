@@ -163,8 +163,8 @@ class Ids(HTMLParser):
 @pytest.mark.parametrize("code", ["en", "zh"])
 def test_every_item_figure_and_table_has_an_address(pages, code):
     found = Ids(pages[code])
-    assert {f"item-{item.code}" for item in ITEMS} <= set(found.ids)
-    assert {f"#item-{item.code}" for item in ITEMS} <= {f"#{link}" for link in found.links}
+    assert {f"item-{code}" for code in ITEMS} <= set(found.ids)
+    assert {f"#item-{code}" for code in ITEMS} <= {f"#{link}" for link in found.links}
     assert len(found.ids) == len(set(found.ids))
     assert set(found.links) <= set(found.ids)
 

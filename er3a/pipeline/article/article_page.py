@@ -25,8 +25,8 @@ from er3a.pipeline.article.article_numbers import (
     summary_of,
 )
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.article import AGREEMENT, ITEMS
+from er3a.pipeline.language import tr, words
+from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTION_OF
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.numbers import NOTHING, at_least, at_most, fixed, number, numbers
 from er3a.pipeline.messages.trajectory import event_word
@@ -39,7 +39,7 @@ from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-ROLES = (N_("the article's table"), N_("the same with offset 2 = −90°"), N_("the real ER3A-C60"))
+ROLES = words(("the article's table", "the same with offset 2 = −90°", "the real ER3A-C60"))
 APART_M = 1.8  # between two arms that stand side by side
 PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
 """The page of the printed table that shows more, by section of the article; for all others its validation page."""
@@ -111,19 +111,19 @@ def _row(row: dict[str, Any]) -> ListRow:
 
 def _rows(tables: ArticleTables, found: ArticleNumbers) -> Iterator[dict[str, Any]]:
     agree, parts = agreements(found), _parts(found)
-    for item in ITEMS:
-        status = agree[item.code]
+    for code, (title, says, finds, why) in ITEMS.items():
+        status, section = agree[code], SECTION_OF[code]
         yield {
-            "code": item.code,
-            "section": item.section,
-            "title": tr(item.title),
-            "says": tr(item.says),
-            "finds": tr(item.finds, **parts),
-            "why": tr(item.why, **parts) if status != "agrees" else "",
+            "code": code,
+            "section": section,
+            "title": tr(title),
+            "says": tr(says),
+            "finds": tr(finds, **parts),
+            "why": tr(why, **parts) if status != "agrees" else "",
             "status": status,
             "word": tr(AGREEMENT[status]),
             "badge": BADGES[status],
-            "page": f"{tables.printed}/{PAGES.get(item.section, 'validation')}.html",
+            "page": f"{tables.printed}/{PAGES.get(section, 'validation')}.html",
         }
 
 

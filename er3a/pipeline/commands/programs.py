@@ -65,7 +65,7 @@ def check_program(
     scene: SceneFile = None,
     assume: Assumed = None,
     require: Annotated[str, typer.Option(help="checks without which nothing passes: scene,tool")] = "",
-    every: Annotated[bool, typer.Option("--all", "-v", help="print each finding by itself, notes too")] = False,
+    every: Annotated[bool, typer.Option("--all", help="print each finding by itself, notes too")] = False,
     verdicts: Verdicts = False,
     sarif: Annotated[Path | None, typer.Option(help="write the findings as SARIF 2.1.0 to this file")] = None,
     baseline: BaselineFile = None,

@@ -34,7 +34,7 @@ def extract(fileobj: Any, keywords: Any, comment_tags: Any, options: Any) -> Ite
 
 def _marked(table: ast.expr, by: str) -> Iterator[ast.Constant]:
     """The texts of a table: its values, and the keys of terms."""
-    if isinstance(table, ast.Constant):
+    if isinstance(table, ast.Constant) and table.value:
         yield table
     parts = table.values if isinstance(table, ast.Dict) else getattr(table, "elts", [])
     keys = filter(None, table.keys) if by == "terms" and isinstance(table, ast.Dict) else []

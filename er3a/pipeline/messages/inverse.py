@@ -30,20 +30,6 @@ FREE_AT = words(
         "curve": "self-motion",
     }
 )
-SHAPES = words(
-    {
-        "front_elbow_up_no_flip": "front, elbow up",
-        "front_elbow_up_flip": "front, elbow up",
-        "front_elbow_down_no_flip": "front, elbow down",
-        "front_elbow_down_flip": "front, elbow down",
-        "back_elbow_up_no_flip": "back, elbow up",
-        "back_elbow_up_flip": "back, elbow up",
-        "back_elbow_down_no_flip": "back, elbow down",
-        "back_elbow_down_flip": "back, elbow down",
-    }
-)
-
-
 TEXTS = texts(
     {
         "inverse.not_reproduced": (

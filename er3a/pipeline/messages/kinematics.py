@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
 from er3a.kinematics.solutions import Label
 from er3a.pipeline.language import words
-from er3a.pipeline.messages.say import FORMATS, WORDS, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, WORDS, joined, say, say_as, says, sentence, texts, word
 
-BRANCHES = words(
+BRANCH_PARTS = words(
     {
-        "front_elbow_up_no_flip": "front, elbow up, no flip",
-        "front_elbow_up_flip": "front, elbow up, flip",
-        "front_elbow_down_no_flip": "front, elbow down, no flip",
-        "front_elbow_down_flip": "front, elbow down, flip",
-        "back_elbow_up_no_flip": "back, elbow up, no flip",
-        "back_elbow_up_flip": "back, elbow up, flip",
-        "back_elbow_down_no_flip": "back, elbow down, no flip",
-        "back_elbow_down_flip": "back, elbow down, flip",
-        "shoulder_plus_elbow_plus_wrist_plus": "shoulder +, elbow +, wrist +",
-        "shoulder_plus_elbow_plus_wrist_minus": "shoulder +, elbow +, wrist -",
-        "shoulder_plus_elbow_minus_wrist_plus": "shoulder +, elbow -, wrist +",
-        "shoulder_plus_elbow_minus_wrist_minus": "shoulder +, elbow -, wrist -",
-        "shoulder_minus_elbow_plus_wrist_plus": "shoulder -, elbow +, wrist +",
-        "shoulder_minus_elbow_plus_wrist_minus": "shoulder -, elbow +, wrist -",
-        "shoulder_minus_elbow_minus_wrist_plus": "shoulder -, elbow -, wrist +",
-        "shoulder_minus_elbow_minus_wrist_minus": "shoulder -, elbow -, wrist -",
+        "front": "front",
+        "back": "back",
+        "elbow_up": "elbow up",
+        "elbow_down": "elbow down",
+        "no_flip": "no flip",
+        "flip": "flip",
+        "shoulder_plus": "shoulder +",
+        "shoulder_minus": "shoulder -",
         "elbow_plus": "elbow +",
         "elbow_minus": "elbow -",
         "wrist_plus": "wrist +",
         "wrist_minus": "wrist -",
     }
 )
+"""What the labels of branches are made of."""
 ARM_CLASSES = words(
     {
         "spherical_wrist": "spherical wrist, axes 2 and 3 parallel: up to 8 solutions in closed form",
@@ -54,7 +48,6 @@ ARM_CLASSES = words(
         "unsolved": "no class",
     }
 )
-SIDES = words({"front": "front", "back": "back"})
 SINGULARITIES = words(
     {
         "wrist": "wrist",
@@ -146,7 +139,7 @@ WORDS.update(
                 "without_limits": "search without limits (respect_limits=False)",
             },
             "arm_class": ARM_CLASSES,
-            "arm_side": SIDES,
+            "arm_side": BRANCH_PARTS,
             "singularity": SINGULARITIES,
             "singular_pose": SINGULARITIES | SINGULAR_POSES,
             "rule": RULE_NAMES,
@@ -166,7 +159,8 @@ def branch_word(label: Label | str, branch: int = 0) -> str:
     """A branch by its code, or the number of an arm that iteration found."""
     if label == "found_arm":
         return sentence("found_arm", number=branch + 1)
-    return word("branch", BRANCHES, label)
+    parts = re.findall("|".join(BRANCH_PARTS), label)
+    return joined((word("branch", BRANCH_PARTS, part) for part in parts), ", ") or label
 
 
 def singularity_word(kind: str) -> str:

@@ -23,8 +23,8 @@ GRADE_NAMES = words(
     {
         "official": "official",
         "measured": "measured",
-        "cad": "cad",
-        "export": "export",
+        "cad": "CAD",
+        "export": "exported",
         "claim": "claim",
         "inferred": "inferred",
     }

@@ -12,6 +12,7 @@ from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
 from er3a.pipeline.language import as_text, distinct, tr, with_unit, words
+from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, quoted
 from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
@@ -38,7 +39,6 @@ SELF_CHECKS = words(
         "orientation_error": "worst orientation error",
     }
 )
-DATA_GRADES = words({"official": "official", "measured": "measured", "cad": "CAD", "export": "exported"})
 KEY_FIGURES = words(
     {
         "independent_checks": "Independent checks passed",
@@ -136,7 +136,7 @@ TEXTS = texts(
 WORDS.update(
     words(
         {
-            "data": DATA_GRADES,
+            "data": GRADE_NAMES,
             "part_entries": PART_ENTRIES,
             "self_check": SELF_CHECKS,
             "speaks": {

@@ -11,7 +11,7 @@ import numpy as np
 from er3a.confirmation.confirm import Confirmation
 from er3a.files.kept_files import sha256
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import own_title, with_unit
 from er3a.pipeline.messages.confirm import lines_of
 from er3a.pipeline.messages.numbers import number
 from er3a.pipeline.messages.say import bracketed
@@ -40,9 +40,9 @@ def write_confirmation(
     command : that made it; files : what it was made from
     """
     _, headline, *lines = lines_of(found, robot, nearest=nearest)
-    arms = [seen_arm(robot, own_title(robot.title), tr("model"), "right" if found.verdict == "agrees" else "wrong")]
+    arms = [seen_arm(robot, own_title(robot.title), "model", "right" if found.verdict == "agrees" else "wrong")]
     if found.verdict not in ("agrees", "open"):
-        arms.append(seen_arm(found.corrected, tr("Controller"), "", "right"))
+        arms.append(seen_arm(found.corrected, "Controller", "", "right"))
     with house_style():
         page.render(
             Path(__file__).with_name("confirmation.html.j2"),
@@ -61,7 +61,7 @@ def write_confirmation(
 
 def _keys(found: Confirmation) -> list[tuple[str, str]]:
     off = [found.before_mm.max(), found.left_mm[found.fits].max(initial=0.0)]
-    words = tr("as it is, at worst"), tr("explained, at worst")
+    words = "as it is, at worst", "explained, at worst"
     return [(with_unit(number(float(value), 3), "mm"), said) for value, said in zip(off, words)]
 
 
@@ -69,14 +69,14 @@ def _bars(found: Confirmation) -> Picture:
     """How far each pose is off, by the model as it is and with what was found."""
     figure, ax = new_figure(width=8.5, height=5.4)
     at = np.arange(len(found.lines))
-    rows = (found.before_mm, -0.2, "fail", tr("as it is")), (found.left_mm, 0.2, "pass", tr("explained"))
+    rows = (found.before_mm, -0.2, "fail", "as it is"), (found.left_mm, 0.2, "pass", "explained")
     for values, aside, colour, label in rows if found.layers else rows[1:]:
         ax.bar(at + aside, np.maximum(values, LEAST_MM), 0.4, bottom=0.0, color=VERDICTS[colour], label=label)
-    ax.axhline(found.digits_mm, color="black", linewidth=0.8, linestyle="--", label=tr("rounding explains"))
+    ax.axhline(found.digits_mm, color="black", linewidth=0.8, linestyle="--", label="rounding explains")
     ax.set_yscale("log")
-    ax.set_ylabel(bracketed(tr("flange off"), "mm"))
-    ax.set_xlabel(tr("line of the file"))
+    ax.set_ylabel(bracketed("flange off", "mm"))
+    ax.set_xlabel("line of the file")
     shown = at[:: max(1, len(at) // 20)]
     ax.set_xticks(shown, [str(found.lines[k]) for k in shown])
     figure.legend(loc="outside lower center", ncols=3)
-    return Picture(figure, tr("How far each pose is off, before and after"), tr("Each pose before and after."))
+    return Picture(figure, "How far each pose is off, before and after", "Each pose before and after.")

@@ -19,7 +19,6 @@ from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
     FREE_AT,
     NEAREST_RULE,
-    SHAPES,
     limits_in_short,
 )
 from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
@@ -75,7 +74,7 @@ def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.Sol
 
 def _shape_word(label: str, branch: int) -> str:
     """An arm shape: a branch whatever its wrist."""
-    return word("shape", SHAPES, label) if label in SHAPES else branch_word(label, branch)
+    return branch_word(label.removesuffix("_flip").removesuffix("_no"), branch)
 
 
 NO_BREAK_SPACE = "\u00a0"
