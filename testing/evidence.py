@@ -37,6 +37,7 @@ PAGES = (
     "comparison",
     "arms",
     "confirm",
+    "time",
     "programs",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md"}

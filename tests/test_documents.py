@@ -76,6 +76,7 @@ def all_blocks(*languages: str) -> list[Any]:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("block", all_blocks("python"))
 def test_python_in_documents_runs(block, monkeypatch):
     monkeypatch.chdir(ROOT)

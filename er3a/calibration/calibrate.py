@@ -55,7 +55,6 @@ from er3a.calibration.parameters import (
     corrected,
     coupled,
     parameters_of,
-    placements_of,
     settles,
     whole_length_mm,
 )
@@ -69,11 +68,12 @@ from er3a.calibration.terms import (
     TermKind,
     places_of,
 )
-from er3a.comparison.entries import TOOL_COLUMNS, Entry
+from er3a.comparison.entries import Entry
 from er3a.diagnosis.faults import Faults, repairs_of
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
+from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
@@ -147,7 +147,7 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
     """
     if not len(observations):
         raise CalibrationError(fact("no_positions"), "there are no positions of single points to calibrate from")
-    placed = placements_of(observations.free)
+    placed = observations.placements
     robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations)
     left = left_of_touched(robot, observations)
@@ -179,9 +179,9 @@ def _with_rough_tool(robot: Robot, observations: PointObservations) -> tuple[Rob
     """The robot with its tool where the measurements put it, if that is far from where its file does; and the share of
     its length that an entry's effect then has to have beside others: near an axis, what a rough place shows of the
     entries about it is no effect of theirs."""
-    placed = placements_of(observations.free)
+    placed = observations.placements
     amounts = places_at(robot, placed, observations)
-    shift = np.where([each.column in TOOL_COLUMNS for each in placed], amounts, 0.0)
+    shift = np.where([each.column.startswith("tool") for each in placed], amounts, 0.0)
     if np.linalg.norm(shift) <= PLAUSIBLE:
         return robot, DEPENDENT
     return corrected(robot, placed, shift), ROUGHLY * DEPENDENT
@@ -341,6 +341,7 @@ class Calibration(ByValue, Displayed):
         deviation was stated
     repeated : how many lines read a point again at a pose of another line; their mean counts once
     rms_before_mm, rms_after_mm : of the differences to the measurements
+    turned_before_deg, turned_after_deg : the same of orientations, of the turn; None where none were measured
     scatter : root mean square of what remains, in standard deviations, per degree of freedom: near 1 if table and
         stated deviations are right; 1 if the deviation was estimated
     more : what it takes to estimate more entries; None if all are estimated
@@ -369,6 +370,8 @@ class Calibration(ByValue, Displayed):
     rms_after_mm: float
     scatter: float
     more: Finding | None
+    turned_before_deg: float | None = None
+    turned_after_deg: float | None = None
     repeated: int = 0
     freedom: int = FEW_SPARE
     wrong: Finding | None = None
@@ -477,7 +480,7 @@ def calibrate(
     measurements: Sequence[Measurement],
     fixed: Sequence[FixedName] = (),
 ) -> Calibration:
-    """Estimate corrections to a robot's table, base and tool from positions of its flange or tool.
+    """Estimate corrections to a robot's table, base and tool from positions and orientations of its flange or tool.
 
     Of lengths, lengths and joint offsets, or all entries, the fullest set is estimated that the positions determine.
 
@@ -521,13 +524,21 @@ def _result(robot: Robot, level: Level, observations: PointObservations, found: 
         singular_values=level.subspace.singular_values,
         coordinates=len(observations),
         poses=observations.poses,
-        rms_before_mm=float(np.sqrt(np.mean((found.before * deviation) ** 2))),
-        rms_after_mm=float(np.sqrt(np.mean((found.after * deviation) ** 2))),
+        rms_before_mm=observations.rms_mm(found.before * deviation),
+        rms_after_mm=observations.rms_mm(found.after * deviation),
+        turned_before_deg=_turned(observations, found.before * deviation),
+        turned_after_deg=_turned(observations, found.after * deviation),
         scatter=_scatter(found, beside),
         freedom=found.freedom,
         more=level.more,
         idle=tuple(each for each in observations.things() if not each.numbers),
     )
+
+
+def _turned(observations: PointObservations, off: Reals) -> float | None:
+    """Root mean square of turns, deg, among differences off (n,) in mm and mrad."""
+    own = off[~observations.is_length].reshape(-1, 3) / MM
+    return float(np.degrees(np.sqrt((own**2).sum(axis=1).mean()))) if len(own) else None
 
 
 def _beside(robot: Robot, level: Level, observations: PointObservations, found: Fit) -> Reals:
@@ -615,7 +626,7 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     level = choose_level(robot, observations)
     table = _fitted(robot, level, observations)
     if not observations.deviation_known:
-        observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+        observations = _rescaled(observations, table)
         table = fit(robot, level.kept, observations)
     here = corrected(robot, table.kept, table.amounts)
     unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
@@ -635,14 +646,24 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
     finer = observations
     if not observations.deviation_known:  # that of the table alone would let the prior pull coefficients towards 0
         if for_file.terms:
-            observations = observations.with_deviation(observations.deviation_mm[0] * table.scatter)
+            observations = _rescaled(observations, table)
             table = fit(robot, level.kept, observations, for_file.terms)
         if choice.terms:
-            finer = finer.with_deviation(finer.deviation_mm[0] * whole.scatter)
+            finer = _rescaled(finer, whole)
             whole = fit(robot, level.kept, finer, choice.terms)
     if not choice.terms:
         finer, whole = observations, table
     return _Model(observations, finer, level, table, choice, for_file, whole)
+
+
+def _rescaled(observations: PointObservations, found: Fit) -> PointObservations:
+    """Observations with standard deviations by what a fit leaves, of coordinates and of orientations."""
+    lengths, deviation = observations.is_length, observations.deviation_mm.copy()
+    for own in (lengths, ~lengths):
+        left = found.rest[own[found.last]]
+        share = found.freedom * len(left) / len(found.rest)
+        deviation[own] *= np.sqrt(left @ left / share) if len(left) else 1.0
+    return observations.with_deviation(deviation)
 
 
 def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
@@ -666,11 +687,12 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
         raise _explained(robot, every, error) from None
     for _ in range(OUTLIER_ROUNDS):
         off = _off_mm(robot, every, model, used)
-        again = _out_of(every, off, off[used[every.pose_of]]) <= 1.0
+        again = _out_of(every, off, used[every.pose_of]) <= 1.0
         if (again == used).all() or (~again).mean() > MAX_OUTLIER_SHARE:
             break
         used, model = again, _model(robot, every.take(again).merged(), free_ratios)
-    distances = np.sqrt(np.bincount(every.pose_of, weights=_off_mm(robot, every, model, used) ** 2))
+    off = _off_mm(robot, every, model, used) * every.is_length
+    distances = np.sqrt(np.bincount(every.pose_of, weights=off**2))
     observations, table = model.observations, _result(robot, model.level, model.observations, model.table)
     return replace(
         table,
@@ -729,7 +751,7 @@ def _mistakes_named(
     for swapped, faults, arm, seen in _likeliest_mistakes(robot, kept, observations):
         with suppress(CalibrationError):
             other = fit(arm, kept, seen, most_steps=NEAR_STEPS)
-            rms, plain = _rms(other.after * observations.deviation_mm), np.zeros(len(kept))
+            rms, plain = seen.rms_mm(other.after * observations.deviation_mm), np.zeros(len(kept))
             if rms <= min(most_mm, FAR_REST * whole_length_mm(robot)) and not _far_off(
                 arm, _estimates(arm, observations, other, plain, plain)
             ):
@@ -763,13 +785,9 @@ def _likeliest_mistakes(
 
     def left(arm: Robot, seen: PointObservations) -> float:
         amounts = places_at(arm, kept, seen)
-        return _rms(seen.predict(arm, kept, amounts[None])[0] - seen.values_mm)
+        return seen.rms_mm(seen.predict(arm, kept, amounts[None])[0] - seen.values_mm)
 
     return sorted(candidates, key=lambda each: left(*each[2:]))[:LIKELIEST]
-
-
-def _rms(values: Reals) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _explained(robot: Robot, every: PointObservations, error: CalibrationError) -> CalibrationError:
@@ -805,7 +823,7 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         if len(found.after) <= 2 * len(found.kept):
             return all_used
         off = found.after * observations.deviation_mm
-        out = _out_of(observations, off, off)
+        out = _out_of(observations, off, np.ones(len(off), dtype=bool))
         far = out > max(1.0, TOGETHER * out.max())
         if not far.any():
             return used
@@ -815,12 +833,14 @@ def _without_outliers(robot: Robot, every: PointObservations) -> Flags:
         observations = observations.take(~far)
 
 
-def _out_of(observations: PointObservations, off_mm: Reals, usual_mm: Reals) -> Reals:
-    """By how many times (P,) points are farther off than noise goes; its deviation by the median of ``usual_mm``, which
-    knows of no outliers, or as stated if that is more."""
-    deviation = MEDIAN_TO_DEVIATION * float(np.median(np.abs(usual_mm)))
-    stated = observations.deviation_mm if observations.deviation_known else 0.0
-    noise = np.maximum(max(deviation, ROUNDING), stated)
+def _out_of(observations: PointObservations, off_mm: Reals, usual: Flags) -> Reals:
+    """By how many times (P,) points are farther off than noise goes; its deviation by the median of ``usual`` (n,)
+    values, which knows of no outliers, of coordinates and of orientations, or as stated if that is more."""
+    noise, lengths = np.full(len(off_mm), ROUNDING), observations.is_length
+    for own in (lengths, ~lengths) if observations.oriented else (lengths,):
+        noise[own] = max(MEDIAN_TO_DEVIATION * float(np.median(np.abs(off_mm[own & usual]))), ROUNDING)
+    if observations.deviation_known:
+        noise = np.maximum(noise, observations.deviation_mm)
     out = np.zeros(len(observations.row_values))
     np.maximum.at(out, observations.pose_of, np.abs(off_mm) / (FAR_OUT * noise))
     return out
@@ -879,7 +899,7 @@ def _beyond(robot: Robot, observations: PointObservations, found: Fit) -> Beyond
         errors=JointErrors(robot, found.terms, found.coefficients),
         terms=_term_estimates(found, error),
         estimates=_estimates(robot, observations, found, error, quantiles),
-        rms_mm=float(np.sqrt(np.mean((found.after * observations.deviation_mm) ** 2))),
+        rms_mm=observations.rms_mm(found.after * observations.deviation_mm),
         deviation_mm=_deviation(observations, found),
         left_out=_left_out(observations, found),
     )

@@ -219,8 +219,9 @@ def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> Held
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
     counts = len(found.amounts), len(found.coefficients)
     linear = _Linear(found.J, found.J @ unknowns - found.rest, counts, poses[pose_of], parts)
+    lengths = found.deviation_mm * observations.is_length[found.last]
     near, far = (
-        np.sqrt(np.bincount(pose_of, weights=(errors * found.deviation_mm) ** 2))
+        np.sqrt(np.bincount(pose_of, weights=(errors * lengths) ** 2))
         for errors in linear.errors(list(range(len(unknowns))))
     )
     return HeldOutErrors(float(near.mean()), float(near.max()), float(far.mean()), float(far.max()))

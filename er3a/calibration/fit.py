@@ -30,7 +30,7 @@ from er3a.calibration.parameters import (
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import Entry
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import rpy_of
+from er3a.geometry.transforms import nearest_rotations, rpy_of, transposed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -88,9 +88,11 @@ def jacobian(
 
     Returns
     -------
-    J : (n, p), mm per m or rad
+    J : (n, p), mm per m or rad, and mrad of orientations; small turns count, however far these are from measured ones
     """
     count = len(parameters)
+    if observations.oriented:
+        observations = observations.agreeing(corrected(robot, parameters, np.broadcast_to(amounts, count)))
     steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
     values = observations.predict(robot, parameters, steps)
     slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
@@ -156,7 +158,7 @@ def left_of_touched(robot: Robot, observations: PointObservations) -> float:
         return 0.0
     off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
     touching = observations.touched[observations.pose_of] >= 0
-    taken = jacobian(robot, placements_of(observations.free), observations)[touching]
+    taken = jacobian(robot, observations.placements, observations)[touching]
     taken /= observations.deviation_mm[touching, None]
     off = off[touching] - taken @ np.linalg.lstsq(taken, off[touching], rcond=None)[0]
     return float(np.sqrt(np.mean(off**2)))
@@ -192,7 +194,7 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
 
 def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObservations) -> list[Entry]:
     """Lengths in whose place others move the points alike: such a one may stay as it is while all shrink to a point."""
-    every = [*placements_of(observations.free), *parameters_of(robot, "all_entries")]
+    every = [*observations.placements, *parameters_of(robot, "all_entries")]
     J = jacobian(robot, every, observations.as_coordinates())
     sizes = np.linalg.norm(J, axis=0)
     J /= np.maximum(sizes, 1e-300)
@@ -380,16 +382,17 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
 
     Returns
     -------
-    amounts : as of :func:`placements_of`, m and rad, 0 where too few points say something
+    amounts : of the observations' placements, m and rad, 0 where too few points say something
     used : (P,), points without those that are far out, by the median of all
     """
-    whole = np.flatnonzero(observations.seen.all(axis=1) & (observations.touched < 0))
+    whole = np.flatnonzero(observations.seen[:, :3].all(axis=1) & (observations.touched < 0))
     used, own = np.ones(len(observations.seen), dtype=bool), np.ones(len(whole), dtype=bool)
     S, t, inverse = np.eye(4), np.zeros(3), np.linalg.inv(robot.base)
-    x, m, R = observations.positions(robot)[whole], np.zeros((len(whole), 3)), observations.turns(robot)[whole]
+    x, R = observations.positions(robot)[whole], observations.turns(robot)
+    R, turned = np.where(observations.on_tool[:, None, None], R, 0.0)[whole], robot.base[:3, :3].T @ R  # of flange: 0
     values = np.zeros(observations.seen.shape)
     values[observations.seen] = observations.values_mm / MM
-    x, m = (xyz @ inverse[:3, :3].T + inverse[:3, 3] for xyz in (x, values[whole]))
+    x, m = (xyz @ inverse[:3, :3].T + inverse[:3, 3] for xyz in (x, values[whole, :3]))
     R = inverse[:3, :3] @ R
     for _ in range(OUTLIER_ROUNDS):
         if own.sum() < MIN_ALIGNED:
@@ -398,8 +401,11 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
         off = np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m, axis=1)
         own = off <= FAR_OUT * MEDIAN_TO_DEVIATION * np.median(off)
     used[whole] = own
-    parts = {"base": [*S[:3, 3], *rpy_of(S)], "tool": t.tolist()}
-    return np.array([amount for name in observations.free for amount in parts[name]]), used
+    own = observations.seen[:, 3:].any(axis=1) & observations.on_tool
+    off = transposed(robot.base[:3, :3] @ S[:3, :3] @ turned @ robot.tool[:3, :3]) @ observations.orientations
+    of_tool = rpy_of(nearest_rotations(off[own].sum(axis=0))) if own.any() else np.zeros(3)
+    amounts = dict(zip(placements_of(("base", "tool"), oriented=True), [*S[:3, 3], *rpy_of(S), *t, *of_tool]))
+    return np.array([amounts[each] for each in observations.placements]), used
 
 
 def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
@@ -415,9 +421,9 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
         return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
     rows = np.concatenate([np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9), -eye, -R], axis=2).reshape(-1, 15)
-    U, _, V = np.linalg.svd(np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3).T)
+    inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
     found = []
-    for turn in (S[:3, :3], U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V):
+    for turn in (S[:3, :3], nearest_rotations(inverse.T)):
         S = np.eye(4)
         S[:3, :3] = turn
         for _ in range(TURNS):
@@ -442,7 +448,7 @@ def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservatio
     """
     amounts, none = np.zeros(len(kept)), np.zeros(len(kept))
     rough, used = rough_places(robot, observations)
-    by_name = dict(zip(placements_of(observations.free), rough.tolist()))
+    by_name = dict(zip(observations.placements, rough.tolist()))
     placing = [k for k, each in enumerate(kept) if each in by_name]
     amounts[placing] = [by_name[kept[k]] for k in placing]
     seen = observations.take(used)
@@ -539,9 +545,9 @@ def _fit(
             return Fit(
                 kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last
             )
-    rest_mm = float(np.sqrt(np.mean((rest[:n] * deviation) ** 2)))
+    rest_mm = observations.rms_mm(rest[:n] * deviation)
     raise CalibrationError(
         fact("no_correction_fits", steps=most_steps, rest_mm=rest_mm),
         f"no corrections make the table fit: after {most_steps} steps the positions are still {rest_mm:.3g} mm off. "
-        "The table has a gross fault or is another arm's; er3a.diagnose names single faults",
+        "The table has a gross fault or is another arm's; er3a confirm names what is other",
     )

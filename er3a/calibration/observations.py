@@ -12,14 +12,15 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import PARALLEL_RAD, placed
+from er3a.calibration.parameters import PARALLEL_RAD, placed, placements_of
 from er3a.comparison.entries import Entry, shifted
 from er3a.errors import InputError
+from er3a.geometry.transforms import log_rotation, nearest_rotations, transposed
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import COORDINATES, MM, Pose
+from er3a.references.quantities import COORDINATES, MM, Pose, Rotation3
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 
@@ -46,6 +47,7 @@ class Measurement:
     deviation_mm : standard deviation of each coordinate; None if it is unknown
     place, plane : the name of a fixed point (a ball in a socket, a tip) or of a plane that was touched there, of which
         nobody knows where it is; no coordinate is measured then
+    turn : rotation of flange or tool in the base frame, rows; None if it wasn't measured
     """
 
     row: int
@@ -55,6 +57,7 @@ class Measurement:
     deviation_mm: float | None = None
     place: str | None = None
     plane: str | None = None
+    turn: Rotation3 | None = None
 
     @property
     def touched(self) -> tuple[TouchKind, str] | None:
@@ -87,14 +90,18 @@ class Touched:
 
 @dataclass(frozen=True, eq=False)
 class PointObservations:
-    """Measured coordinates of points that the flange carries.
+    """Measured coordinates of points that the flange carries, and orientations.
+
+    Of an orientation it is observed by how much the model's is turned from the measured one: a rotation vector, in
+    mrad, which counts as coordinates in mm do, being what a lever of a metre moves.
 
     Attributes
     ----------
     row_values : (P, m), rad or m, what the rows of the table move by
     on_tool : (P,) bool, whether the tool's point was measured
-    seen : (P, 3) bool, the n coordinates that were measured
+    seen : (P, 6) bool, the n values that were measured: three coordinates, three of the rotation vector
     values_mm, deviation_mm : (n,), what was measured, and its standard deviation (1 if unknown)
+    orientations : (P, 3, 3), in the base frame; identity where none was measured
     deviation_known : whether the deviations were stated
     lines : (P,), of the file
     free : what is placed by the measurements, too
@@ -113,11 +120,36 @@ class PointObservations:
     lines: Integers
     free: tuple[PlacementName, ...]
     touched: Integers
+    orientations: Reals
     kinds: tuple[TouchKind, ...] = ()
     names: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.values_mm)
+
+    @property
+    def is_length(self) -> Flags:
+        """(n,), which of the values are coordinates, and no parts of orientations."""
+        return np.nonzero(self.seen)[1] < 3
+
+    @property
+    def oriented(self) -> bool:
+        """Whether orientations were measured."""
+        return bool(self.seen[:, 3:].any())
+
+    @property
+    def placements(self) -> tuple[Entry, ...]:
+        """The parameters of base and tool, as far as they are free."""
+        return placements_of(self.free, self.oriented)
+
+    def rms_mm(self, off: Reals) -> float:
+        """Root mean square of the coordinates among differences.
+
+        Parameters
+        ----------
+        off : (n,), mm and mrad
+        """
+        return float(np.sqrt(np.mean(off[self.is_length] ** 2)))
 
     def groups(self) -> list[tuple[TouchKind, Integers]]:
         """Places and planes that are touched.
@@ -182,17 +214,17 @@ class PointObservations:
 
         Parameters
         ----------
-        shift : (P, 3), m, base frame
+        shift : (P, 6), m and rad, base frame
         around : (P, 3), m, where the points are
 
         Returns
         -------
-        change : (P, 3), m, columns as of :meth:`relative`
+        change : (P, 6), m and rad, columns as of :meth:`relative`
         """
         found = shift.copy()
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
-            own = found[rows] if kind == "place" else np.einsum("pi,pi->p", along, found[rows])[:, None]
+            own = found[rows] if kind == "place" else np.einsum("pi,pi->p", along, found[rows, :3])[:, None]
             found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
         return found
 
@@ -224,7 +256,7 @@ class PointObservations:
         last = [alone]
         for kind, rows in self.groups():
             basis = self._dropping(kind, rows, around)[1]
-            for every in at[rows].T:
+            for every in at[rows, :3].T:
                 own = every[every >= 0]
                 known = _innovations(basis[every >= 0] / self.deviation_mm[own, None])
                 first = sum(len(part) for part in last)
@@ -256,7 +288,7 @@ class PointObservations:
 
         Returns
         -------
-        values : (H, n), mm
+        values : (H, n), mm, and mrad from the measured orientations
         """
         own, base_inverse, points = tables_of(robot), np.linalg.inv(robot.base), self.points(robot)
         placing = np.array([not parameter.joint for parameter in parameters], dtype=bool)
@@ -266,15 +298,20 @@ class PointObservations:
             part = amounts[start : start + step]
             tables = shifted(own, parameters, part)
             T = frames_of(tables, robot, self.row_values)[:, :, -1]
-            S, shift = np.tile(np.eye(4), (len(part), 1, 1)), np.zeros((len(part), 3))
+            S, X = np.tile(np.eye(4), (2, len(part), 1, 1))
             for k in np.flatnonzero(part[:, placing].any(axis=1)):
-                S[k], shift[k] = placed(parameters, part[k])
+                S[k], X[k] = placed(parameters, part[k])
             world = robot.base @ S @ base_inverse
-            xyz = points + self.on_tool[:, None] * shift[:, None]
+            xyz = points + self.on_tool[:, None] * X[:, None, :3, 3]
             xyz = np.einsum("hpij,hpj->hpi", T[..., :3, :3], xyz) + T[..., :3, 3]
             xyz = xyz @ world[:, :3, :3].swapaxes(1, 2) + world[:, None, :3, 3]
-            seen = [self.relative(each) for each in xyz] if self.kinds else xyz
-            values[start : start + step] = MM * np.asarray(seen)[:, self.seen]
+            seen = np.zeros((*xyz.shape[:2], 6))
+            seen[..., :3] = [self.relative(each) for each in xyz] if self.kinds else xyz
+            if self.oriented:
+                tool = np.where(self.on_tool[:, None, None], (robot.tool[:3, :3] @ X[:, :3, :3])[:, None], np.eye(3))
+                turned = world[:, None, :3, :3] @ T[..., :3, :3] @ tool
+                seen[..., 3:] = log_rotation(turned @ transposed(self.orientations))
+            values[start : start + step] = MM * seen[:, self.seen]
         return values
 
     def positions(self, robot: Robot) -> Reals:
@@ -293,7 +330,21 @@ class PointObservations:
         return found
 
     def turns(self, robot: Robot) -> Reals:
-        """How a robot's table turns the tool.
+        """How a robot's table turns the flange.
+
+        Parameters
+        ----------
+        robot : with any base
+
+        Returns
+        -------
+        R : (P, 3, 3)
+        """
+        found: Reals = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1, :3, :3]
+        return found
+
+    def agreeing(self, robot: Robot) -> PointObservations:
+        """Observations with the orientations that a robot has, about which small turns are what is observed.
 
         Parameters
         ----------
@@ -301,10 +352,10 @@ class PointObservations:
 
         Returns
         -------
-        R : (P, 3, 3); 0 where the flange's point was measured, since no tool moves it
+        observations : the same where no orientations were measured
         """
-        T = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1]
-        return np.where(self.on_tool[:, None, None], T[:, :3, :3], 0.0)
+        tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
+        return replace(self, orientations=self.turns(robot) @ tool) if self.oriented else self
 
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame.
@@ -333,6 +384,7 @@ class PointObservations:
         T = frames_of(tables_of(robot), robot, self.row_values)[0]
         ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
         shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
+        shift = np.pad(shift, ((0, 0), (0, 3)))  # what slides turns nothing
         found: Reals = MM * self.relative_shift(shift, self.positions(robot))[self.seen]
         return found
 
@@ -357,6 +409,7 @@ class PointObservations:
             deviation_mm=self.deviation_mm[own],
             lines=self.lines[used],
             touched=self.touched[used],
+            orientations=self.orientations[used],
         )
 
     @property
@@ -402,6 +455,7 @@ class PointObservations:
             deviation_mm=np.sqrt(readings @ variance / counts)[seen],
             lines=self.lines[own],
             touched=self.touched[own],
+            orientations=nearest_rotations((readings @ self.orientations.reshape(-1, 9)).reshape(-1, 3, 3)),
         )
 
     def shifted(self, amounts: Reals) -> PointObservations:
@@ -417,12 +471,12 @@ class PointObservations:
         """
         return replace(self, row_values=self.row_values + amounts)
 
-    def with_deviation(self, deviation_mm: float) -> PointObservations:
-        """Observations with one standard deviation for all, estimated from what a fit leaves.
+    def with_deviation(self, deviation_mm: Reals | float) -> PointObservations:
+        """Observations with other standard deviations, estimated from what a fit leaves.
 
         Parameters
         ----------
-        deviation_mm : of each coordinate, mm
+        deviation_mm : of each value (n,), or of all, mm and mrad
 
         Returns
         -------
@@ -442,9 +496,9 @@ class PointObservations:
         observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any; values are 0
         """
         points = np.unique(self.on_tool)
-        every = self._at(robot, np.repeat(np.array(spread(robot)), len(points), axis=0), np.tile(points, RICH_POSES))
-        seen = np.broadcast_to(self.seen[self.touched < 0].any(axis=0), every.seen.shape)
-        return replace(every, seen=seen, values_mm=np.zeros(seen.sum()), deviation_mm=every.deviation_mm[: seen.sum()])
+        x = row_values(robot, meant(robot, np.repeat(np.array(spread(robot)), len(points), axis=0)))
+        measured = np.asarray(self.seen[self.touched < 0].any(axis=0))
+        return self._coordinates(x, np.tile(points, RICH_POSES), measured).agreeing(robot)
 
     def as_coordinates(self) -> PointObservations:
         """The same points as if their coordinates were measured.
@@ -453,22 +507,23 @@ class PointObservations:
         -------
         observations : P points, nothing touched
         """
-        return self._coordinates(self.row_values, self.on_tool)
+        return self._coordinates(self.row_values, self.on_tool, np.arange(6) < 3)
 
-    def _at(self, robot: Robot, poses: Reals, on_tool: Flags) -> PointObservations:
-        return self._coordinates(row_values(robot, meant(robot, poses)), on_tool)
-
-    def _coordinates(self, row_values: Reals, on_tool: Flags) -> PointObservations:
-        count = len(row_values)
+    def _coordinates(self, row_values: Reals, on_tool: Flags, measured: Flags) -> PointObservations:
+        """Values that are 0, of those of the six that are measured of each point."""
+        count, lengths = len(row_values), self.is_length
+        seen = np.tile(measured, (count, 1))
+        usual = [np.median(self.deviation_mm[own]) if own.any() else 1.0 for own in (lengths, ~lengths)]
         return replace(
             self,
             row_values=row_values,
             on_tool=on_tool,
-            seen=np.ones((count, 3), dtype=bool),
-            values_mm=np.zeros(3 * count),
-            deviation_mm=np.full(3 * count, np.median(self.deviation_mm)),
+            seen=seen,
+            values_mm=np.zeros(seen.sum()),
+            deviation_mm=np.broadcast_to(np.repeat(usual, 3), seen.shape)[seen],
             lines=np.zeros(count, dtype=np.int64),
             touched=np.full(count, -1),
+            orientations=np.tile(np.eye(3), (count, 1, 1)),
         )
 
 
@@ -522,7 +577,9 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
     for k, each in enumerate(measurements):
         if each.touched:
             xyz[k] = 0.0 if each.place else (0.0, np.nan, np.nan)
-    seen = np.isfinite(xyz)
+    turned = np.array([each.turn is not None for each in measurements], dtype=bool)
+    values = np.hstack([xyz, np.where(turned[:, None], np.zeros((1, 3)), np.nan)])
+    seen = np.isfinite(values)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
     deviation = np.array([each.deviation_mm if known else 1.0 for each in measurements], dtype=float)
@@ -531,7 +588,7 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
         row_values=row_values(robot, meant(robot, poses)),
         on_tool=on_tool,
         seen=seen,
-        values_mm=xyz[seen],
+        values_mm=values[seen],
         deviation_mm=np.broadcast_to(deviation[:, None], seen.shape)[seen],
         deviation_known=known,
         lines=np.array([each.row for each in measurements], dtype=np.int64),
@@ -539,6 +596,7 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
             name for name in PLACEMENTS if name not in fixed and (on_tool if name == "tool" else touched < 0).any()
         ),
         touched=touched,
+        orientations=np.array([each.turn or np.eye(3) for each in measurements], dtype=float).reshape(-1, 3, 3),
         kinds=tuple(kind for kind, _ in numbers),
         names=tuple(name for _, name in numbers),
     )

@@ -1,7 +1,8 @@
 """The numbers that a calibration may correct: a table's entries, and where base and tool are.
 
 Base and tool are corrected behind what the robot's file says of them: the base by a shift and a turn in its own frame,
-``base S`` with ``S = T(x, y, z) Rz(rz) Ry(ry) Rx(rx)``, the tool by a shift of its point in the flange's frame.
+``base S`` with ``S = T(x, y, z) Rz(rz) Ry(ry) Rx(rx)``, the tool by a shift of its point in the flange's frame, and,
+where orientations were measured, by a turn about its own axes in the same order.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.calibration.outcomes import LevelName, PlacementName
-from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, Entry, EntryUnit, shifted
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, TOOL_TURNS, Entry, EntryUnit, shifted
+from er3a.geometry.transforms import posed, rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM
@@ -51,18 +52,20 @@ def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
     return (*lengths, *offsets, *turns, *hayati, *others)
 
 
-def placements_of(names: Sequence[PlacementName]) -> tuple[Entry, ...]:
+def placements_of(names: Sequence[PlacementName], oriented: bool = False) -> tuple[Entry, ...]:
     """The parameters of base and tool; they are preferred to table entries with the same effect.
 
     Parameters
     ----------
     names : ``base``, ``tool``, both or none
+    oriented : whether the tool's orientation was measured, too
 
     Returns
     -------
-    entries : six of the base, three of the tool
+    entries : six of the base, three of the tool, or six
     """
-    columns = (BASE_COLUMNS if "base" in names else ()) + (TOOL_COLUMNS if "tool" in names else ())
+    of_tool = (*TOOL_COLUMNS, *TOOL_TURNS) if oriented else TOOL_COLUMNS
+    columns = (BASE_COLUMNS if "base" in names else ()) + (of_tool if "tool" in names else ())
     return tuple(Entry(column) for column in columns)
 
 
@@ -79,7 +82,7 @@ def all_parameters(robot: Robot) -> tuple[Entry, ...]:
     """
     joints = range(1, robot.rows + 1)
     table = (Entry(column, j) for column in ("a", "alpha", "beta", "d", "offset") for j in joints)
-    return (*table, *placements_of(("base", "tool")))
+    return (*table, *placements_of(("base", "tool"), oriented=True))
 
 
 def parallel_pairs(robot: Robot) -> list[tuple[int, tuple[int, int]]]:
@@ -112,12 +115,15 @@ def placed(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
 
     Returns
     -------
-    S, shift : (4, 4), m, behind the robot's base, and (3,), m, of the tool's point in the flange's frame
+    S, X : (4, 4), m, behind the robot's base; and of the tool, its point's shift in the flange's frame, and its turn
     """
     by_column = {parameter.column: amount for parameter, amount in zip(parameters, amounts) if not parameter.joint}
-    x, y, z, rx, ry, rz = (by_column.get(column, 0.0) for column in BASE_COLUMNS)
-    S = translation(x, y, z) @ rot_z(rz) @ rot_y(ry) @ rot_x(rx)
-    return S, np.array([by_column.get(column, 0.0) for column in TOOL_COLUMNS])
+
+    def at(columns: Sequence[str]) -> Reals:
+        x, y, z, rx, ry, rz = (by_column.get(column, 0.0) for column in columns)
+        return translation(x, y, z) @ rot_z(rz) @ rot_y(ry) @ rot_x(rx)
+
+    return at(BASE_COLUMNS), at((*TOOL_COLUMNS, *TOOL_TURNS))
 
 
 WIDEST = 0.05
@@ -181,12 +187,12 @@ def corrected(robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Robo
 
     Returns
     -------
-    robot : its base is ``base S``, its tool's point is shifted in the flange's frame
+    robot : its base is ``base S``, its tool's point is shifted in the flange's frame, and the tool turned about it
     """
     found = robot_of(shifted(tables_of(robot), parameters, amounts[None]), 0, robot)
-    S, shift = placed(parameters, amounts)
+    S, X = placed(parameters, amounts)
     if any(parameter.column in BASE_COLUMNS for parameter in parameters):
         found = found.replace(base=robot.base @ S)
-    if shift.any():
-        found = found.replace(tool=translation(*shift) @ robot.tool)
+    if not np.array_equal(X, np.eye(4)):
+        found = found.replace(tool=posed(robot.tool[:3, :3] @ X[:3, :3], robot.tool[:3, 3] + X[:3, 3]))
     return found

@@ -152,17 +152,18 @@ def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
 
     Returns
     -------
-    effects : (P, m, 3), m per rad or m, in the base frame
+    effects : (P, m, 6), m and rad per rad or m, in the base frame
     """
     T = frames_of(tables_of(robot), robot, row_values)[0]
     return _moving(robot, T, np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3])
 
 
 def _moving(robot: Robot, T: Reals, p: Reals) -> Reals:
-    """How points p (P, 3) move with each row, (P, m, 3); frames T (P, m + 1, 4, 4)."""
+    """How points p (P, 3) move and turn with each row, (P, m, 6); frames T (P, m + 1, 4, 4)."""
     axis, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
-    turning = np.cross(axis, p[:, None] - origin)
-    found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], axis, turning)
+    sliding = np.concatenate([axis, np.zeros_like(axis)], axis=-1)
+    turning = np.concatenate([np.cross(axis, p[:, None] - origin), axis], axis=-1)
+    found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], sliding, turning)
     return found
 
 
@@ -295,7 +296,7 @@ class CorrectedModel(ByValue):
         seen = self._seen(measurements)
         found = np.full(seen.seen.shape, np.nan)
         found[seen.seen] = seen.predict(self.robot, (), np.zeros((1, 0)))[0] - seen.values_mm
-        return found
+        return found[:, :3]
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
         """How far the model is from measurements, over what was observed of each.

@@ -18,6 +18,7 @@ EntryUnit = Literal["mm", "deg", "deg/s", ""]
 LENGTHS = ("a", "d")
 BASE_COLUMNS = ("base_x", "base_y", "base_z", "base_rx", "base_ry", "base_rz")
 TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
+TOOL_TURNS = ("tool_rx", "tool_ry", "tool_rz")
 IN_MM = (*LENGTHS, *BASE_COLUMNS[:3], *TOOL_COLUMNS)
 SCALE_M, SCALE_RAD = 1e-3, float(np.radians(0.1))  # 0.1 deg moves a point 0.6 m away by a millimetre
 """Steps of lengths and angles that move a tool about as far: 1 mm, and 0.1 deg at half a metre."""
@@ -29,7 +30,8 @@ class Entry:
 
     Attributes
     ----------
-    column : of the table, or one of ``BASE_COLUMNS`` and ``TOOL_COLUMNS``, or ``scale``, a common factor of all lengths
+    column : of the table, or one of ``BASE_COLUMNS``, ``TOOL_COLUMNS``, ``TOOL_TURNS``, or ``scale``, a common factor
+        of all lengths
     joint : the row, from 1; 0 for base, tool and scale
     """
 
@@ -67,7 +69,7 @@ class Entry:
 
         Returns
         -------
-        value : in :attr:`unit`; 0 for the base, whose corrections come behind what the file says
+        value : in :attr:`unit`; 0 for the base and turns of the tool, whose corrections come behind what the file says
         """
         if self.joint:
             return round(float(getattr(robot, self.column)[self.joint - 1] * self.in_unit), 9)

@@ -16,8 +16,8 @@ import numpy as np
 
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, Start, State
-from er3a.confirmation.screen import Near, joined, nearest, nearest_rotations, plain, single_readings
-from er3a.geometry.transforms import inverted, posed
+from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
+from er3a.geometry.transforms import inverted, nearest_rotations, posed
 from er3a.numerics.arrays import Reals
 
 EXPLAINED = 4.0

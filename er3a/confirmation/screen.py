@@ -21,8 +21,9 @@ from itertools import combinations, product
 import numpy as np
 
 from er3a.confirmation.fit import Fitter, JointReading
+from er3a.confirmation.pairs import Pairs
 from er3a.finding import fact
-from er3a.geometry.transforms import inverted, posed, transposed
+from er3a.geometry.transforms import inverted, nearest_rotations, posed, transposed
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
@@ -115,6 +116,20 @@ def joined(first: JointReading, second: JointReading) -> JointReading:
     )
 
 
+def likeliest_form(robot: Robot, pairs: Pairs) -> str:
+    """The form of orientation, of those that the columns' names allow, by which a controller's poses come nearest.
+
+    Parameters
+    ----------
+    robot : whose joint values are taken as they are, with any base and tool
+
+    Returns
+    -------
+    form : an empty name without orientations
+    """
+    return nearest(Fitter(robot, pairs), [plain(robot)], pairs.forms[: pairs.named])[0].form
+
+
 def nearest(fitter: Fitter, readings: Sequence[JointReading], forms: Sequence[str]) -> list[Near]:
     """Ways of reading, the nearest first.
 
@@ -150,23 +165,6 @@ def _products(fitter: Fitter, readings: Sequence[JointReading], form: str) -> tu
 def _agreement(K: Reals) -> Reals:
     """The largest singular value of each (H, 9, 9), 1 if rotations agree."""
     found: Reals = np.sqrt(np.abs(np.linalg.eigvalsh(K @ transposed(K))[:, -1]))
-    return found
-
-
-def nearest_rotations(M: Reals) -> Reals:
-    """The rotations nearest to matrices.
-
-    Parameters
-    ----------
-    M : (..., 3, 3)
-
-    Returns
-    -------
-    R : (..., 3, 3)
-    """
-    U, _, Vt = np.linalg.svd(M)
-    U[..., -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
-    found: Reals = U @ Vt
     return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 
 from er3a.errors import InputError
-from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, posed, transform
+from er3a.geometry.transforms import ORTHONORMAL_TOLERANCE, exp_rotation, nearest_rotations, posed, transform
 from er3a.numerics.arrays import Reals
 
 POSITION = ("x_mm", "y_mm", "z_mm")
@@ -107,8 +107,7 @@ def rotations(form: str, values: Any, tolerance: float = ORTHONORMAL_TOLERANCE) 
     _refuse(~(off <= tolerance), "the matrix is not a rotation: R R^T differs from 1 by {:.3g}", off, remedy)
     mirrored = np.linalg.det(R)
     _refuse(mirrored < 0, "the matrix is left-handed (its determinant is {:.0f})", mirrored, "Change one axis's sign")
-    U, _, Vt = np.linalg.svd(R)
-    return np.asarray(U @ Vt)
+    return nearest_rotations(R)
 
 
 def poses_of(

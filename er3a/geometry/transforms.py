@@ -165,6 +165,23 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     return angle
 
 
+def nearest_rotations(M: Reals) -> Reals:
+    """The rotations nearest to matrices in the sum of squares, by singular values.
+
+    Parameters
+    ----------
+    M : (..., 3, 3)
+
+    Returns
+    -------
+    R : (..., 3, 3), with determinant 1
+    """
+    U, _, Vt = np.linalg.svd(M)
+    U[..., -1] *= np.sign(np.linalg.det(U @ Vt))[..., None]
+    R: Reals = U @ Vt
+    return R
+
+
 SMALL_TURN = 1e-4  # rad; below, series replace quotients of vanishing numbers
 
 

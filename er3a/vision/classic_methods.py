@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.geometry.transforms import inverted, log_rotation, posed
+from er3a.geometry.transforms import inverted, log_rotation, nearest_rotations, posed
 from er3a.numerics.arrays import Reals
 
 Unknowns = tuple[Reals, Reals]
@@ -49,7 +49,7 @@ def mean_pose(T: Reals) -> Reals:
     -------
     mean : (..., 4, 4), m
     """
-    return posed(_nearest_rotation(T[..., :3, :3].mean(axis=-3)), T[..., :3, 3].mean(axis=-2))
+    return posed(nearest_rotations(T[..., :3, :3].mean(axis=-3)), T[..., :3, 3].mean(axis=-2))
 
 
 def park(F: Reals, B: Reals) -> Unknowns:
@@ -70,7 +70,7 @@ def park(F: Reals, B: Reals) -> Unknowns:
     """
     A, C = motions(F, B)
     alpha, beta = log_rotation(A[..., :3, :3]), log_rotation(C[..., :3, :3])
-    R = _nearest_rotation(np.einsum("...pi,...pj->...ij", alpha, beta))
+    R = nearest_rotations(np.einsum("...pi,...pj->...ij", alpha, beta))
     # (R_A - 1) t = R t_C - t_A, in the least-squares sense
     left = A[..., :3, :3] - np.eye(3)
     right = np.einsum("...ij,...pj->...pi", R, C[..., :3, 3]) - A[..., :3, 3]
@@ -108,11 +108,4 @@ def shah(F: Reals, B: Reals) -> Unknowns:
 
 def _signed(M: Reals) -> Reals:
     """The rotation nearest to a matrix that is known up to its sign."""
-    return _nearest_rotation(M * np.sign(np.linalg.det(M)))
-
-
-def _nearest_rotation(M: Reals) -> Reals:
-    U, _, Vt = np.linalg.svd(M)
-    U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
-    R: Reals = U @ Vt
-    return R
+    return nearest_rotations(M * np.sign(np.linalg.det(M)))

@@ -350,8 +350,10 @@ def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("convert", [lambda q: q[:, [0, 1, 2, 3, 5, 4]], lambda q: q * [1, 1, 1, 1, -1, 1]])
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize(
+    ("convert", "known"),
+    [(lambda q: q[:, [0, 1, 2, 3, 5, 4]], True), (lambda q: q * [1, 1, 1, 1, -1, 1], False)],
+)
 def test_swapped_columns_and_a_joints_sign_are_named(convert, known, random):
     tool = np.eye(4)
     tool[:3, 3] = 0.05, 0.02, 0.1

@@ -80,6 +80,7 @@ def test_what_is_inside_a_closed_surface_overlaps(arm: Robot) -> None:
             assert bodies.min_distance(q[None])[0][0] == pytest.approx(-0.2, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_move_that_is_proven_free_is_free_between_its_ends(arm: Robot) -> None:
     bodies, random = Bodies(arm, None), np.random.default_rng(8)
     states = []

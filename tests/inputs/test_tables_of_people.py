@@ -183,7 +183,7 @@ ROWS = st.tuples(LENGTHS, st.sampled_from([0, 90, -90, 180, 60]), LENGTHS, st.sa
 
 
 @pytest.mark.long
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     rows=st.lists(ROWS, min_size=2, max_size=7),
     form=st.sampled_from(FORMS),

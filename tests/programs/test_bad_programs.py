@@ -160,7 +160,7 @@ def refused(path):
 
 
 @pytest.mark.long
-@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_programs_are_read_or_refused_clearly(data, tmp_path):
     seed = data.draw(st.sampled_from(SEEDS))
@@ -175,7 +175,7 @@ def test_damaged_programs_are_read_or_refused_clearly(data, tmp_path):
     assert error is None or (error.file == str(path) and "\n" not in str(error))
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=300), suffix=st.sampled_from([".src", ".script", ".pgm", ".XPL", ".csv", ".txt"]))
 def test_any_bytes_are_read_or_refused_clearly(content, suffix, tmp_path):
     path = tmp_path / f"any{suffix}"

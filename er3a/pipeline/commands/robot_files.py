@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -128,21 +129,27 @@ def _check_options(output: Path | None, words: str) -> None:
 
 
 def _measured(path: Path, arm: Robot) -> Sequence[Measurement]:
-    """Measured positions; of another table than er3a's own, those of the controller's poses in it."""
+    """Measured positions; of another table than er3a's own, the controller's poses in it, with orientations."""
     from er3a.calibration.observations import Measurement
     from er3a.confirmation.poses import read_pairs
+    from er3a.confirmation.screen import likeliest_form
     from er3a.files.by_name import load_measurements
     from er3a.files.csv_file import read_header
     from er3a.files.units import JOINT_COLUMN
+    from er3a.references.quantities import MM
     from er3a.robots.joint_limits import shown
 
     rows: Sequence[Measurement]
-    if any(map(JOINT_COLUMN.fullmatch, read_header(path))):
+    header = read_header(path)
+    if "point" in header and any(map(JOINT_COLUMN.fullmatch, header)):
         rows = load_measurements(path, arm)
     else:
         pairs = read_pairs(path, arm)
-        values = zip(pairs.lines.tolist(), shown(arm, pairs.q).tolist(), (1000 * pairs.xyz).tolist())
+        values = zip(pairs.lines.tolist(), shown(arm, pairs.q).tolist(), (MM * pairs.xyz).tolist())
         rows = [Measurement(line, tuple(q), "tool", (xyz[0], xyz[1], xyz[2])) for line, q, xyz in values]
+        if pairs.turns:
+            turns = pairs.turns[likeliest_form(arm, pairs)].tolist()
+            rows = [replace(row, turn=R) for row, R in zip(rows, turns)]
     return rows
 
 
@@ -185,7 +192,7 @@ def calibrate(
     The whole model goes to NAME_model.json, for er3a.load_calibration in Python. The robot file has the table that is
     best without such errors, and ratios and couplings as its coupling.
 
-    Poses that a controller shows can be given too, as er3a confirm reads them; their positions count. They repeat the
+    Poses that a controller shows can be given too, as er3a confirm reads them, with orientations. They repeat the
     controller's model, so er3a confirm answers first what is between both.
 
     Exit code 1 if measurements and table don't fit (what remains or is corrected is far beyond errors of arms and of

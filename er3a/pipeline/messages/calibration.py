@@ -63,6 +63,7 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         ),
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
         + scatter,
+        *_turned_line(found),
         *_entry_lines(found.estimates),
         *(f"not estimated: {say(reason)}" for reason in found.held),
         *(
@@ -90,6 +91,12 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines.append(f"to estimate more: {say(found.more)}")
     lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
+
+
+def _turned_line(found: Calibration) -> list[str]:
+    if found.turned_before_deg is None:
+        return []
+    return [f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"]
 
 
 def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
@@ -340,6 +347,8 @@ def calibration_record(
         "wrong": say(found.wrong) if found.wrong else None,
         "rms_before_mm": found.rms_before_mm,
         "rms_after_mm": found.rms_after_mm,
+        "turned_before_deg": found.turned_before_deg,
+        "turned_after_deg": found.turned_after_deg,
         "scatter": found.scatter,
         "standard_deviation_mm": found.deviation_mm,
         "fits": found.fits,

@@ -72,8 +72,8 @@ TEXTS = texts(
         "confirm.family": "another arm, maybe of the same family: compare names and drawings; --output corrected.yaml",
         "confirm.nearest": "the corrected table is that of {name}",
         "confirm.small": (
-            "{count} small corrections, as a factory's calibration makes; the largest: {largest:, }; --output "
-            "mine.yaml, of UR also er3a import-calibration"
+            "{count} small corrections, as of a factory; the largest: {largest:, }; --output mine.yaml; "
+            "UR: er3a import-calibration; intervals: er3a calibrate"
         ),
         "confirm.held_out": "at poses left out of the fit: {mm:.2g} mm root mean square",
         "confirm.open": "nearest: {nearest:; }",

@@ -88,7 +88,7 @@ TEXTS = texts(
         "no_positions": "there are no positions of single points to calibrate from",
         "no_correction_fits": (
             "no corrections fit: after {steps} steps {rest_mm:.3g} mm stay. Check whose table it is, and which joints "
-            "belong to which point; er3a.diagnose finds single faults"
+            "belong to which point; er3a confirm names what is other"
         ),
         "corrections_found": "Corrections found, with 95 % intervals that exclude 0: {entries:, }.",
         "no_correction_found": (

@@ -18,22 +18,18 @@ from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedies, remedy
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.trajectory import (
-    FactName,
     FaultText,
     Slowed,
     cause_of,
     cause_text,
-    end_facts,
     end_text,
     event_word,
-    fact_word,
     first_faults,
     no_repair,
     path_text,
-    repair_facts,
     repair_lead,
+    repair_text,
     switch_text,
-    whole_pace,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
@@ -101,7 +97,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
             wrong = [*_faults(path), *wrong]
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
-        to_do, facts, instead = _to_do(path, rows, own, results.summary)
+        to_do, instead = _to_do(path, rows, own, results.summary)
         moments = tuple(_linked(_moment(fault, rows), path.name) for fault in wrong)
         found.append(
             Fault(
@@ -116,7 +112,6 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
                 instead,
                 cause_of(path),
-                tuple((fact_word(name), text) for name, text in facts if text),
             )
         )
     return found
@@ -170,26 +165,22 @@ def _assumed(part: model.Stretch[Any]) -> bool:
 
 def _to_do(
     path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows, summary: model.TrajectorySummary
-) -> tuple[str, list[tuple[FactName, str]], tuple[str, str] | None]:
-    """What to do instead of running a path as it is, what else is to be known of that, and the motion that may be run
-    with its address."""
-    shapes = summary.verdict.shapes
+) -> tuple[str, tuple[str, str] | None]:
+    """What to do instead of running a path as it is, and the motion that may be run with its address."""
     if path.chosen:
         name, repair = repaired(path), motions.take(motions.strategy == path.strategy)
-        lead = sentence("finding", finding=repair_lead(path, slowed(path, rows, repair)))
-        facts = repair_facts(path, summary.joint_limits, shapes)
-        facts += [("start", _switch(path, rows, motions)), ("pace", whole_pace(path))]
-        return lead, facts, (name, address_of("trajectory", name, 0.0, path.name))
+        text = repair_text(path, slowed(path, rows, repair), _switch(path, rows, motions))
+        return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), [], None
+        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), None
     last = path.sound_end
     if last is None:
         todo = advised(path, rows)
-        return sentence("finding", finding=todo) if todo else "", [], None
+        return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     address = address_of("trajectory", path.name, last.t_s, path.name, last.t_s)
-    return end_text(path, last, shapes=shapes), end_facts(path), (name, address)
+    return end_text(path, last), (name, address)
 
 
 def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Slowed | None:
