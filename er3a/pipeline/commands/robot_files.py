@@ -202,7 +202,7 @@ def calibrate(
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.robot_library import load_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
     _check_options(output, words)
@@ -229,7 +229,7 @@ def calibrate(
     if as_json:
         options.print_json(record)
     else:
-        lines = [lines_of(found, rows, others), *(held_back_lines(found, rows, others) if others else [])]
+        lines = [lines_of(found, rows, others), *([held_back_line(found, others)] if others else [])]
         print("\n".join([*lines, *([f"{html}: written"] if html else [])]))
     if output and not settled:
         raise Er3aError(
