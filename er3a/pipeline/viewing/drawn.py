@@ -90,10 +90,7 @@ def _checked(robot: Robot, shapes: ArmShapes) -> list[Shape]:
         points = np.array(piece.points)
         if len(points) > corners:
             points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
-        try:
-            found.append(_mesh(piece.link, points, hull_faces(points)))
-        except scipy.spatial.QhullError:  # flat: nothing to be seen of it but from above
-            continue
+        found.append(_mesh(piece.link, points, hull_faces(points)))
     return found
 
 
