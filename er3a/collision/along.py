@@ -31,11 +31,10 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from er3a.collision.bodies import Bodies, named_pair
-from er3a.collision.distances import which_overlap
-from er3a.collision.pairs import BASE, Pair
+from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies, carried_bodies, layout_of, link_frames, solid_body
+from er3a.collision.shapes import link_frames
 from er3a.numerics.arrays import Integers, Reals, runs
 from er3a.robots.robot import Robot
 
@@ -369,8 +368,6 @@ STEP = 0.02
 def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float, Pair] | None:
     """When a motion that goes straight from row to row first overlaps a solid of the scene, and what with which.
 
-    Allowed contacts are not looked up.
-
     Parameters
     ----------
     t : (n,), s
@@ -380,9 +377,6 @@ def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float
     -------
     moment, pair : s, and two bodies; None if nothing overlaps at the rows and every ``STEP`` between them
     """
-    moving = [body for body in (*arm_bodies(robot), *carried_bodies(robot, scene)) if body.link != BASE]
-    solids = [solid_body(solid) for solid in scene.solids]
-    pairs = [(i, len(moving) + j) for i in range(len(moving)) for j in range(len(solids))]
     steps = np.abs(np.diff(q, axis=0, append=q[-1:])).max(axis=1)
     counts = np.where(np.isfinite(steps), np.maximum(np.ceil(steps / STEP), 1), 1).astype(int)
     row = np.repeat(np.arange(len(t)), counts)
@@ -390,14 +384,14 @@ def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float
     after = np.minimum(row + 1, len(t) - 1)
     tried = np.where(share[:, None] > 0, q[row] + share[:, None] * (q[after] - q[row]), q[row])
     known = np.flatnonzero(np.isfinite(tried).all(axis=1))
-    found = np.empty((len(known), len(pairs)), bool)
-    which_overlap(layout_of(robot, [*moving, *solids], pairs), np.ascontiguousarray(tried[known]), found)
+    bodies = bodies_of(robot, scene)
+    found = bodies.overlaps(tried[known]) & (bodies.second < 0)
     (hits,) = np.nonzero(found.any(axis=1))
     if not len(hits):
         return None
-    at, (first, second) = known[hits[0]], pairs[int(found[hits[0]].argmax())]
+    at = known[hits[0]]
     moment = t[row[at]] + share[at] * (t[after[at]] - t[row[at]])
-    return float(moment), named_pair(moving[first], solids[second - len(moving)])
+    return float(moment), bodies.pairs[int(found[hits[0]].argmax())]
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,3 +77,24 @@ def hull_corners(points: Reals) -> Reals:
     except scipy.spatial.QhullError:  # flat
         return points
     return corners
+
+
+def hull_faces(points: Reals) -> Integers:
+    """The triangles of a convex hull.
+
+    Parameters
+    ----------
+    points : (k, 3), m
+
+    Returns
+    -------
+    faces : (n, 3), rows of ``points``, counter-clockwise from outside; a fan of triangles where they lie in a plane
+    """
+    try:
+        hull = scipy.spatial.ConvexHull(points)
+    except scipy.spatial.QhullError:
+        return np.array([(0, k, k + 1) for k in range(1, len(points) - 1)])
+    a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
+    inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+    faces: Integers = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    return faces

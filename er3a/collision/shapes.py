@@ -36,7 +36,7 @@ from er3a.finding import Finding, fact
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Reals
 from er3a.robots.robot import ConvexPiece, Envelope, Grade, LinkMesh, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
@@ -343,7 +343,7 @@ def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals
 
 
 ON_AXIS = 1e-9  # m
-LOOKED_AT = 100  # corners of a surface
+LOOKED_AT = 200  # corners of a surface
 ROUND = 72  # corners by which a circle is drawn
 BALL = 200  # and a ball
 SIDES = 24  # of the prism around a carried cylinder
@@ -491,13 +491,16 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
 
     Returns
     -------
-    depth : m, not below 0; of a surface up to ``LOOKED_AT`` corners are looked at, so that it is at least that deep
+    depth : m, not below 0; of a surface up to ``LOOKED_AT`` corners in the body's box are looked at, so that it is at
+        least that deep
     """
-    points = other.points if other.tree is None else other.tree.corner.reshape(-1, 3)
-    points = points[:: -(-len(points) // LOOKED_AT)] @ T[:3, :3].T + T[:3, 3]
     if body.tree is None and len(body.points) <= 2 and body.kind != CYLINDER:
         return 0.0
-    return max(0.0, float(_depths_in(body, points).max()))
+    points = (other.points if other.tree is None else other.tree.corner.reshape(-1, 3)) @ T[:3, :3].T + T[:3, 3]
+    low, high = body.points.min(axis=0) - body.disc, body.points.max(axis=0) + body.disc
+    points = points[((points >= low) & (points <= high)).all(axis=1)]
+    points = points[:: max(-(-len(points) // LOOKED_AT), 1)]
+    return max(0.0, float(_depths_in(body, points).max(initial=0.0)))
 
 
 def _depths_in(body: Body, points: Reals) -> Reals:
@@ -550,29 +553,6 @@ def placed_points(solid: Mesh) -> Reals:
     """
     placed: Reals = solid.points @ solid.T[:3, :3].T + solid.T[:3, 3]
     return placed
-
-
-def hull_faces(points: Reals) -> Integers:
-    """The triangles of a convex hull.
-
-    Parameters
-    ----------
-    points : (k, 3), m
-
-    Returns
-    -------
-    faces : (n, 3), rows of ``points``, counter-clockwise from outside
-
-    Raises
-    ------
-    scipy.spatial.QhullError
-        the points are in one plane
-    """
-    hull = ConvexHull(points)
-    a, b, c = np.moveaxis(points[hull.simplices], 1, 0)
-    inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
-    faces: Integers = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
-    return faces
 
 
 def layout_of(

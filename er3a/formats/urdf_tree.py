@@ -37,7 +37,7 @@ import numpy as np
 import scipy
 
 from er3a.collision.convex import cylinder_points
-from er3a.collision.meshes import MOST_CORNERS, hull_corners, is_convex
+from er3a.collision.meshes import MOST_CORNERS, hull_corners, hull_faces, is_convex
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_link_mesh, read_text
@@ -970,7 +970,7 @@ def write_shapes(robot: Robot, names: Sequence[str], root: ElementTree.Element, 
     shapes += [(each, "collision", str(number)) for number, each in enumerate(robot.hulls, start=1)]
     for each, tag, name in shapes:
         file, points = meshes / f"{names[each.link]}_{name}.obj", _in_link(robot, each.link, each.points)
-        faces = each.faces if isinstance(each, LinkMesh) else _hull_faces(points)
+        faces = each.faces if isinstance(each, LinkMesh) else hull_faces(points)
         file.write_text(_obj(points, faces), encoding="utf-8")
         made = _geometry(elements[names[each.link]], tag, np.eye(4), "mesh", filename=f"{meshes.name}/{file.name}")
         if isinstance(each, ConvexPiece) and each.margin:
@@ -989,19 +989,6 @@ def _geometry(link: ElementTree.Element, tag: str, T: Reals, shape: str, **attri
     ElementTree.SubElement(element, "origin", xyz=xyz, rpy=rpy)
     ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape, attributes)
     return element
-
-
-def _hull_faces(points: Reals) -> Integers:
-    """Triangles (f, 3) of the hull of points (n, 3), or a fan of triangles if they lie in a plane."""
-    try:
-        hull = scipy.spatial.ConvexHull(points)
-    except scipy.spatial.QhullError:
-        return np.array([(0, k, k + 1) for k in range(1, len(points) - 1)])
-    corners = points[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) > 0
-    faces: Integers = np.where(outwards[:, None], hull.simplices, hull.simplices[:, ::-1])
-    return faces
 
 
 def _obj(points: Reals, faces: Integers) -> str:

@@ -21,9 +21,10 @@ from hypothesis import strategies as st
 from er3a.collision.along import bodies_of
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import base_contacts, solids_met
+from er3a.collision.meshes import hull_faces
 from er3a.collision.pairs import ASSUMED_MARGIN, label_of, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Sphere
-from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, hull_faces, link_frames, shapes_assumed
+from er3a.collision.shapes import arm_shapes, covered_lengths, has_bare_tool, link_frames, shapes_assumed
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene

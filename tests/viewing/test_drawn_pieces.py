@@ -38,7 +38,8 @@ def test_many_pieces_are_drawn_with_fewer_faces():
     assert sum(len(piece["faces"]) for piece in drawn) <= 1.05 * MAX_FACES
 
 
-def test_flat_pieces_are_left_out_and_an_arm_without_lengths_has_a_size():
-    flat = ConvexPiece(1, ((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)), 0.0)
-    assert meshes(make_arm(hulls=(flat,))) == []
+def test_flat_pieces_are_drawn_and_an_arm_without_lengths_has_a_size():
+    flat = ConvexPiece(1, ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), 0.0)
+    (drawn,) = meshes(make_arm(hulls=(flat,)))
+    assert drawn["faces"] == [[0, 1, 2], [0, 2, 3]]
     assert drawn_size(gantry()) == 2.5

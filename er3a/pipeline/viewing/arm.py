@@ -14,9 +14,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from er3a.collision.meshes import hull_faces
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Plane, Solid, Sphere
-from er3a.collision.shapes import Body, arm_bodies, hull_faces
+from er3a.collision.shapes import Body, arm_bodies
 from er3a.geometry.transforms import inverted
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton

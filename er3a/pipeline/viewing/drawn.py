@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import scipy
 
-from er3a.collision.meshes import simplified
+from er3a.collision.meshes import hull_faces, simplified
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import ArmShapes, arm_shapes, hull_faces, placed_points, solid_corners
+from er3a.collision.shapes import ArmShapes, arm_shapes, placed_points, solid_corners
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
@@ -90,10 +90,7 @@ def _checked(robot: Robot, shapes: ArmShapes) -> list[Shape]:
         points = np.array(piece.points)
         if len(points) > corners:
             points = points[np.unique((fibonacci_sphere(corners) @ points.T).argmax(axis=1))]
-        try:
-            found.append(_mesh(piece.link, points, hull_faces(points)))
-        except scipy.spatial.QhullError:  # flat: nothing to be seen of it but from above
-            continue
+        found.append(_mesh(piece.link, points, hull_faces(points)))
     return found
 
 

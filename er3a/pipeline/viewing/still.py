@@ -15,7 +15,8 @@ import numpy as np
 from markupsafe import Markup
 from PIL import Image
 
-from er3a.collision.shapes import CORNERS, hull_faces
+from er3a.collision.meshes import hull_faces
+from er3a.collision.shapes import CORNERS
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.viewing.painting import paint
