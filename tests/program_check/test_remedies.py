@@ -17,7 +17,6 @@ from er3a.program_check.program_check_findings import NOTES
 from er3a.programs.execution import RunLimits
 from er3a.programs.languages import read_program
 from er3a.robots.robot import CombinedLimit, Envelope
-from testing.arms import scara
 from testing.program_texts import axes
 
 ROBOT = load_robot("er3a_c60")
@@ -103,7 +102,6 @@ TURNED = {
     "start": np.radians([-160, -26, 42, 139, 169, -55]),
 }
 TIED = {"robot": ROBOT.replace(combined=[CombinedLimit((0, 1, 1, 0, 0, 0), *np.radians([-60, 60]))])}
-CSV = "t_s,q1_deg,q2_deg,q3_mm,q4_deg\n0,0,30,50,0\n4,10,30,{},0\n"
 BESIDE = {"start": np.radians([63, -20, -61, -4, -63, -126])}
 MENDED = {
     "target_out_of_reach": (krl(f"PTP {{X 3000,Y 0,Z 400,{DOWN}}}"), krl(f"PTP {{X 400,Y 0,Z 400,{DOWN}}}")),
@@ -153,10 +151,6 @@ MENDED = {
         (krl("LIN_REL {X 1.2,Y -1.2,Z -0.3}"), TURNED),  # where it ends 4.3 mm behind the start
     ),
     "combination_exceeded": ((krl("PTP {A2 -50,A3 -20}"), TIED), (krl("PTP {A2 -50,A3 -5}"), TIED)),
-    "limit_exceeded": (
-        (CSV.format(200), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
-        (CSV.format(150), {"robot": scara(), "start": np.array([0, 0.5, 0.05, 0])}),
-    ),
     "suspect_number": (krl(AT_HOME, "PTP {A1 0,A2 -0.5,A3 -0.6,A4 0.3,A5 -1.2,A6 0.1}"), krl(AT_HOME, "PTP {A1 5}")),
     "not_followed.undefined": (krl("PTP XTHERE"), krl("PTP {A1 10}")),
     "not_followed.position_unknown": ((krl("PTP {A1 10}"), {"start": None}), krl("PTP {A1 10}")),
@@ -202,7 +196,7 @@ def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
 
     def checked(program):
         text, given = program if isinstance(program, tuple) else (program, {})
-        suffix = {"M": "mod", "D": "src", "t": "csv"}[text[0]]
+        suffix = {"M": "mod", "D": "src"}[text[0]]
         options = {"start": HOME} | {key: value for key, value in given.items() if key not in ("data", "robot")}
         (tmp_path / f"a.{suffix}").write_text(text)
         (tmp_path / "a.dat").unlink(missing_ok=True)
