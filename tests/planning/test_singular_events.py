@@ -21,7 +21,7 @@ QUICK = "joint moves"
 )
 def test_nothing_is_missed_that_a_hundred_times_finer_sampling_finds(robot, random, kind):
     found = Found()
-    for _ in range(4):
+    for _ in range(8):
         found.add(robot, KINDS[kind](robot, random))
     assert found.missed_crossings == found.missed_passes == 0
     assert found.passes > 0
