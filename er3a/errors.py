@@ -39,7 +39,7 @@ class InputError(Er3aError):
 
 EXTRAS = {
     "fast": ("numba",),
-    "meshes": ("coacd", "collada"),
+    "meshes": ("collada",),
     "vision": ("cv2",),
     "xacro": ("xacrodoc",),
     "study": (

@@ -14,10 +14,10 @@ from er3a.robots.robot import Robot
 DEG = np.pi / 180
 OTHERS_LONG = pytest.mark.parametrize(
     "robot",
-    ["er3_600", *(pytest.param(name, marks=pytest.mark.long) for name in ("er3a_c60", "er3a_c60_article"))],
+    ["er3_600", pytest.param("er3a_c60_article", marks=pytest.mark.long)],
     indirect=True,
 )
-"""For a test of the fixture ``robot`` that takes seconds: one robot in the fast set, the others among the long ones."""
+"""For a test of the fixture ``robot`` that takes seconds: one robot in the fast set, another among the long ones."""
 
 
 def links_of_rows(a: np.ndarray, alpha: np.ndarray, d: np.ndarray, offset: np.ndarray | None = None) -> np.ndarray:

@@ -36,6 +36,8 @@ PAGES = (
     "fleet",
     "comparison",
     "arms",
+    "confirm",
+    "time",
     "programs",
 )
 PARTS = {"fuzz": "reliability.md", "faults": "reliability.md", "kills": "reliability.md"}

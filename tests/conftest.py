@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,27 +38,26 @@ LONGEST_S = 900
 MOST_FAST_S, SHOWN_SLOW = 0.4, 20  # processor time of a test of the fast set
 LONGEST_FILES = (
     "integration/test_wheel.py",
-    "kinematics/test_by_class.py",
-    "integration/test_pipeline.py",
     "identifiability/test_evidence.py",
-    "identifiability/test_oracle.py",
+    "browser/test_page_use.py",
+    "browser/test_teach_page.py",
     "integration/test_killed_run.py",
-    "robots/test_urdf_round_trip.py",
+    "integration/test_pipeline.py",
+    "integration/test_strangers_study.py",
     "viewing/test_article.py",
-    "integration/test_sweep.py",
-    "stages/test_workspace.py",
-    "workspace/test_sliding_first.py",
-    "test_documents.py",
-    "stages/test_trajectory.py",
-    "workspace/test_general.py",
+    "browser/test_pages.py",
+    "identifiability/test_oracle.py",
     "calibration/test_points.py",
+    "stages/test_checked.py",
+    "robots/test_urdf_round_trip.py",
+    "kinematics/test_by_class.py",
+    "comparison/test_compare.py",
     "integration/test_offices.py",
-    "test_command_line.py",
 )
 ROOT = Path(__file__).resolve().parents[1]
 ALL_LONG = re.compile(r"^pytestmark = (\[\s*)?pytest\.mark\.long\b", re.MULTILINE)
 
-settings.register_profile("no test asserts on time", deadline=None)
+settings.register_profile("no test asserts on time", deadline=None, max_examples=25)
 settings.load_profile("no test asserts on time")
 
 
@@ -116,12 +114,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
-    """How much processor time each test takes, for the report at the end."""
-    start = time.process_time()
+    """How much processor time each test and the processes that it starts take, for the report at the end."""
+    start = sum(os.times()[:4])
     try:
         return (yield)
     finally:
-        item.user_properties.append(("processor_s", time.process_time() - start))
+        item.user_properties.append(("processor_s", sum(os.times()[:4]) - start))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -158,9 +156,9 @@ def _ask_nobody() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(params=ROBOTS)
+@pytest.fixture(params=["er3_600", "er3a_c60_article"])
 def robot(request: pytest.FixtureRequest) -> Robot:
-    """Each of the project's robots in turn."""
+    """Two of the project's robots in turn: one with offsets of links 1 and 3, one without."""
     return load_robot(request.param)
 
 

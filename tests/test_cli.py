@@ -73,7 +73,6 @@ def test_a_machine_at_its_limits_is_one_line_and_exit_code_2(monkeypatch, capsys
         ("chek", "No such command 'chek'"),
         ("check", "Missing argument"),
         ("compute validation", "Missing argument"),
-        ("mesh a.stl --unit inch --output a.json", "'inch' is not one of 'm', 'mm'"),
         ("program write x --language perl --robot er3_600", "'perl' is not one of 'krl'"),
         ("import-urdf x --output", "requires an argument"),
         ("run -- --cores two", "number of cores"),

@@ -18,7 +18,7 @@ import er3a
 from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward
 from er3a.pipeline import program_reports, run_study, verdicts
-from er3a.pipeline.progress import TimeBudget, shown_work
+from er3a.pipeline.progress import shown_work, time_left
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import StageVerdict
 from testing import processes
@@ -89,6 +89,7 @@ def test_a_run_says_what_was_edited_meanwhile(call, monkeypatch):
     assert call("run", "results/other/workspace/summary.json").returncode == 0
 
 
+@pytest.mark.long
 def test_reading_a_program_ends_in_its_time_and_a_line_of_it_is_not_repeated_whole(call, tmp_path, monkeypatch):
     long = tmp_path / "long.src"
     long.write_text(f"DEF p( )\nPTP {{A1 {'1' * 900_000}}}\n{'X' * 900_000}\nEND\n", encoding="utf-8")
@@ -201,17 +202,10 @@ def test_long_work_says_what_it_does_and_for_how_long(capsys, monkeypatch):
     capsys.readouterr()
 
 
-def test_pieces_of_work_share_what_is_left_of_the_time():
-    budget = TimeBudget(100.0, 4)
-    parts = [end - start for start, end in (budget.next_piece() for _ in range(4))]
-    assert parts == pytest.approx([25, 33.3, 50, 100], rel=0.01), "what one does not use is the others'"
-
-
 def test_compiling_takes_none_of_the_time(monkeypatch):
     compiled = [5.0]
     monkeypatch.setattr("er3a.numerics.jit.compile_seconds", lambda: sum(compiled))
     monkeypatch.setattr("er3a.pipeline.progress.time", SimpleNamespace(monotonic=lambda: 100.0 + sum(compiled)))
-    budget = TimeBudget(30.0, 2)
-    first = budget.next_piece()
+    holds = time_left(30.0)
     compiled.append(40.0)
-    assert budget.next_piece() == (first[0], first[0] + 30.0)
+    assert holds()

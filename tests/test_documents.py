@@ -24,6 +24,7 @@ from er3a.errors import InputError
 from er3a.files.hand_eye_file import HandEyeFile
 from er3a.files.program_file import ProgramsFile
 from er3a.files.robot_file import RobotFile
+from er3a.files.scene_file import SceneFile
 from er3a.files.yaml_file import parse, read_yaml
 from er3a.pipeline.cli import app
 from er3a.pipeline.commands.names import COMMANDS
@@ -75,6 +76,7 @@ def all_blocks(*languages: str) -> list[Any]:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("block", all_blocks("python"))
 def test_python_in_documents_runs(block, monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -93,8 +95,8 @@ def merged(into: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.parametrize("block", all_blocks("yaml"))
 def test_yaml_in_documents_is_accepted(block):
     settings = yaml.safe_load(block)
-    if settings.get("kind") == "programs":
-        parse(ProgramsFile, settings, None)
+    if whole := {"programs": ProgramsFile, "scene": SceneFile}.get(settings.get("kind")):
+        parse(whole, settings, None)
         return
     if "apiVersion" in settings:  # a cluster's, not ours
         return

@@ -60,7 +60,7 @@ for name in er3a.__all__:
 """
 POSIX = "fcntl resource pwd grp termios tty pty syslog"
 LINUX_WHEELS = "pinocchio coal ompl toppra libusb_package"
-EXTRAS = """babel contourpy cv2 coacd collada filelock libusb_package llvmlite matplotlib networkx numba open3d pandas
+EXTRAS = """babel contourpy cv2 collada filelock libusb_package llvmlite matplotlib networkx numba open3d pandas
 psutil pyarrow rerun snakemake snakemake_interface_logger_plugins xacro xacrodoc"""
 OF_STUDIES = (
     "er3a.numerics.machine_code",

@@ -167,6 +167,7 @@ def study():
     return Study.model_validate(content)
 
 
+@pytest.mark.long
 def test_a_robot_without_camera_and_programs_goes_through_neither_stage(study):
     assert study.stages("er3_600") == ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
 

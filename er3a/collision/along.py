@@ -35,7 +35,7 @@ from er3a.collision.bodies import Bodies, named_pair
 from er3a.collision.distances import which_overlap
 from er3a.collision.pairs import BASE, Pair
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies, carried_bodies, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import arm_bodies, carried_bodies, layout_of, link_frames, solid_body
 from er3a.numerics.arrays import Integers, Reals, runs
 from er3a.robots.robot import Robot
 
@@ -381,7 +381,7 @@ def first_overlap(robot: Robot, scene: Scene, t: Reals, q: Reals) -> tuple[float
     moment, pair : s, and two bodies; None if nothing overlaps at the rows and every ``STEP`` between them
     """
     moving = [body for body in (*arm_bodies(robot), *carried_bodies(robot, scene)) if body.link != BASE]
-    solids = [body for solid in scene.solids for body in solid_bodies(solid)]
+    solids = [solid_body(solid) for solid in scene.solids]
     pairs = [(i, len(moving) + j) for i in range(len(moving)) for j in range(len(solids))]
     steps = np.abs(np.diff(q, axis=0, append=q[-1:])).max(axis=1)
     counts = np.where(np.isfinite(steps), np.maximum(np.ceil(steps / STEP), 1), 1).astype(int)

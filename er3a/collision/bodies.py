@@ -9,7 +9,7 @@ from itertools import compress, product
 
 import numpy as np
 
-from er3a.collision.convex import cylinder_points, overlap_depth
+from er3a.collision.convex import TOUCHING, cylinder_points, overlap_depth
 from er3a.collision.distances import (
     CYLINDER,
     FREE,
@@ -23,7 +23,7 @@ from er3a.collision.distances import (
 from er3a.collision.matrix import BOXES, MatrixRow, collision_matrix, matrix_of
 from er3a.collision.pairs import BASE, Pair, link_label
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside, layout_of, link_frames, solid_body
 from er3a.errors import Er3aError
 from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -64,7 +64,7 @@ class Bodies:
             joined += more.joined
             self.matrix += more.rows
         moving = [body for body in (*own, *carried) if body.link != BASE]
-        solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
+        solids = [solid_body(solid) for solid in (scene.solids if scene else ())]
         allowed = {frozenset((rule.first, rule.second)) for rule in rules if rule.rule == "allow"}
         around = [(b, s) for s in solids for b in moving if frozenset((b.name, s.name)) not in allowed]
         kept = [frozenset((a.name, b.name)) not in allowed for a, b in watched]
@@ -276,7 +276,8 @@ class Bodies:
         bodies = [self.all[b] for b in (self.layout.first[pair], self.layout.second[pair])]
         T = np.concatenate([link_frames(self.robot, q), np.eye(4)[None]])
         if any(body.tree for body in bodies):
-            return max(depth_inside(a, b, np.linalg.inv(T[a.link]) @ T[b.link]) for a, b in (bodies, bodies[::-1]))
+            found = [depth_inside(a, b, np.linalg.inv(T[a.link]) @ T[b.link]) for a, b in (bodies, bodies[::-1])]
+            return max(TOUCHING, *found)  # what crosses overlaps, though no corner that was looked at is inside
         return overlap_depth(*(_core_points(body, T[body.link]) for body in bodies))
 
 

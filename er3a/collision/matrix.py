@@ -32,7 +32,7 @@ import numpy as np
 from er3a.collision.distances import FREE, MEETS, measure, search_boxes, some_distances, which_overlap
 from er3a.collision.pairs import BASE, PENETRATION_TOLERANCE, TRIED, link_label
 from er3a.collision.scene import Box, Scene
-from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_bodies
+from er3a.collision.shapes import Body, arm_bodies, arm_shapes, layout_of, link_frames, solid_body
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.robot import PairRule, Robot, derived
@@ -327,7 +327,7 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     contacts : with depths in m
     """
     base = [body for body in arm_bodies(robot) if body.link == BASE]
-    solids = [body for solid in (scene.solids if scene else ()) for body in solid_bodies(solid)]
+    solids = [solid_body(solid) for solid in (scene.solids if scene else ())]
     bodies = [*base, *map(_middle, base), *solids]
     pairs = list(product(range(len(base)), range(2 * len(base), len(bodies))))
     if not pairs:
@@ -337,8 +337,7 @@ def base_contacts(robot: Robot, scene: Scene | None) -> tuple[BaseContact, ...]:
     found: dict[str, BaseContact] = {}
     for k, (a, b) in enumerate(pairs):
         distance, touches, middle = distances[k], deep[k], distances[len(pairs) + k]
-        margin = bodies[b].radius if len(bodies[b].points) > 1 else 0.0  # a ball's radius is none
-        inside = bool(deep[len(pairs) + k]) or middle + bodies[a].radius + margin < -INSIDE
+        inside = bool(deep[len(pairs) + k]) or middle + bodies[a].radius < -INSIDE
         contact = BaseContact(bodies[b].name, 0.0 - float(distance), inside)
         before = found.get(contact.solid)
         if (touches or distance < 0) and (
@@ -360,11 +359,10 @@ def solids_met(robot: Robot, box: Box, scene: Scene) -> tuple[str, ...]:
     names : of the solids, each once, in the scene's order
     """
     inner = replace(box, size=np.maximum(np.asarray(box.size) - 2 * PENETRATION_TOLERANCE, PENETRATION_TOLERANCE))
-    bodies = [*solid_bodies(inner), *(body for solid in scene.solids for body in solid_bodies(solid))]
+    bodies = [solid_body(each) for each in (inner, *scene.solids)]
     pairs = [(0, k) for k in range(1, len(bodies))]
     distances, deep, _ = _measured(robot, bodies, pairs, np.zeros(robot.joints))
-    met = (body.name for body, touches in zip(bodies[1:], deep | (distances < 0)) if touches)
-    return tuple(dict.fromkeys(met))
+    return tuple(body.name for body, touches in zip(bodies[1:], deep | (distances < 0)) if touches)
 
 
 def _middle(body: Body) -> Body:

@@ -9,7 +9,7 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
 from er3a.errors import PoseError
 from er3a.geometry.transforms import check_poses
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import PairRule
 
 UNIT_LENGTH = 1e-6  # by which a normal's length may differ from 1
@@ -107,26 +107,25 @@ class Plane(ByValue):
 
 @dataclass(frozen=True, eq=False)
 class Mesh(ByValue):
-    """A solid of any shape, as convex pieces.
+    """A surface of triangles; what is inside a closed one is solid.
 
     Attributes
     ----------
-    T : (4, 4), T_world_mesh; pieces : vertices (k, 3), m, of each piece, in the mesh's frame
-    margin : m, by how far the mesh may stick out of the pieces; they are taken larger by it
+    T : (4, 4), T_world_mesh; points : (k, 3), m, in the mesh's frame; faces : (f, 3), rows of points
     """
 
     name: str
     T: Reals
-    pieces: tuple[Reals, ...]
-    margin: float
+    points: Reals
+    faces: Integers
 
     def __post_init__(self) -> None:
-        _check(self.name, self.T, *(float(np.ptp(piece, axis=0).max()) for piece in self.pieces))
+        _check(self.name, self.T, float(np.ptp(self.points[self.faces], axis=(0, 1)).max()))
 
     @property
     def measures(self) -> str:
-        """Where it is, and of how many pieces."""
-        return f"{_place(self.T)}; {len(self.pieces)} convex pieces, margin {1000 * self.margin:.3g}"
+        """Where it is, and of how many triangles."""
+        return f"{_place(self.T)}; {len(self.faces)} triangles"
 
 
 Solid = Box | Cylinder | Sphere | Plane | Mesh

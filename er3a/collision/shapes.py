@@ -28,7 +28,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from er3a.collision.convex import cylinder_points, distances_from_hull
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
-from er3a.collision.pairs import BASE, link_label
+from er3a.collision.meshes import MOST_CORNERS, hull_corners, is_convex
+from er3a.collision.pairs import BASE, Pair, link_label
 from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
 from er3a.collision.triangles import TriangleTree, depths_inside, outer_corners, tree_of, trees_of
 from er3a.finding import Finding, fact
@@ -299,24 +300,22 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     return tuple(found)
 
 
-def enlarged_by(robot: Robot, scene: Scene | None, names: Sequence[str]) -> float:
-    """By how much shapes are at most larger than the meshes that they hold, together.
-
-    An overlap by less is no contact for sure.
+def surely_touch(robot: Robot, pair: Pair, depth: float, margin: float) -> bool:
+    """Whether an overlap is a collision for certain: motions of paths and programs fail by those, others are cautions.
 
     Parameters
     ----------
-    scene : None for none
-    names : of the two bodies in contact: labels of links, names of solids
+    pair : of bodies that overlap
+    depth : m, of the overlap
+    margin : m, by how much assumed shapes of the arm may be wrong; contacts between what is carried and solids rest on
+        none of them
 
     Returns
     -------
-    margin : m, the sum of the largest margin of each
+    certain : whether it is deeper than the shapes may be wrong
     """
-    margins = [(link_label(piece.link), piece.margin) for piece in arm_shapes(robot).pieces]
-    solids = (*scene.solids, *scene.carried) if scene else ()
-    margins += [(solid.name, solid.margin) for solid in solids if isinstance(solid, Mesh)]
-    return sum(max((margin for owner, margin in margins if owner == name), default=0.0) for name in names)
+    assumed = arm_shapes(robot).assumed and pair.code != "carried_and_solid"
+    return depth > (margin if assumed else 0.0)
 
 
 def link_frames(robot: Robot, q: Reals) -> Reals:
@@ -418,18 +417,20 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
     """
     if scene is None or not scene.carried:
         return ()
-    last = robot.rows
     poses = frames(robot, np.zeros(robot.joints))
-    T = np.linalg.inv(poses[last - 1]) @ poses[last]
-    bodies = [body for solid in scene.carried for body in solid_bodies(solid)]
-    points = [cylinder_points(b.points, b.disc, SIDES) if b.kind == CYLINDER else b.points for b in bodies]
-    return tuple(
-        Body(body.name, last, corners @ T[:3, :3].T + T[:3, 3], body.radius) for body, corners in zip(bodies, points)
-    )
+    T = np.linalg.inv(poses[-2]) @ poses[-1]
+    found = []
+    for solid in scene.carried:
+        assert not isinstance(solid, Plane), "nothing carries a half-space"
+        body = solid_body(replace(solid, T=T @ solid.T))
+        if body.kind == CYLINDER:
+            body = replace(body, kind=HULL, disc=0.0, points=cylinder_points(body.points, body.disc, SIDES))
+        found.append(replace(body, link=robot.rows))
+    return tuple(found)
 
 
-def solid_bodies(solid: Solid) -> tuple[Body, ...]:
-    """A solid as convex bodies of the world.
+def solid_body(solid: Solid) -> Body:
+    """A solid as a body of the world.
 
     Parameters
     ----------
@@ -437,15 +438,14 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
 
     Returns
     -------
-    bodies : points in the world frame, m; one for each piece of a mesh, else one
+    body : points in the world frame, m; a mesh that is closed and convex, of few corners, as its hull
     """
     match solid:
         case Plane():
             points = np.array([solid.normal, [solid.offset, 0, 0]])
-            return (Body(solid.name, WORLD, points, 0.0, HALF_SPACE),)
+            return Body(solid.name, WORLD, points, 0.0, HALF_SPACE)
         case Mesh():
-            pieces = tuple(piece @ solid.T[:3, :3].T + solid.T[:3, 3] for piece in solid.pieces)
-            return tuple(Body(solid.name, WORLD, piece, solid.margin) for piece in pieces)
+            return _mesh_body(solid)
         case Box():
             points, radius, kind, disc = CORNERS * solid.size, 0.0, HULL, 0.0
         case Cylinder():
@@ -455,7 +455,17 @@ def solid_bodies(solid: Solid) -> tuple[Body, ...]:
             points, radius, kind, disc = np.zeros((1, 3)), solid.radius, HULL, 0.0
         case _:
             assert_never(solid)
-    return (Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc),)
+    return Body(solid.name, WORLD, points @ solid.T[:3, :3].T + solid.T[:3, 3], radius, kind, disc)
+
+
+@lru_cache(maxsize=64)
+def _mesh_body(solid: Mesh) -> Body:
+    """A mesh with its tree: it takes a while to grow, so those used last are kept."""
+    points, tree = placed_points(solid), tree_of(placed_points(solid), solid.faces)
+    corners = hull_corners(points[np.unique(solid.faces)])
+    if tree.shell.all() and len(corners) <= MOST_CORNERS and is_convex(points, solid.faces):
+        return Body(solid.name, WORLD, corners, 0.0)
+    return Body(solid.name, WORLD, outer_corners(corners), 0.0, tree=tree)
 
 
 def depths_in(solid: Solid, points: Reals) -> Reals:
@@ -467,10 +477,9 @@ def depths_in(solid: Solid, points: Reals) -> Reals:
 
     Returns
     -------
-    depths : (n,), m; not above 0 outside. The margin around the pieces of a mesh does not count
+    depths : (n,), m; not above 0 outside
     """
-    depths: Reals = np.max([_depths_in(body, points) for body in solid_bodies(solid)], axis=0)
-    return depths
+    return _depths_in(solid_body(solid), points)
 
 
 def depth_inside(body: Body, other: Body, T: Reals) -> float:
@@ -486,15 +495,16 @@ def depth_inside(body: Body, other: Body, T: Reals) -> float:
     """
     points = other.points if other.tree is None else other.tree.corner.reshape(-1, 3)
     points = points[:: -(-len(points) // LOOKED_AT)] @ T[:3, :3].T + T[:3, 3]
-    found = np.zeros(len(points))
-    if body.tree is not None:
-        depths_inside(trees_of([body.tree]), 0, points, found)
-    elif len(body.points) > 2 or body.kind == CYLINDER:
-        found = _depths_in(body, points)
-    return max(0.0, float(found.max()))
+    if body.tree is None and len(body.points) <= 2 and body.kind != CYLINDER:
+        return 0.0
+    return max(0.0, float(_depths_in(body, points).max()))
 
 
 def _depths_in(body: Body, points: Reals) -> Reals:
+    if body.tree is not None:
+        found = np.zeros(len(points))
+        depths_inside(trees_of([body.tree]), 0, np.ascontiguousarray(points), found)
+        return found
     if body.kind == HALF_SPACE:
         return np.asarray(body.points[1, 0] - points @ body.points[0])
     if len(body.points) == 1:
@@ -512,8 +522,8 @@ def _depths_in(body: Body, points: Reals) -> Reals:
     return np.asarray(-(points @ faces[:, :3].T + faces[:, 3]).max(axis=1))
 
 
-def solid_pieces(solid: Solid) -> tuple[Reals, ...]:
-    """Convex pieces that a solid is drawn by.
+def solid_corners(solid: Box | Cylinder | Sphere) -> Reals:
+    """Points on a convex solid's surface that it is drawn by.
 
     Parameters
     ----------
@@ -521,22 +531,25 @@ def solid_pieces(solid: Solid) -> tuple[Reals, ...]:
 
     Returns
     -------
-    corners : (k, 3), m, world frame, of each piece; planes have none
-
-    Notes
-    -----
-    Corners of round solids are on their surface. Pieces of a mesh are without the margin that is added to them.
+    corners : (k, 3), m, world frame
     """
-    if isinstance(solid, Plane):
-        return ()
-    return tuple(_corners(body, 0.0 if isinstance(solid, Mesh) else body.radius) for body in solid_bodies(solid))
-
-
-def _corners(body: Body, radius: float) -> Reals:
-    points = body.points
+    body = solid_body(solid)
     if body.kind == CYLINDER:
-        points = cylinder_points(points, body.disc * np.cos(np.pi / ROUND), ROUND)
-    return (points[:, None] + radius * fibonacci_sphere(BALL)).reshape(-1, 3) if radius else points
+        return cylinder_points(body.points, body.disc * np.cos(np.pi / ROUND), ROUND)
+    if body.radius:
+        return np.asarray(body.points + body.radius * fibonacci_sphere(BALL))
+    return body.points
+
+
+def placed_points(solid: Mesh) -> Reals:
+    """The points of a mesh, (k, 3), m, in the world frame.
+
+    Parameters
+    ----------
+    solid : of a scene
+    """
+    placed: Reals = solid.points @ solid.T[:3, :3].T + solid.T[:3, 3]
+    return placed
 
 
 def hull_faces(points: Reals) -> Integers:

@@ -2,7 +2,8 @@
 
 Tables are CSV with any separator, decimal commas, and further columns. Lines are ABB's ``jointtarget`` and
 ``robtarget`` as ``TPWrite`` prints them, KRL's ``{A1 10.0, ...}`` and ``{X 500.0, ...}``, Fanuc's
-``P[1]{ J1 = 10.0 deg, ...}``, and EFORT's ``POINTJ(...)`` and ``POINTC(...)``.
+``P[1]{ J1 = 10.0 deg, ...}``, and EFORT's ``POINTJ(...)`` and ``POINTC(...)``. Recordings of ROS become such a table
+(:mod:`er3a.confirmation.bag`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from er3a.confirmation.bag import is_recording, recorded_lines
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.errors import ArgumentError, InputError
 from er3a.files.arithmetic import UNITS, words_of
@@ -83,8 +85,11 @@ def read_pairs(
     if units is not None and units not in LENGTHS:
         raise ArgumentError("units", units, f"one of {', '.join(LENGTHS)}")
     path = Path(source)
-    content = csv_text(path) if text is None else text
-    lines = _lines_of_pendant(path, content, robot.joints) or _table(path, content, robot.joints)
+    if text is None and is_recording(path):
+        lines = recorded_lines(path)
+    else:
+        content = csv_text(path) if text is None else text
+        lines = _lines_of_pendant(path, content, robot.joints) or _table(path, content, robot.joints)
     pairs = _pairs(path, robot, lines, units)
     if angles is None:
         return pairs

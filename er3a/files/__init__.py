@@ -2,7 +2,7 @@
 
 One module for each kind of file: ``robot_file`` (its fields; ``robot_library`` makes a ``Robot`` from it,
 ``robot_writer`` writes one), ``dh_table``, ``reference_sets``, ``target_file``,
-``path_file``, ``program_file``, ``scene_file``, ``vision_file``, ``hand_eye_file``, ``pieces_file``,
+``path_file``, ``program_file``, ``scene_file``, ``vision_file``, ``hand_eye_file``,
 ``factory_calibration``; ``arm_file`` reads any that describes an arm. Shared: ``yaml_file`` and
 ``csv_file`` (syntax), ``units`` (fields that detect the wrong unit), ``annotations`` (grades, translations),
 ``kept_files`` (atomic writes and locations). ``by_name``: functions of the library that take names of files.

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
+from er3a.files.kept_files import own_or_shipped
 from er3a.files.units import (
     MAX_DEG,
     MAX_DISTANCE_MM,
@@ -24,6 +25,7 @@ from er3a.files.units import (
     look_like_radians,
 )
 from er3a.files.yaml_file import InputFile, StrictModel
+from er3a.formats.mesh_file import Unit, read_mesh
 from er3a.geometry.transforms import rot_z, transform
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
@@ -384,8 +386,25 @@ def _inside_the_study(value: str) -> str:
     return value
 
 
-PiecesPath = Annotated[Text, AfterValidator(_inside_the_study)]
-"""A file that ``er3a mesh`` wrote, below the folder that the study is run in."""
+StudyPath = Annotated[Text, AfterValidator(_inside_the_study)]
+"""A file below the folder that the study is run in."""
+
+
+class MeshFile(StrictModel):
+    """``mesh``: a file of triangles (STL, OBJ, PLY, DAE, GLB) below the study's folder; ``unit`` of its lengths."""
+
+    mesh: StudyPath
+    unit: Unit
+
+    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (k, 3), m, in the file's frame, and triangles (f, 3) of them.
+
+        Raises
+        ------
+        InputError
+            for a file that holds none, or can only be in the other unit
+        """
+        return read_mesh(own_or_shipped(self.mesh), self.unit)
 
 
 class OfOneJoint(StrictModel):
@@ -540,11 +559,10 @@ class Capsule(StrictModel):
         return values
 
 
-class LinkPieces(Placement):
-    """Convex pieces of a mesh (``pieces``: a file written by ``er3a mesh``), placed in the frame of joint ``link``."""
+class PlacedMesh(Placement, MeshFile):
+    """Triangles of a mesh file, placed in the frame of joint ``link``."""
 
     link: Annotated[int, Field(ge=0)]
-    pieces: PiecesPath
 
 
 class LinkHull(StrictModel):
@@ -570,15 +588,15 @@ class LinkSurface(StrictModel):
     robot file's folder, and its checksum, as ``er3a import-urdf`` writes them."""
 
     link: Annotated[int, Field(ge=0)]
-    stl: PiecesPath
+    stl: StudyPath
     sha256: Text
 
 
 class Envelopes(Sourced):
-    """Shapes of links and tool, for collision checks: capsules, convex pieces and surfaces of triangles."""
+    """Shapes of links and tool, for collision checks: capsules, hulls and surfaces of triangles."""
 
     capsules: Annotated[list[Capsule], Field(max_length=1000)] = []
-    meshes: Annotated[list[LinkPieces], Field(max_length=100)] = []
+    meshes: Annotated[list[PlacedMesh], Field(max_length=100)] = []
     hulls: Annotated[list[LinkHull], Field(max_length=1000)] = []
     surfaces: Annotated[list[LinkSurface], Field(max_length=100)] = []
 

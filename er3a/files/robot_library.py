@@ -17,7 +17,6 @@ from er3a.files import robot_file
 from er3a.files.arm_catalogue import KnownArm, known_arms
 from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
-from er3a.files.pieces_file import load_pieces
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
@@ -25,7 +24,6 @@ from er3a.formats.urdf import import_urdf
 from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.numerics.arrays import Reals
 from er3a.robots.masses import Load, together
 from er3a.robots.robot import (
     CombinedLimit,
@@ -33,6 +31,7 @@ from er3a.robots.robot import (
     ConvexPiece,
     Envelope,
     Grade,
+    LinkMesh,
     Robot,
     Source,
     robot_name,
@@ -149,7 +148,7 @@ def read_table(
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:
-    """What a robot file holds, checked, with the triangles of the STL files that it names.
+    """What a robot file holds, checked, with the triangles of the STL files that it names; or a D-H table's content.
 
     Returns
     -------
@@ -160,6 +159,11 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     InputError
         naming file, field and remedy; also if the robot is not named as its file, or an STL file has another checksum
     """
+    if holds_table(path):
+        content, notes = read_dh_table(path, robot_name(path))
+        if notes:
+            warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=2)
+        return content
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
@@ -168,7 +172,7 @@ def read_robot(path: Path) -> robot_file.RobotFile:
 
 
 def robot_path(name_or_path: str | Path) -> Path:
-    """The file that a robot's name, or a path ending in .yaml or .yml, refers to.
+    """The file that a robot's name, or the path of a robot file or D-H table, refers to.
 
     Parameters
     ----------
@@ -184,7 +188,7 @@ def robot_path(name_or_path: str | Path) -> Path:
         for a name without a file; the names that exist are listed
     """
     text = str(name_or_path)
-    if text.endswith((".yaml", ".yml")):
+    if text.endswith((".yaml", ".yml")) or ("." in text and holds_table(text)):
         return Path(text)
     path = _named_file(text)
     if path is None and text in known_arms():
@@ -241,7 +245,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         references=tuple(content.references),
         envelopes=_envelopes(content.envelopes),
         hulls=_hulls(content.envelopes),
-        meshes=content.surfaces,
+        meshes=_surfaces(content),
         visuals=tuple(each.visual() for each in content.visuals),
         pair_rules=content.collision.rules() if content.collision else (),
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
@@ -335,18 +339,21 @@ def _envelopes(group: robot_file.Envelopes | None) -> tuple[Envelope, ...]:
 
 
 def _hulls(group: robot_file.Envelopes | None) -> tuple[ConvexPiece, ...]:
-    """Hulls that are written in the file, and those of files of convex pieces."""
-    found: list[ConvexPiece] = []
-    for mesh in group.meshes if group else ():
-        content, T = load_pieces(own_or_shipped(mesh.pieces)), mesh.transform()
-        found += [_hull(mesh.link, p @ T[:3, :3].T + T[:3, 3], content.uncovered_mm / 1000) for p in content.pieces()]
-    for hull in group.hulls if group else ():
-        found.append(_hull(hull.link, np.array(hull.points_mm) / 1000, hull.margin_mm / 1000))
+    return tuple(
+        ConvexPiece(
+            hull.link, tuple((x / 1000, y / 1000, z / 1000) for x, y, z in hull.points_mm), hull.margin_mm / 1000
+        )
+        for hull in (group.hulls if group else ())
+    )
+
+
+def _surfaces(content: robot_file.RobotFile) -> tuple[LinkMesh, ...]:
+    """The triangles beside the file, and those of the mesh files that it names."""
+    found = list(content.surfaces)
+    for mesh in content.envelopes.meshes if content.envelopes else ():
+        T, (points, faces) = mesh.transform(), mesh.triangles()
+        found.append(LinkMesh(mesh.link, points @ T[:3, :3].T + T[:3, 3], faces))
     return tuple(found)
-
-
-def _hull(link: int, points: Reals, margin: float) -> ConvexPiece:
-    return ConvexPiece(link, tuple((float(x), float(y), float(z)) for x, y, z in points), margin)
 
 
 def placement_transform(placement: robot_file.Placement | None) -> np.ndarray:

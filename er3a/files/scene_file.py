@@ -11,9 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from er3a.collision import scene as library
-from er3a.files.kept_files import own_or_shipped
-from er3a.files.pieces_file import load_pieces
-from er3a.files.robot_file import CollisionPairs, DecidedPair, Name, PiecesPath, Text
+from er3a.files.robot_file import CollisionPairs, DecidedPair, MeshFile, Name, Text
 from er3a.files.units import MAX_DISTANCE_MM, SHORTEST_PLAIN_LENGTH_MM, PositionMm, RpyDeg, Triple, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import transform
@@ -78,15 +76,12 @@ class CylinderObstacle(Obstacle):
         return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
-class MeshObstacle(Obstacle):
-    """``pieces``: a file of convex pieces, written by ``er3a mesh``."""
-
-    pieces: PiecesPath
+class MeshObstacle(Obstacle, MeshFile):
+    """The triangles of a mesh file; its own axes lie at ``xyz_mm``."""
 
     def solid(self) -> library.Mesh:
-        """In the units of the library; :class:`InputError` for a file without such pieces."""
-        content = load_pieces(own_or_shipped(self.pieces))
-        return library.Mesh(self.name, self.place(), content.pieces(), content.uncovered_mm / 1000)
+        """In the units of the library; :class:`InputError` for a file that holds no triangles."""
+        return library.Mesh(self.name, self.place(), *self.triangles())
 
 
 class SphereObstacle(StrictModel):

@@ -28,6 +28,7 @@ RENAMED = {
     "full_speed_after_s": "acceleration_time_s",
     "overlap_mm": "penetration_tolerance_mm",
     "repair": "avoidance",
+    "pieces": "mesh: part.stl, unit: mm",
 }
 """Keys of files by the names that they had, and the names that they have."""
 

@@ -1,10 +1,9 @@
-"""Triangle meshes from STL, OBJ, DAE and GLB files, read by trimesh."""
+"""Triangle meshes from STL, OBJ, PLY, DAE and GLB files, read by trimesh."""
 
 from __future__ import annotations
 
 import hashlib
 import struct
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
@@ -16,38 +15,24 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.robots.robot import LinkMesh
 
 Unit = Literal["m", "mm"]
-FORMATS = (".stl", ".obj", ".dae", ".glb")
+FORMATS = (".stl", ".obj", ".ply", ".dae", ".glb")
 MAX_TRIANGLES = 1_000_000
 MAX_MESH_BYTES = 200_000_000
 SMALLEST, LARGEST = 2e-3, 100.0  # m, of a mesh in all
 LARGEST_OF_LINK = 20.0  # m
 
 
-@dataclass(frozen=True, eq=False)
-class ClosedMesh:
-    """A closed surface: vertices (V, 3), m, and faces (F, 3), outwards by the right-hand rule."""
-
-    vertices: Reals
-    faces: Integers
-
-
-def read_mesh(path: str | Path, unit: Unit) -> ClosedMesh:
-    """Read a closed mesh whose lengths are in a unit.
+def read_mesh(path: Path, unit: Unit) -> tuple[Reals, Integers]:
+    """Vertices (V, 3), m, and faces (F, 3) of a mesh whose lengths are in a unit.
 
     Raises
     ------
     InputError
-        for a file that is not such a mesh, is too large, is not closed, or can only be in the other unit
+        for a file that is not a mesh, is too large, or can only be in the other unit
     """
-    path = Path(path)
-    vertices, faces, closed = _surface(_loaded(path), 1.0 if unit == "m" else 1e-3)
-    if not closed:
-        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        loose = int((np.unique(edges, axis=0, return_counts=True)[1] != 2).sum())
-        problem = f"is not closed: {loose} edges don't have two triangles"
-        raise InputError(path, None, problem, "Close its holes, for example in a mesh editor")
+    vertices, faces, _ = _surface(_loaded(path), 1.0 if unit == "m" else 1e-3)
     _check_size(path, float(np.ptp(vertices, axis=0).max()), unit)
-    return ClosedMesh(vertices, faces)
+    return vertices, faces
 
 
 def read_link_mesh(path: Path, scale: Reals) -> tuple[Reals, Integers, bool]:
@@ -188,10 +173,10 @@ def _too_many(path: Path, count: int) -> InputError:
 def _check_size(path: Path, size: float, unit: Unit) -> None:
     if size < SMALLEST:
         problem = f"its longest side is {size * 1000:.3g} mm, which can only be metres"
-        raise InputError(path, None, problem, "Import it with --unit m")
+        raise InputError(path, None, problem, "Write unit: m")
     if size > LARGEST:
         other = "mm" if unit == "m" else "a smaller unit"
-        raise InputError(path, None, f"its longest side is {size:.4g} m, which can only be {other}", "Check --unit")
+        raise InputError(path, None, f"its longest side is {size:.4g} m, which can only be {other}", "Check its unit")
 
 
 MAX_BYTES = 1_000_000

@@ -37,7 +37,7 @@ import numpy as np
 import scipy
 
 from er3a.collision.convex import cylinder_points
-from er3a.collision.meshes import hull_corners, is_convex
+from er3a.collision.meshes import MOST_CORNERS, hull_corners, is_convex
 from er3a.collision.shapes import CORNERS
 from er3a.errors import Er3aError, InputError
 from er3a.formats.mesh_file import read_link_mesh, read_text
@@ -49,7 +49,6 @@ from er3a.numerics.si_units import limit_in_degrees
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot
 
-MOST_CORNERS = 100  # of a hull, which stands in the robot file; with more a convex mesh is kept as a surface beside it
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4

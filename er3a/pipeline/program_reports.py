@@ -31,7 +31,7 @@ from er3a.files.units import noted_doubts
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.language import as_text
-from er3a.pipeline.messages.programs import remedy
+from er3a.pipeline.messages.programs import cycle_text, remedy
 from er3a.pipeline.messages.say import excerpt, say
 from er3a.pipeline.messages.scope import gap_text, not_checked
 from er3a.pipeline.progress import TimeOverError, time_limit
@@ -39,7 +39,7 @@ from er3a.pipeline.results import plain
 from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
 from er3a.pipeline.scope import Check as Checked
 from er3a.pipeline.stages.covered import covered_units, gaps_of_program
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, collisions, judge, measured, min_clearance
+from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PATH_VERDICTS, PathVerdict
@@ -66,7 +66,6 @@ from er3a.version import __version__
 BASE = "%SRCROOT%"
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
-UNREADABLE = "unreadable"
 DAY_S = 86_400.0
 MOST_ROWS = 10  # that are printed of a program's findings unless all are asked for
 MOST_TEXTS = 4  # of what is not followed for one reason
@@ -94,6 +93,17 @@ class CheckedFile:
         if self.check is None:
             return "fail"
         return worst_of((self.check.level, "caution" if self.missed else "pass"))
+
+    @property
+    def findings(self) -> tuple[LocatedFinding, ...]:
+        """Those of its check; of a program that can't be read the error, at its line if it names one."""
+        if self.check is not None:
+            return self.check.findings
+        assert self.error is not None
+        words = (self.error.field or "").replace(",", " ").split()
+        line = int(words[1]) if words[:1] == ["line"] and words[1:2] and words[1].isdigit() else 0
+        finding = fact("unreadable", problem=self.error.problem, remedy=self.error.remedy)
+        return (LocatedFinding("fail", finding, Place(Path(self.error.file or self.file), line)),)
 
     def lacks(self, required: Iterable[str]) -> list[str]:
         """Checks of those required that were not made.
@@ -180,15 +190,13 @@ def lines_of(checked: CheckedFile, every: bool = False, verdicts: bool = False) 
     every : whether notes are among them, and each finding has a line of its own
     verdicts : whether each motion has a line, too
     """
-    if checked.check is None:
-        return [_error_line(checked)]
-    findings = checked.check.findings
+    findings = checked.findings
     rows = [[each] for each in findings] if every else _causes(findings)
     lines = [_cause_line(row) for row in rows]
     if not every and len(lines) > MOST_ROWS:
         rest = len(lines) - MOST_ROWS + 1
         lines = [*lines[: MOST_ROWS - 1], f"{shown(checked.file)}: {rest} more causes: --all prints them"]
-    return lines + ([_verdict_line(each) for each in checked.check.verdicts] if verdicts else [])
+    return lines + ([_verdict_line(each) for each in checked.check.verdicts] if verdicts and checked.check else [])
 
 
 def _causes(findings: Iterable[LocatedFinding]) -> list[list[LocatedFinding]]:
@@ -217,25 +225,6 @@ def _cause_line(row: list[LocatedFinding]) -> str:
     times = f" ({first.times} times)" if len(row) == 1 and first.times > 1 else ""
     to_do = f". {remedy(first.finding)}" if first.level != "note" and remedy(first.finding) else ""
     return f"{_where(first.place)}: {WORDS[first.level]}: {text}{where}{times}{to_do} [{first.finding.code}]"
-
-
-def _error_line(checked: CheckedFile) -> str:
-    error = checked.error
-    assert error is not None
-    line = _line_in(error)
-    file = shown(_file_of(checked, error))
-    where = f"{file}:{line}" if line else file
-    return f"{where}: error: {error.problem}. {error.remedy} [{UNREADABLE}]"
-
-
-def _file_of(checked: CheckedFile, error: InputError) -> Path:
-    """The file that can't be read: the program's own, or a module that it calls."""
-    return checked.file if error.file is None else Path(error.file)
-
-
-def _line_in(error: InputError) -> int:
-    words = (error.field or "").replace(",", " ").split()
-    return int(words[1]) if words[:1] == ["line"] and len(words) > 1 and words[1].isdigit() else 0
 
 
 def _verdict_line(verdict: MotionVerdict) -> str:
@@ -314,13 +303,7 @@ def cycle_line(checked: CheckedFile) -> str:
     """
     if checked.check is None:
         return ""
-    cycle = checked.check.cycle
-    low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"
-    time = f"{low} s" if low == high else f"{low} to {high} s"
-    what = "one round of its loop" if cycle.repeats else "the program"
-    more = f", and {cycle.waits} wait{'s' if cycle.waits > 1 else ''} for signals" if cycle.waits else ""
-    less = "" if cycle.complete else ", without motions whose path is unknown or was not checked"
-    return f"{shown(checked.file)}: {what} takes about {time}{more}{less}"
+    return f"{shown(checked.file)}: {cycle_text(checked.check)}"
 
 
 def shapes_line(robot: Robot) -> str:
@@ -393,11 +376,10 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = []
     for each in checked:
         if each.check is None:
-            error = each.error
-            assert error is not None
-            where = {"file": _uri(_file_of(each, error)), "line": _line_in(error)}
-            problem = {**where, "problem": error.problem, "remedy": error.remedy}
-            found.append({"file": _uri(each.file), "level": "fail", "error": problem})
+            (one,) = each.findings
+            problem = {key: one.finding.params[key] for key in ("problem", "remedy")}
+            where = {"file": _uri(one.place.file), "line": one.place.line}
+            found.append({"file": _uri(each.file), "level": "fail", "error": where | problem})
             continue
         check = each.check
         found.append(
@@ -479,22 +461,13 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
     -------
     log : one run; paths relative to the folder that the command runs in. Fingerprints do not change with line numbers.
     """
-    results, rules = [], {}
+    results, rules = [], set()
     seen: dict[str, int] = {}
     for each in checked:
-        if each.check is None:
-            error = each.error
-            assert error is not None
-            text = f"{error.problem}. {error.remedy}"
-            place = Place(_file_of(each, error), max(_line_in(error), 1))
-            results.append(_result((UNREADABLE, "fail", text), place, each.file.name, seen))
-            rules[UNREADABLE] = "fail"
-            continue
-        lines = each.check.execution.program.lines
-        for one in each.check.findings:
-            rules.setdefault(one.finding.code, one.level)
-            finding = (one.finding.code, one.level, _message(one))
-            results.append(_result(finding, one.place, _line_text(one.place, each.file, lines), seen, one.calls))
+        lines = each.check.execution.program.lines if each.check else ()
+        for one in each.findings:
+            rules.add(one.finding.code)
+            results.append(_result(one, _line_text(one.place, each.file, lines), seen))
     driver = {
         "name": "er3a check-program",
         "version": __version__,
@@ -525,31 +498,21 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     ]
 
 
-def _message(one: LocatedFinding) -> str:
-    return say(one.finding) + (f" ({one.times} times)" if one.times > 1 else "")
-
-
-def _result(
-    finding: tuple[str, Level, str],
-    place: Place,
-    line_text: str,
-    seen: dict[str, int],
-    calls: tuple[Place, ...] = (),
-) -> dict[str, Any]:
-    code, level, text = finding
-    print_of = hashlib.sha256(
-        "\n".join((code, _uri_from_here(place.file), place.element, line_text)).encode()
-    ).hexdigest()[:32]
+def _result(one: LocatedFinding, line_text: str, seen: dict[str, int]) -> dict[str, Any]:
+    code, place = one.finding.code, one.place
+    parts = (code, _uri_from_here(place.file), place.element, line_text)
+    print_of = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     number = seen[print_of] = seen.get(print_of, 0) + 1
+    times = f" ({one.times} times)" if one.times > 1 else ""
     found: dict[str, Any] = {
         "ruleId": code,
-        "level": {"fail": "error", "caution": "warning"}.get(level, "note"),
-        "message": {"text": text},
+        "level": WORDS[one.level],
+        "message": {"text": say(one.finding) + times},
         "locations": [_location(place)],
         "partialFingerprints": {FINGERPRINT: f"{print_of}:{number}"},
     }
-    if calls:
-        found["relatedLocations"] = [{**_location(call), "message": {"text": "called from here"}} for call in calls]
+    if one.calls:
+        found["relatedLocations"] = [{**_location(call), "message": {"text": "called from here"}} for call in one.calls]
     return found
 
 
@@ -626,7 +589,7 @@ def programs_of(
             continue
         verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
         along = measured(surroundings, each.motion)
-        if collisions(along):
+        if along.contacts:
             verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
         rest = tuple(left for left in each.open if left.reason not in CHOSEN)
         elsewhere = language != "csv" and any(left.reason == "points_missed" for left in rest)

@@ -87,15 +87,16 @@ def time_limit(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-class TimeBudget:
-    """Seconds that some pieces of work may take together; each may take an equal part of what is left."""
+def time_left(seconds: float) -> Callable[[], bool]:
+    """Whether some work may go on.
 
-    def __init__(self, seconds: float, pieces: int):
-        self.pieces, self.end = pieces, work_clock() + seconds
+    Parameters
+    ----------
+    seconds : from now on, by :func:`work_clock`
 
-    def next_piece(self) -> tuple[float, float]:
-        """When the next piece begins and when it has to end, by :func:`work_clock`."""
-        now = work_clock()
-        part = max(self.end - now, 0.0) / max(self.pieces, 1)
-        self.pieces -= 1
-        return now, now + part
+    Returns
+    -------
+    holds : False once they are over
+    """
+    end = work_clock() + seconds
+    return lambda: work_clock() < end

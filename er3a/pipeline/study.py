@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, create_model, model_validator
 from er3a.collision.scene import Scene
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.annotations import catalogues_beside, translations_in
-from er3a.files.kept_files import sha256, shown_path
+from er3a.files.kept_files import own_or_shipped, sha256, shown_path
 from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
@@ -498,7 +498,7 @@ class StudyBase(InputFile):
         return {file for name in self.robots for stage in self.stages(name) for file in self.inputs(name, stage)}
 
     def scenes(self, name: str, stage: str) -> list[Path]:
-        """The file of :meth:`scene`, and those of convex pieces that it names.
+        """The file of :meth:`scene`, and the meshes that it names.
 
         Parameters
         ----------
@@ -557,13 +557,13 @@ def shapes_named_in(path: Path) -> list[Path]:
 
     Returns
     -------
-    files : pieces relative to the study's folder, STL files relative to the file; each once, none of a file that can't
+    files : meshes, and STL files relative to the file; each once, none of a file that can't
         be read
     """
 
     def named(part: Any) -> Iterator[Path]:
-        if isinstance(part, dict) and isinstance(part.get("pieces"), str):
-            yield Path(part["pieces"])
+        if isinstance(part, dict) and isinstance(part.get("mesh"), str):
+            yield own_or_shipped(part["mesh"])
         if isinstance(part, dict) and isinstance(part.get("stl"), str):
             yield path.parent / part["stl"]
         for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():

@@ -11,6 +11,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -49,11 +50,12 @@ from er3a.program_check.sanity import suspect_numbers
 from er3a.program_check.step_checks import CheckedMotion, Judge, Obstacles
 from er3a.programs.execution import Ending, Execution, RunLimits
 from er3a.programs.instructions import ArmMotion, Load, Pause, Place, PoseTarget, Unknown
+from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.programs.syntax import Program
 from er3a.robots.robot import Robot
 
-ASSUMED_SPEED, ASSUMED_SLIDE = np.radians(180.0), 0.5  # rad/s and m/s
+ASSUMED_SPEED = np.radians(180.0)  # rad/s
 
 Check = Literal["limits", "reach", "configuration", "singularity", "rates", "self-collision", "scene", "tool"]
 CHECKS: tuple[Check, ...] = ("limits", "reach", "configuration", "singularity", "rates", "self-collision")
@@ -206,21 +208,28 @@ def assumed_limits(robot: Robot, options: CheckOptions) -> JointLimits:
 
     Returns
     -------
-    limits : those of the options if they have any; else the robot's speeds, with 180 deg/s or 0.5 m/s for unknown ones,
+    limits : those of the options if they have any; else the robot's speeds, with 180 deg/s for unknown ones,
         and accelerations that reach them in ``ACCELERATION_TIME``
     """
-    assumed = np.where(robot.slides, ASSUMED_SLIDE, ASSUMED_SPEED)
+    assumed = np.full(robot.joints, ASSUMED_SPEED)
     return options.joint_limits or joint_limits(robot, assumed, ACCELERATION_TIME)
 
 
-def check_program(program: Program, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
+def check_program(program: Program | str | Path, robot: Robot, options: CheckOptions | None = None) -> ProgramCheck:
     """Follow a program and check each of its motions.
+
+    Parameters
+    ----------
+    program : its file, or what ``er3a.read_program`` read from it
 
     Raises
     ------
+    InputError
+        for a file that can't be read as a program
     ShapeError, PoseError
         for a start without one value for each joint, and a frame that is not a rigid transform
     """
+    program = program if isinstance(program, Program) else read_program(program)
     options = options or CheckOptions()
     judge = Judge(robot, CheckRules(options.near, assumed_limits(robot, options), options.assumed))
     execution = execute(program, robot, options.start, options.frames, options.limits, judge)

@@ -14,7 +14,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.errors import PoseError
-from er3a.finding import Finding, fact, turned_or_moved
+from er3a.finding import Amount, Finding, fact, turned_or_moved
 from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
@@ -25,7 +25,6 @@ from er3a.planning import motion_faults
 from er3a.planning.timing import JointLimits
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
 from er3a.programs.solving import WIDE_STEP, joints_along, way_of
-from er3a.robots.joint_limits import joint_shown
 from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
@@ -407,8 +406,8 @@ def _stopped(path: MotionPath, target: Reals) -> Finding:
     away = np.abs(solutions.q - last).max(axis=1)
     other = solutions.q[int(away.argmin())] - last
     joint = int(np.abs(other).argmax())
-    turned, slides = joint_shown(arm, joint, float(other[joint]))
-    return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, jump=turned_or_moved(turned, slides))
+    jump = Amount(float(np.degrees(other[joint])), "deg")
+    return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, jump=jump)
 
 
 def _proper(T: Reals) -> Reals:
@@ -474,9 +473,9 @@ def _beyond_rates(
     found: Shares = {}
     for j in np.flatnonzero(needed.max(axis=0) > OVER_SPEED * able).tolist():
         first = int(np.argmax(needed[:, j] > OVER_SPEED * able[j]))
-        (worst, slides), (most, _) = (joint_shown(path.arm, j, float(each[j])) for each in (needed.max(axis=0), able))
+        worst, most = np.degrees(needed[:, j].max()), np.degrees(able[j])
         assumed = order == 1 and not np.isfinite(path.arm.speed[j])
-        found[motion_faults.rate_fault(order, j + 1, worst, most, slides, assumed)] = begins(j, first)
+        found[motion_faults.rate_fault(order, j + 1, float(worst), float(most), False, assumed)] = begins(j, first)
     return found
 
 
@@ -502,7 +501,7 @@ def far_turns(path: MotionPath) -> list[Finding]:
     """
     arm, start, step = path.arm, path.q[0], path.q[-1] - path.q[0]
     found: list[Finding] = []
-    turned = np.where(arm.slides, 0.0, np.abs(step))
+    turned = np.abs(step)
     lead = int(np.argmax(turned))
     if turned[lead] > FAR_TURN and path.length < NEAR_MOVE:
         tool = forward(arm, path.q[[0, -1]])[:, :3, :3]
@@ -570,5 +569,5 @@ def arrives_otherwise(path: MotionPath, given: Reals) -> Finding | None:
     if path.end is None or np.abs(path.end - given).max() <= SAME_ARRIVAL:
         return None
     joint = int(np.argmax(np.abs(path.end - given)))
-    differs, slides = joint_shown(path.arm, joint, float(path.end[joint] - given[joint]))
-    return fact("arrives_otherwise", joint=joint + 1, difference=turned_or_moved(differs, slides))
+    differs = Amount(float(np.degrees(path.end[joint] - given[joint])), "deg")
+    return fact("arrives_otherwise", joint=joint + 1, difference=differs)

@@ -37,9 +37,8 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     ----------
     found : ``motion_collides``: ``touches`` in the order of first contact, each ``bodies_touch``: of ``pair``, from a
         time (``t_s``) of the motion on, and a place of a line (``at_mm``); ``depth_mm`` at most; ``at_target``: whether
-        they overlap at the motion's end; ``enlarged_mm``: by how much their shapes are larger than the meshes in them,
-        so that an overlap by less is no contact for sure; ``assumed``: by shapes of the arm that no
-        document gives, and by none of what is carried
+        they overlap at the motion's end; ``certain``: as of ``collision.shapes.surely_touch``; ``assumed``: by
+        shapes of the arm that no document gives, and by none of what is carried
     others : findings of the same instruction
 
     Returns
@@ -50,7 +49,7 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
     for touch in (touch for other in others for touch in other.touches):
         first = deepest.setdefault(touch.pair, touch)
         depth, at_target = max(first.depth_mm, touch.depth_mm), first.at_target or touch.at_target
-        deepest[touch.pair] = first.but(depth_mm=depth, at_target=at_target)
+        deepest[touch.pair] = first.but(depth_mm=depth, at_target=at_target, certain=first.certain or touch.certain)
     return found.but(touches=tuple(deepest.values()))
 
 
@@ -70,7 +69,7 @@ def level_of(finding: Finding) -> Level:
 
     Parameters
     ----------
-    finding : of any kind; a collision fails only with shapes that are not assumed, and bodies that overlap for certain
+    finding : of any kind; a collision fails where bodies touch for certain
 
     Returns
     -------
@@ -85,8 +84,8 @@ def level_of(finding: Finding) -> Level:
             return "fail" if refused else "caution" if word else "note"
         case Finding(code="suspect_number", kind="impossible_speed" | "mm" | "mm/s"):
             return "fail"
-        case Finding(code="motion_collides", touches=touches, assumed=assumed):
-            return "fail" if not assumed and any(touch.depth_mm > touch.enlarged_mm for touch in touches) else "caution"
+        case Finding(code="motion_collides", touches=touches):
+            return "fail" if any(touch.certain for touch in touches) else "caution"
     if finding.code in FAILS:
         return "caution" if getattr(finding, "basis", "") == "assumed" else "fail"
     return "note" if finding.code in NOTES else "caution"

@@ -67,7 +67,7 @@ def _other_units(motions: list[tuple[Step, ArmMotion]], robot: Robot, in_mm: boo
             small = np.count_nonzero(np.abs(xyz) > 1e-9) >= 2 and np.abs(xyz).max() < SMALL
             if (small or not in_mm) and 0.1 * reach < other * np.linalg.norm(xyz) < 1.5 * reach:
                 yield step, meant, _listed(xyz * scale, unit), _listed(xyz * scale * other, unit)
-        elif isinstance(target, JointTarget) and not robot.slides.any() and np.isfinite(target.joints).all():
+        elif isinstance(target, JointTarget) and np.isfinite(target.joints).all():
             q = target.joints
             degrees = np.degrees(q)
             if in_mm and may_be_radians(degrees.tolist()):
@@ -88,7 +88,7 @@ def _value(rate: Rate | None, unit: str) -> float | None:
 
 
 def _speeds(motions: list[tuple[Step, ArmMotion]], robot: Robot) -> Iterator[Suspect]:
-    known = not robot.slides.any() and np.isfinite(robot.speed).all()
+    known = np.isfinite(robot.speed).all()
     fastest = float(robot.speed.sum()) * arm_length(robot) if known else np.inf  # no point of the arm is faster
     quickest = 2 * float(robot.speed.max()) if known else np.inf
     for step, motion in motions:

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from er3a.by_value import ByValue
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_shapes, enlarged_by
+from er3a.collision.shapes import arm_shapes, surely_touch
 from er3a.errors import PoseError
 from er3a.finding import Amount, Finding, fact, is_one
 from er3a.kinematics.batch import inverse_batch
@@ -424,7 +423,7 @@ class Obstacles:
                 pair=name,
                 t_s=float(path.law.times(np.array(at))),
                 at_mm=path.along_mm(at) if path.of_tool else None,
-                enlarged_mm=1000 * enlarged_by(self.robot, self.scene, names_of(name)),
+                certain=surely_touch(self.robot, name, float(depths[:, k].max()) / 1000, self.assumed_margin),
                 at_target=bool(depths[-1, k] > 0 and shares[-1] > 1 - 1e-9),
             )
             touches.append(touch)

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from er3a.errors import InputError
 from er3a.finding import fact, is_one
-from er3a.programs.csv_program import read_csv_program
 from er3a.programs.evaluation import MAX_ROBOT_AXES, Dialect
 from er3a.programs.instructions import JointTarget, Listing
 from er3a.programs.krl.dialect import KrlDialect
@@ -50,8 +49,7 @@ class Language:
     sign : a regular expression that texts of the language match; empty where the opening alone decides
     opening : with what all its texts begin, and those of no other language
     dialect : the meaning of its expressions, motions and functions when a program runs
-    writer : None of a table over time (:func:`er3a.programs.csv_program.write_csv`)
-    joints : how many joint angles a target can have; None for any number, of prismatic joints too
+    joints : how many joint angles a target can have
     points : suffix of the file with a program's points, where they stand in one of their own
     contents : suffix of a file that only lists a program's modules
     companions : what finds the files that belong to a program: modules that it calls, points, the controller's data
@@ -62,8 +60,8 @@ class Language:
     sign: str
     reader: Callable[[ProgramText], Program]
     dialect: Callable[[], Dialect]
-    writer: Callable[[Listing, WriteOptions], Writer] | None
-    joints: range | None
+    writer: Callable[[Listing, WriteOptions], Writer]
+    joints: range
     opening: str = ""
     points: str = ""
     contents: str = ""
@@ -74,7 +72,6 @@ KRL_SIGN = r"(?im)^\s*(?:&ACCESS|(?:GLOBAL\s+)?DEF(?:FCT)?\s+[\w$\[\]\s]*\([^)]*
 UR_SIGN = r"(?m)^\s*(?:def\s+\w+\(.*\)\s*:|move[jlpc]\(|set_tcp\()"
 RPL_SIGN = r"(?m)\bM(?:JOINT|LIN)\s*\(|:=|^\s*END_\w+\s*;"
 RAPID_SIGN = r"(?im)^\s*(?:%%%\s*$|MODULE\s+\w+|(?:LOCAL\s+)?PROC\s+\w+\s*\(|(?:CONST|PERS|VAR)\s+\w+\s+\w+.*:=\s*\[)"
-CSV_SIGN = r"(?m)^[^#\n]*\bq1_(?:deg|mm)\b[^\n]*[,;\t]"
 SIX = range(6, 7)
 UP_TO_SIX = range(1, MAX_ROBOT_AXES + 1)  # A1 to A6; E1 to E6 are axes beside the arm
 LANGUAGES: dict[LanguageName, Language] = {
@@ -101,7 +98,6 @@ LANGUAGES: dict[LanguageName, Language] = {
         contents=".pgf",
         companions=modules_of,
     ),
-    "csv": Language("CSV", (".csv",), CSV_SIGN, read_csv_program, RplDialect, None, None),
 }
 """Languages by name, in the order in which their signs are looked for."""
 SUFFIXES: dict[str, LanguageName] = {suffix: name for name, each in LANGUAGES.items() for suffix in each.suffixes}
@@ -110,7 +106,7 @@ WITHOUT_JOINTS = "Write a table (csv), or a language that has these joints"
 
 
 def read_program(path: str | Path) -> Program:
-    """Read a robot program in one of the registered languages, or a CSV table of joints.
+    """Read a robot program in one of the registered languages.
 
     Raises
     ------
@@ -118,6 +114,9 @@ def read_program(path: str | Path) -> Program:
         for a file that is none of these, or with unterminated blocks, strings or comments
     """
     path = Path(path)
+    if path.suffix.lower() == ".csv":
+        problem = "a table of joint values is a path, not a program"
+        raise InputError(path, None, problem, "Name it in a path of kind table (docs/paths.md)")
     for each in LANGUAGES.values():
         held = {each.points: "holds the points", each.contents: "lists the modules"}.get(path.suffix.lower() or "none")
         if held is not None:
@@ -173,7 +172,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def write_program(listing: Listing, language: LanguageName, options: WriteOptions | None = None) -> WrittenProgram:
-    """Write a listing as the files of a language. For tables over time use :func:`er3a.programs.csv_program.write_csv`.
+    """Write a listing as the files of a language; tables over time: :func:`er3a.programs.motion_table.write_csv`.
 
     Raises
     ------
@@ -182,17 +181,15 @@ def write_program(listing: Listing, language: LanguageName, options: WriteOption
     InputError
         for an arm for which the language has no joint targets
     """
-    writer = LANGUAGES[language].writer if language in LANGUAGES else None
-    if writer is None:
-        known = ", ".join(name for name, each in LANGUAGES.items() if each.writer)
-        raise ValueError(f"no writer for {language!r}; known: {known}")
+    if language not in LANGUAGES:
+        raise ValueError(f"no writer for {language!r}; known: {', '.join(LANGUAGES)}")
     options = options or WriteOptions()
     counts = {len(each.target.joints) for each in listing.motions if isinstance(each.target, JointTarget)}
     reasons = [not_written(language, options.robot)] if options.robot is not None else []
     for reason in (*reasons, *(_other_count(LANGUAGES[language], count) for count in sorted(counts))):
         if reason:
             raise InputError(None, None, reason, WITHOUT_JOINTS)
-    return writer(listing, options).write()
+    return LANGUAGES[language].writer(listing, options).write()
 
 
 def not_written(language: LanguageName, robot: Robot) -> str:
@@ -200,13 +197,15 @@ def not_written(language: LanguageName, robot: Robot) -> str:
 
     Parameters
     ----------
-    language : one of those registered; a table (CSV) holds any joints
+    language : one of those registered, or a table over time (csv), which holds any joints
 
     Returns
     -------
     reason : in words, such as too many joints, or one that slides; empty if it has
     """
-    if LANGUAGES[language].joints is not None and robot.slides.any():
+    if language == "csv":
+        return ""
+    if robot.slides.any():
         slide = int(robot.slides.argmax()) + 1
         return f"joint {slide} of this arm slides, and joint targets are read and written as angles"
     return _other_count(LANGUAGES[language], robot.joints)
@@ -229,7 +228,7 @@ def titles_unwritten(languages: Iterable[LanguageName], robot: Robot) -> list[st
 def _other_count(language: Language, joints: int) -> str:
     """Why a language has no joint targets of so many angles; empty if it has."""
     known = language.joints
-    if known is None or joints in known:
+    if joints in known:
         return ""
     has = f"{known[0]} to {known[-1]}" if len(known) > 1 else str(known[0])
     return f"{language.title} gives an arm {has} joint angles, and this arm has {joints}"

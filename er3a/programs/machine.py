@@ -527,7 +527,7 @@ def execute(
     ShapeError, PoseError
         for a start without one value for each joint, and a frame that is not a rigid transform
     """
-    if robot is not None and (reason := _not_meant(program, robot)):
+    if robot is not None and (reason := not_written(program.language, robot)):
         raise InputError(program.file, None, reason, "Give the arm that the program is meant for")
     if robot is not None and start is not None and np.shape(start) != robot.lower.shape:
         raise ShapeError("start", np.shape(start), f"({len(robot.lower)},)")
@@ -545,15 +545,3 @@ def execute(
         cell = replace(cell, joints=robot.joints, tool=robot.tool, base=np.eye(4))
     dialect = LANGUAGES[program.language].dialect()
     return Machine(program, dialect, cell, limits or RunLimits(), mover).run()
-
-
-def _not_meant(program: Program, robot: Robot) -> str:
-    """Why a program is none of an arm's; empty if it is."""
-    if not program.slides:
-        return not_written(program.language, robot)
-    if len(program.slides) != robot.joints:
-        return f"the table has {len(program.slides)} joints, and this arm has {robot.joints}"
-    for joint, (slides, own) in enumerate(zip(program.slides, robot.slides.tolist()), 1):
-        if slides != own:
-            return f"joint {joint} is in {'mm' if slides else 'deg'}, and this arm's {'slides' if own else 'turns'}"
-    return ""

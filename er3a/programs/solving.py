@@ -67,10 +67,10 @@ def joints_along(robot: Robot, poses: Reals, start: Reals) -> Reals:
     rows: list[Reals] = []
     q = start
     for pose, solutions, solved in zip(poses, found.q, found.solved):
-        best = _nearest(robot, solutions[solved], q)
+        best = _nearest(solutions[solved], q)
         if best is not None and np.abs(best - q).max() > WIDE_STEP:
             again = inverse_batch(robot, pose[None], q)
-            best = _nearest(robot, again.q[0][again.solved[0]], q)
+            best = _nearest(again.q[0][again.solved[0]], q)
         if best is None:
             break
         rows.append(best)
@@ -80,12 +80,11 @@ def joints_along(robot: Robot, poses: Reals, start: Reals) -> Reals:
     return made if (off < ON_POSE).all() else made[: int(np.argmax(off >= ON_POSE))]
 
 
-def _nearest(robot: Robot, solutions: Reals, q: Reals) -> Reals | None:
+def _nearest(solutions: Reals, q: Reals) -> Reals | None:
     """Of solutions (k, n) the nearest to joints (n,), with whole turns added."""
     if not len(solutions):
         return None
-    step = solutions - q
-    step = np.where(robot.slides, step, wrap_to_pi(step))
+    step = wrap_to_pi(solutions - q)
     found: Reals = q + step[int(np.abs(step).max(axis=1).argmin())]
     return found
 

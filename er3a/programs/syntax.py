@@ -420,7 +420,6 @@ class Program(ByValue):
     entry : the routine with which it begins
     data : declarations (of a .dat or .var file, or of global variables), carried out first
     findings : about the text
-    slides : whether each joint of a table slides, its targets in m; empty of other programs
     constants : variables that nothing may change
     """
 
@@ -432,7 +431,6 @@ class Program(ByValue):
     data: tuple[Assign, ...] = ()
     findings: tuple[Finding, ...] = ()
     lines: tuple[str, ...] = field(default=(), repr=False)
-    slides: tuple[bool, ...] = ()
     constants: frozenset[str] = frozenset()
 
     def operations(self) -> Iterator[Operation]:

@@ -373,14 +373,12 @@ class Writer(ABC):
         return speed.value * self._greatest_speed(0 if moved is None else int(np.argmax(moved)))
 
     def _speed_of(self, joint: int) -> tuple[float, str]:
-        """A joint's greatest speed, rad/s or m/s, and as a text with its unit where it is assumed."""
+        """A joint's greatest speed, rad/s, and as a text with its unit where it is assumed."""
         robot, given = self.robot, self.options.assumed_speed
         if robot is not None and not np.isnan(robot.speed[joint]):
             return float(robot.speed[joint]), ""
-        slides = robot is not None and bool(robot.slides[joint])
-        usual = ASSUMED_SLIDE_SPEED if slides else ASSUMED_JOINT_SPEED
-        speed = usual if given is None else float(given[joint])
-        return speed, f"{1000 * speed:g} mm/s" if slides else f"{math.degrees(speed):g} deg/s"
+        speed = ASSUMED_JOINT_SPEED if given is None else float(given[joint])
+        return speed, f"{math.degrees(speed):g} deg/s"
 
     def _greatest_speed(self, joint: int) -> float:
         """What decides a motion's speed; counted where it is assumed."""
@@ -648,7 +646,7 @@ def principal_axes(load: MassBody) -> tuple[Reals, Reals]:
 
 
 LOAD_DIGITS = 9  # of masses in kg, centres in m, moments in kg m^2
-ASSUMED_JOINT_SPEED, ASSUMED_SLIDE_SPEED = math.radians(100), 0.5  # rad/s, m/s, where nobody states a joint's greatest
+ASSUMED_JOINT_SPEED = math.radians(100)  # rad/s, where nobody states a joint's greatest
 
 
 def by_length(ready: ReadyMotion, unit: str) -> float | None:

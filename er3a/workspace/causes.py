@@ -1,28 +1,24 @@
-"""The causes of a void. Each limit is widened alone, and the void's cells are decided again. Then single entries of the
-table are changed, to find causes other than a limit.
+"""The causes of a void: each limit is widened alone, and the void's cells are decided again.
 
-The commonest mistakes in a table are an offset that is off by a right angle, a reversed direction, and a length with
-the other sign or with half or twice its value (a diameter for a radius). Each changes the whole reach of the arm, so
-all voids of the changed arm are examined, not only the void's own cells. A void does not show which change is right;
-references do.
+Whether an entry of the table is wrong a void can't show; references and measured poses do (:mod:`er3a.diagnosis`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Finding, fact
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.arcs import FULL_TURN
 from er3a.workspace.cells import in_section, in_space
 from er3a.workspace.general_arm import general_arm
-from er3a.workspace.general_proof import prove_general, unfilled_about
-from er3a.workspace.proven import SETTLED, TARGET, Cavity, SectionMap, cavities
+from er3a.workspace.general_proof import unfilled_about
+from er3a.workspace.proven import Cavity
 
 PROBES, SAMPLES = 80, 65_536  # arcs of a void that are decided again, each from so many random joint values
 Unit = Literal["deg", "mm"]
@@ -215,110 +211,3 @@ def _spread_probes(cavity: Cavity) -> tuple[Cavity, Reals]:
     drawn = order[np.searchsorted(total, (np.arange(PROBES) + 0.5) * (total[-1] / PROBES))]
     chosen, times = np.unique(drawn, return_counts=True)
     return cavity.part(chosen, cavity.enclosed), times.astype(float)
-
-
-CELLS = 6000  # of the proof of each changed arm
-TURNS_DEG = (-90.0, 90.0, 180.0)  # by which an offset may be wrong
-FACTORS = (-1.0, 0.5, 2.0)  # by which a length may be wrong
-INNER = (1, 2, 3, 4)  # joints 2 to 5; turning joint 1 or 6 moves no section through the reach
-# Lengths that shape the section of an arm with a spherical wrist, by their places.
-SHAPING: dict[Literal["a", "d"], tuple[int, ...]] = {"a": (0, 1, 2), "d": (3, 5)}
-
-
-Column = Literal["offset", "direction", "a", "d", "lower", "upper"]
-EntryUnit = Literal["deg", "mm", ""]
-UNITS: dict[Column, EntryUnit] = {
-    "offset": "deg",
-    "direction": "",
-    "a": "mm",
-    "d": "mm",
-    "lower": "deg",
-    "upper": "deg",
-}
-IN_SI: dict[EntryUnit, float] = {"deg": np.pi / 180, "mm": 1e-3, "": 1.0}
-
-
-SingleChange = Finding
-"""One entry changed: ``column`` of the table ("lower" and "upper" are limits), ``joint`` 1 to 6, ``given`` and
-``tried`` in ``unit``. ``left_litres``: bounds of the changed arm's enclosed voids together, as far as a coarse
-proof finds them; None where it leaves too much undecided, which joins voids to the outside."""
-
-
-def single_changes(robot: Robot, cause: VoidCause, seed: int) -> tuple[SingleChange, ...]:
-    """Single changes of a table of an arm with a spherical wrist, judged by the voids that they leave.
-
-    Parameters
-    ----------
-    cause : what the limits say of the void; the limits that it names are among the changes
-    seed : of the random joint values of the proofs
-
-    Returns
-    -------
-    changes : those that leave least first, undecided ones last
-    """
-    found = []
-    for column, joint, given, tried in (*_of_table(robot), *_of_limits(robot, cause)):
-        proof = prove_general(general_arm(with_entry(robot, column, joint, tried))[0], TARGET, CELLS, seed)
-        enclosed = cavities(SectionMap(proof))[0] if proof.width <= SETTLED else None
-        left = None if enclosed is None else (_litres(enclosed, "lower"), _litres(enclosed, "upper"))
-        change = {"given": given, "tried": tried, "left_litres": left}
-        found.append(fact("single_change", column=column, joint=joint, unit=UNITS[column], **change))
-    return tuple(
-        sorted(found, key=lambda each: ((each.left_litres or (0, np.inf))[1], each.column, each.joint, each.tried))
-    )
-
-
-def _litres(voids: Sequence[Cavity], bound: Literal["lower", "upper"]) -> float:
-    """Volume of voids together, by their lower or upper bounds, in litres."""
-    return round(1000 * sum((void.lower if bound == "lower" else void.upper) for void in voids), 3)
-
-
-def with_entry(robot: Robot, column: Column, joint: int, value: float) -> Robot:
-    """The robot with one entry of its table, or a limit, changed.
-
-    Parameters
-    ----------
-    column : of the table, or "lower", "upper"
-    joint : from 1
-    value : in the column's unit, see ``UNITS``
-
-    Returns
-    -------
-    robot : a copy
-    """
-    values = getattr(robot, column).copy()
-    values[joint - 1] = value * IN_SI[UNITS[column]]
-    return robot.replace(**{column: values})
-
-
-Candidate = tuple[Column, int, float, float]  # column, joint from 1, given and tried in the column's unit
-
-
-def _of_table(robot: Robot) -> Iterator[Candidate]:
-    """Offsets, directions and lengths; without those that leave the reach as it is."""
-    for j in INNER:
-        if robot.upper[j] - robot.lower[j] < FULL_TURN:
-            given = float(np.degrees(robot.offset[j]))
-            for turn in TURNS_DEG:
-                yield "offset", j + 1, round(given, 9), round(180.0 - (180.0 - (given + turn)) % 360.0, 9)
-        if abs(robot.lower[j] + robot.upper[j]) > 1e-9:
-            yield "direction", j + 1, float(robot.direction[j]), -float(robot.direction[j])
-    for column, rows in SHAPING.items():
-        for k in rows:
-            mm = float(round(1000 * getattr(robot, column)[k], 6))
-            for factor in FACTORS if mm else ():
-                yield column, k + 1, mm, round(factor * mm, 6)
-
-
-def _of_limits(robot: Robot, cause: VoidCause) -> Iterator[Candidate]:
-    """The limits that a void's cause names, widened by its step; without limits of sums of joints."""
-    for limit in _named(cause):
-        if limit.factors == (1.0,) and limit.unit == "deg":
-            yield limit.side, limit.joints[0], round(limit.limit, 9), round(limit.extended, 9)
-
-
-def _named(cause: VoidCause) -> Sequence[Relaxed]:
-    """The limits that a cause names."""
-    if is_one(cause, "void_disappears"):
-        return tuple(cause.limits)
-    return () if cause.most is None else (cause.most,)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.convex import RIM
+from er3a.collision.scene import Mesh, Scene
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import link_mesh
@@ -229,6 +230,24 @@ def test_the_panel_measures_the_triangles_of_meshes(page, scene, random):
     assert 0 < (least > 0).mean() < 1
     assert np.array_equal(distance > 0, least > 0)
     assert np.abs(distance - least)[least > 0].max() < 4e-6  # corners are passed on to 1 µm
+
+
+@pytest.mark.parametrize("name", ["er3a_c60", "iiwa"])
+def test_the_panel_measures_the_triangles_of_a_scene(page, name, random):
+    """A ring that an arm without triangles reaches through, and one that it carries."""
+    robot, ring = some_arms()[name], trimesh.creation.torus(0.3, 0.05, 24, 12)
+    T = random_pose(random)
+    T[0, 3] += 0.4
+    around = Scene(
+        "rings", (Mesh("ring", T, ring.vertices, ring.faces),), (Mesh("held", T, ring.vertices / 3, ring.faces),)
+    )
+    q = joints_at_random(robot, random, POSES)
+    found = asked(page, DISTANCES, panel_data(robot, NEAR), clearance_data(robot, around), q.tolist())
+    least, _ = Bodies(robot, around).min_distance(q)
+    distance = np.array([one["distance"] for one in found])
+    assert 0 < (least > 0).mean() < 1
+    assert np.array_equal(distance > 0, least > 0)
+    assert np.abs(distance - least)[least > 0].max() < 4e-6
 
 
 def random_pose(random: np.random.Generator) -> np.ndarray:

@@ -352,13 +352,12 @@ def test_too_few_positions_are_no_gross_fault(random, monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("convert", "cause"),
+    ("convert", "cause", "known"),
     [
-        (lambda q: q[:, [0, 1, 2, 3, 5, 4]], fact("columns_swapped", first=5, second=6)),
-        (lambda q: q * [1, 1, 1, 1, -1, 1], fact("turns_other_way", joint=5)),
+        (lambda q: q[:, [0, 1, 2, 3, 5, 4]], fact("columns_swapped", first=5, second=6), True),
+        (lambda q: q * [1, 1, 1, 1, -1, 1], fact("turns_other_way", joint=5), False),
     ],
 )
-@pytest.mark.parametrize("known", [True, False])
 def test_swapped_columns_and_a_joints_sign_are_named(convert, cause, known, random, tmp_path):
     tool = np.eye(4)
     tool[:3, 3] = 0.05, 0.02, 0.1

@@ -36,6 +36,7 @@ def written(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_the_page_hands_out_the_corrected_robot(written):
     page = (written / "page.html").read_text(encoding="utf-8")
     found = re.search(r'href="data:text/plain;base64,([^"]+)" download="mine.yaml"', page)

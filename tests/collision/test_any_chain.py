@@ -141,7 +141,7 @@ def test_distances_are_those_of_coal(robot, seed):
 
 @pytest.mark.long
 @settings(max_examples=3)
-@given(robot=chains(2, 7), seed=st.integers(0, 1 << 32))
+@given(robot=chains(2, 5), seed=st.integers(0, 1 << 32))
 def test_what_never_meets_does_not(robot, seed):
     random = np.random.default_rng(seed)
     robot = with_capsules(robot, random)

@@ -98,6 +98,7 @@ def test_every_pair_of_links_stands_in_it_with_what_dense_sampling_finds(robot, 
             assert 0 < distances.min() < 0.02  # the bounds need more boxes only where it is narrow
 
 
+@pytest.mark.long
 def test_bent_tool_that_enters_the_forearm_is_found():
     """59 mm deep, at J5 of up to 105 deg, where links at most two apart used to be left out."""
     robot = bent_tool(load_robot("er3a_c60"))

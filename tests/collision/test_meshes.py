@@ -1,8 +1,7 @@
-"""Meshes as convex pieces: what holds them, what they stand out by, and every way to bring a bad one."""
+"""Mesh files: of scenes and of links, and every way to bring a bad one."""
 
 from __future__ import annotations
 
-import json
 import re
 import struct
 import subprocess
@@ -18,15 +17,15 @@ import yaml
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
-from er3a.collision.meshes import hull_of, uncovered
+from er3a.collision.scene import Box, Scene
+from er3a.collision.shapes import depths_in
 from er3a.errors import InputError
-from er3a.files.pieces_file import load_pieces
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.formats.mesh_file import read_mesh
 from er3a.formats.urdf import import_urdf
 from er3a.geometry.transforms import transform
-from er3a.pipeline.commands.robot_files import import_mesh
+from er3a.kinematics.forward import forward
 from er3a.robots.robot import ConvexPiece, PairRule
 from testing.arms import made_of
 
@@ -41,14 +40,14 @@ def angle_iron() -> trimesh.Trimesh:
 
 
 @pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of the library that writes DAE
-@pytest.mark.parametrize("suffix", ["stl", "obj", "dae", "glb"])
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae", "glb"])
 def test_formats_give_the_same_mesh(tmp_path, suffix):
     mesh = angle_iron()
     assert mesh.is_watertight
     mesh.export(tmp_path / f"iron.{suffix}")
     found = read_mesh(tmp_path / f"iron.{suffix}", "mm")
-    np.testing.assert_allclose(np.ptp(found.vertices, axis=0), [0.2, 0.2, 0.1], atol=1e-6)
-    assert len(found.faces) == 20
+    np.testing.assert_allclose(np.ptp(found[0], axis=0), [0.2, 0.2, 0.1], atol=1e-6)
+    assert len(found[1]) == 20
 
 
 @pytest.mark.long
@@ -63,77 +62,86 @@ def test_a_mesh_whose_triangles_are_turned_is_read_without_what_only_developers_
     }
     absent = [name for name, own in owners.items() if not own & ours]
     code = f"import sys; sys.modules |= dict.fromkeys({absent!r}); from er3a.formats.mesh_file import read_mesh"
-    code += "; print(len(read_mesh(sys.argv[1], 'mm').faces))"
+    code += "; from pathlib import Path; print(len(read_mesh(Path(sys.argv[1]), 'mm')[1]))"
     done = subprocess.run([sys.executable, "-c", code, tmp_path / "iron.stl"], capture_output=True, text=True)
     assert done.stdout == "20\n", done.stderr
 
 
-@pytest.mark.long
-def test_pieces_with_their_margin_hold_the_mesh_and_come_again(tmp_path):
-    angle_iron().export(tmp_path / "iron.stl")
-    made = [import_mesh(tmp_path / "iron.stl", tmp_path / f"{k}.json", "mm", 0.05, 0) for k in range(2)]
-    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
-    content = load_pieces(tmp_path / "0.json")
-    assert content == made[0]
-    assert len(content.pieces_mm) > 1
-    points = trimesh.sample.sample_surface(angle_iron(), 3000, seed=1)[0]
-    away = np.full(len(points), np.inf)
-    for piece in content.pieces_mm:
-        hull = trimesh.convex.convex_hull(np.array(piece))
-        nearest = trimesh.proximity.closest_point_naive(hull, points)[1]
-        heights = points @ hull.face_normals.T - np.einsum("ij,ij->i", hull.face_normals, hull.triangles_center)
-        inside = (heights <= 1e-9).all(axis=1)
-        away = np.minimum(away, np.where(inside, 0.0, nearest))
-    assert away.max() <= content.uncovered_mm + 1e-6
-    assert content.excess_mm < 20
+def scene_of(folder: Path, **keys: object) -> Scene:
+    (folder / "scene.yaml").write_text(yaml.safe_dump({"kind": "scene", "title": "made", **keys}), encoding="utf-8")
+    return load_scene(folder / "scene.yaml")
 
 
-@pytest.mark.long  # a kernel that takes five seconds to compile
-def test_what_stands_out_is_bounded_from_above_and_not_by_much():
-    """A box of which the pieces hold all but a slice of 3 mm."""
-    box = trimesh.creation.box((0.2, 0.1, 0.1))
-    corners = box.vertices.copy()
-    corners[corners[:, 0] > 0, 0] -= 0.003
-    found = uncovered(np.array(box.vertices), np.array(box.faces), [corners])
-    assert 0.003 <= found < 0.0031
+def placed(**keys: object) -> list[dict[str, object]]:
+    """An angle iron under the arm's forearm, turned, as an obstacle of a scene."""
+    return [
+        {"name": "iron", "xyz_mm": [480, -80, 500], "rpy_deg": [20, -35, 50], "mesh": "iron.ply", "unit": "mm", **keys}
+    ]
 
 
-def test_hulls_of_many_corners_get_a_margin_that_holds_the_rest(random):
-    points = random.normal(size=(2000, 3)) * 0.1
-    (piece,), margin = hull_of(points).pieces, hull_of(points).uncovered
-    assert len(piece) <= 64
-    hull = trimesh.convex.convex_hull(piece)
-    heights = points @ hull.face_normals.T - np.einsum("ij,ij->i", hull.face_normals, hull.triangles_center)
-    outside = points[(heights > 0).any(axis=1)]
-    assert len(outside)
-    assert trimesh.proximity.closest_point_naive(hull, outside)[1].max() <= margin + 1e-9
-
-
-def test_robot_and_scene_take_pieces_from_files(tmp_path, monkeypatch):
+@pytest.fixture
+def arm_and_poses(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    box = trimesh.creation.box((100.0, 100.0, 100.0))
-    box.export("cube.stl")
-    import_mesh(tmp_path / "cube.stl", tmp_path / "cube.json", "mm", 0.05, 0)
-    scene = {
-        "kind": "scene",
-        "title": "made",
-        "meshes": [{"name": "cube", "xyz_mm": [500, 0, 0], "pieces": "cube.json"}],
-    }
-    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(scene), encoding="utf-8")
-    plain = {"kind": "scene", "title": "made", "boxes": [{"name": "cube", "size_mm": [100] * 3, "xyz_mm": [500, 0, 0]}]}
-    (tmp_path / "plain.yaml").write_text(yaml.safe_dump(plain), encoding="utf-8")
-    robot, q = load_robot("er3_600"), np.radians([[0, -60, 0, 0, 40, 0], [30, -30, 0, 0, 0, 0]])
-    found, expected = (clearance(robot, q, load_scene(f"{name}.yaml")).distance for name in ("scene", "plain"))
-    np.testing.assert_allclose(found, expected, atol=1e-7)
+    angle_iron().export(tmp_path / "iron.ply")
+    robot = load_robot("er3_600")
+    return robot, np.random.default_rng(7).uniform(robot.lower, robot.upper, (400, 6))
 
+
+def test_a_mesh_of_a_scene_is_checked_by_its_triangles(tmp_path, arm_and_poses):
+    """The forearm's capsules against the solid of the angle iron: two boxes, which share an edge."""
+    robot, q = arm_and_poses
+    found = clearance(robot, q, scene_of(tmp_path, meshes=placed())).distance
+    T = transform(np.array([480, -80, 500]) / 1000, np.radians([20, -35, 50]))
+    plates = [
+        Box(f"{k}", T @ transform(np.array(m), np.zeros(3)), np.array(size)) for k, (m, size) in enumerate(PLATES)
+    ]
+    expected = clearance(robot, q, Scene("made", tuple(plates))).distance
+    assert ((found < 0) == (expected < 0)).all()
+    assert (expected < 0).sum() > 10
+    np.testing.assert_allclose(found[expected > 0], expected[expected > 0], atol=1e-7)
+
+
+PLATES = [((0.1, 0.01, 0.05), (0.2, 0.02, 0.1)), ((0.01, 0.1, 0.05), (0.02, 0.2, 0.1))]
+
+
+def test_what_is_inside_a_closed_mesh_is_in_collision_and_what_is_carried_moves_with_the_tool(tmp_path, arm_and_poses):
+    robot, q = arm_and_poses
+    trimesh.creation.torus(2.0, 1.9, 64, 32).export("ring.glb")
+    ring = {"name": "ring", "xyz_mm": [2000, 0, 400], "mesh": "ring.glb", "unit": "m"}
+    around = Bodies(robot, scene_of(tmp_path, meshes=[ring]))
+    assert around.overlaps(q).any(axis=1).all()
+    (depth,) = depths_in(around.scene.solids[0], np.array([[0.0, 0.0, 0.4]]))
+    assert 1.85 < depth <= 1.9
+
+    carried = {"name": "iron", "xyz_mm": [0, 0, 100], "mesh": "iron.ply", "unit": "mm"}
+    floor = {"name": "floor", "normal": [0, 0, 1], "offset_mm": 0}
+    scene = scene_of(tmp_path, planes=[floor], carried={"meshes": [carried]})
+    bodies = Bodies(robot, scene)
+    pair = next(
+        k
+        for k, each in enumerate(bodies.pairs)
+        if getattr(each, "carried", "") == "iron" and each.code == "carried_and_solid"
+    )
+    for joints in q[:50]:
+        corners = np.array(angle_iron().vertices) / 1000 + [0, 0, 0.1]
+        T = forward(robot, joints)
+        lowest = (corners @ T[:3, :3].T + T[:3, 3])[:, 2].min()
+        assert bodies.distances(joints, np.array([pair]))[0] == pytest.approx(lowest, abs=1e-7)
+
+
+@pytest.mark.usefixtures("arm_and_poses")
+def test_a_robot_takes_meshes_from_files_and_old_files_of_pieces_get_one_line(tmp_path):
     content = yaml.safe_load((ROBOTS / "er3_600.yaml").read_text(encoding="utf-8")) | {"name": "arm"}
-    content["envelopes"]["meshes"] = [{"link": 6, "pieces": "cube.json", "xyz_mm": [0, 0, 128.5]}]
+    content["envelopes"]["meshes"] = [{"link": 6, "mesh": "iron.ply", "unit": "mm", "xyz_mm": [0, 0, 128.5]}]
     (tmp_path / "arm.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     arm = load_robot(tmp_path / "arm.yaml")
-    assert len(arm.hulls) == 1
-    assert (clearance(arm, q, load_scene("plain.yaml")).distance <= expected + 1e-12).all()
-    # A gripper's own bodies are one link's: no pair.
-    assert all(pair.first != pair.second for pair in Bodies(arm, None).pairs)
+    np.testing.assert_allclose(np.ptp(arm.meshes[0].points, axis=0), [0.2, 0.2, 0.1], atol=1e-6)
+    assert all(pair.first != pair.second for pair in Bodies(arm, None).pairs)  # a gripper's own bodies are one link's
+
+    with pytest.raises(InputError) as caught:
+        scene_of(tmp_path, meshes=[{"name": "iron", "xyz_mm": [0, 0, 0], "pieces": "iron.json"}])
+    assert caught.value.field == "meshes[0].pieces"
+    assert "mesh: part.stl" in str(caught.value)
 
 
 def write_stl_head(path, triangles: int) -> None:
@@ -143,8 +151,7 @@ def write_stl_head(path, triangles: int) -> None:
 
 
 BAD = {
-    "not closed": ("is not closed: 3 edges", "Close its holes"),
-    "in metres": ("can only be metres", "--unit m"),
+    "in metres": ("can only be metres", "unit: m"),
     "ten million triangles": ("has 10000000 triangles", "Simplify"),
     "no format": ("is not a mesh format", "Save it as"),
     "empty": ("holds no triangles", "as triangles"),
@@ -157,9 +164,6 @@ def test_bad_mesh_is_refused_in_one_line(case, tmp_path):
     path = tmp_path / "mesh.stl"
     mesh = trimesh.creation.box((100.0, 100.0, 100.0))
     match case:
-        case "not closed":
-            mesh.update_faces(np.arange(12) > 0)
-            mesh.export(path)
         case "in metres":
             mesh.apply_scale(1e-3)
             mesh.export(path)
@@ -175,18 +179,6 @@ def test_bad_mesh_is_refused_in_one_line(case, tmp_path):
     for words in BAD[case]:
         assert words in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_pieces_that_were_edited_are_refused(tmp_path):
-    trimesh.creation.box((100.0, 100.0, 100.0)).export(tmp_path / "cube.stl")
-    import_mesh(tmp_path / "cube.stl", tmp_path / "cube.json", "mm", 0.05, 0)
-    content = json.loads((tmp_path / "cube.json").read_text(encoding="utf-8"))
-    content["pieces_mm"][0][0][0] += 1.0
-    (tmp_path / "cube.json").write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(InputError, match="were changed after er3a wrote them"):
-        load_pieces(tmp_path / "cube.json")
-    with pytest.raises(InputError, match="not a file of convex pieces"):
-        load_pieces(tmp_path / "cube.stl")
 
 
 def test_collision_geometry_of_a_urdf_is_taken_over(tmp_path):

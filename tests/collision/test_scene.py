@@ -68,8 +68,8 @@ BAD = {
     ),
     "name of a link": ({"boxes": [BOX | {"name": "link_3"}]}, "boxes[0]", "a part of the arm"),
     "mesh outside the study": (
-        {"meshes": [{"name": "jig", "xyz_mm": [500, 0, 0], "pieces": "../jig.json"}]},
-        "meshes[0].pieces",
+        {"meshes": [{"name": "jig", "xyz_mm": [500, 0, 0], "mesh": "../jig.stl", "unit": "mm"}]},
+        "meshes[0].mesh",
         "outside the study",
     ),
     "allowed pair of what there is not": (

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from er3a import Robot, load_robot
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import FREE, free_between, which_overlap
-from er3a.collision.scene import Box, Scene
+from er3a.collision.scene import Box, Mesh, Scene
 from er3a.collision.shapes import layout_of, link_frames
 from er3a.files.robot_writer import write_robot
 from er3a.formats.mesh_file import link_mesh
@@ -80,6 +80,7 @@ def test_what_is_inside_a_closed_surface_overlaps(arm: Robot) -> None:
             assert bodies.min_distance(q[None])[0][0] == pytest.approx(-0.2, abs=0.02)
 
 
+@pytest.mark.long
 def test_a_move_that_is_proven_free_is_free_between_its_ends(arm: Robot) -> None:
     bodies, random = Bodies(arm, None), np.random.default_rng(8)
     states = []
@@ -107,3 +108,15 @@ def test_a_robot_file_keeps_every_triangle(arm: Robot, tmp_path) -> None:
     write_robot(arm.replace(name="arm"), tmp_path / "arm.yaml")
     assert load_robot(tmp_path / "arm.yaml").meshes == arm.meshes
     assert (tmp_path / "arm.yaml").stat().st_size < 10_000
+
+
+def test_surfaces_that_cross_overlap_though_no_corner_of_one_is_inside_the_other() -> None:
+    """A bar through a plate: neither has a corner in the other."""
+    arm = load_robot("er3_600").replace(envelopes=(), hulls=())
+    bar, plate = trimesh.creation.box((0.02, 0.02, 0.5)), trimesh.creation.annulus(0.001, 0.4, 0.01)
+    arm = arm.replace(meshes=(link_mesh(6, trimesh.util.concatenate([bar, bent(np.random.default_rng(0))]).triangles),))
+    T = link_frames(arm, np.zeros(6))[6] @ trimesh.transformations.translation_matrix([0.1, 0, 0.2])
+    bodies = Bodies(arm, Scene("a", (Mesh("plate", T, plate.vertices, plate.faces),)))
+    assert bodies.overlaps(np.zeros((1, 6))).all()
+    assert bodies.min_distance(np.zeros((1, 6)))[0] < 0
+    assert not bodies.free(np.zeros((1, 6))).any()

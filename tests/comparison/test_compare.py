@@ -41,7 +41,7 @@ def arm_of(robot: er3a.Robot) -> Arm:
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_right_table_is_accused(kind):
     random = np.random.default_rng(KINDS.index(kind))
-    for _ in range(8):
+    for _ in range(3):
         arm = random_arm(random, kind)
         printed = robot(arm)
         assert er3a.compare(printed, printed).verdict == "equal"
@@ -62,7 +62,7 @@ def test_no_right_table_is_accused(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_wrong_entries_are_named(kind):
     random = np.random.default_rng(100 + KINDS.index(kind))
-    for case in range(4):  # the campaign has ten times as many
+    for case in range(2):  # the campaign has twenty times as many
         arm = random_arm(random, kind)
         made = with_wrong_entries(random, arm)
         if made is None:
@@ -79,6 +79,7 @@ def test_wrong_entries_are_named(kind):
         assert er3a.compare(found.corrected, robot(other)).geometry.same
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "seed", "case", "entries"),
     [
@@ -147,6 +148,7 @@ def test_all_alphas_negated_of_an_arm_that_is_its_own_mirror_image_are_one_slip(
     assert [each.code for each in found.causes] == ["all_alphas_negated"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("slide", "end"), [(0, "base"), (3, "flange")])
 def test_a_slip_is_named_where_base_or_flange_take_up_the_turn_of_a_slide(slide, end):
     rows = [("R", 20, 90, 100, -150, 150), ("R", 300, 0, 120, -150, 150), ("R", 250, 90, 40, -150, 150)]
@@ -159,6 +161,7 @@ def test_a_slip_is_named_where_base_or_flange_take_up_the_turn_of_a_slide(slide,
     assert [(each.code, each.side) for each in causes] == [("a_and_d_swapped", "a")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("slide", "entry"), [(False, "alpha3"), (True, "beta3")])
 def test_a_lean_of_the_next_axis_is_a_twist_unless_that_takes_two_entries(slide, entry):
     """Of coincident axes alpha will do with other zeros of both; a slide's theta is an entry of its own."""
@@ -216,6 +219,7 @@ def test_a_length_of_the_wrong_sign_is_named(name, entry, elsewhere):
     assert [(each.code, each.entries) for each in causes] == [("one_length_negated", (entry,))]
 
 
+@pytest.mark.long
 def test_arms_that_only_stand_or_count_otherwise_have_no_length_of_the_wrong_sign():
     right = er3a.to_standard(er3a.load_robot("er3a_c60"))
     over = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -305,6 +309,7 @@ def test_couplings_and_counts_and_kinds():
     assert (slides.verdict, slides.geometry.differences[0].entry) == ("other_arm", "type3")
 
 
+@pytest.mark.long
 def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
     right = er3a.load_robot("er3a_c60")
     moved, turned = np.radians([0, 30, -20, 0, 10, 0]), np.where(np.arange(6) == 2, -1, 1)
@@ -509,6 +514,7 @@ def test_a_table_in_other_units_than_it_says_is_not_usable_as_printed(given, tmp
     assert compared(right, right)[0] == 0
 
 
+@pytest.mark.long
 def test_a_page_says_the_unit_in_doubt_before_another_arm_as_the_command_line_does(tmp_path):
     """Half the angles in radians, another upper arm: no change of units explains it, so the unit stays a doubt."""
     right = with_columns(tmp_path).rename(tmp_path / "right.csv")
@@ -566,6 +572,7 @@ def test_inches_are_recognised_where_they_are_round_millimetres(decimals, tmp_pa
     assert read_arm(str(path), length_unit="mm").robot.a[1] == pytest.approx(lengths[1][0] / 1000)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 def test_links_too_long_in_metres_are_in_inches_and_that_is_said_first_of_another_arm_too(tmp_path):
     other, bare = with_columns(tmp_path).rename(tmp_path / "ur5.csv"), tmp_path / "ur3.csv"

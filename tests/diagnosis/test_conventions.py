@@ -25,6 +25,7 @@ def other_conventions(robot: er3a.Robot, seed: int) -> er3a.Robot:
     return robot.replace(offset=offset, direction=direction, base=base)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in (1, 4, 5))])
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_conventions_are_named_whatever_their_number(name, seed):
@@ -65,6 +66,7 @@ def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
     assert {each.code for each in best.faults if not is_one(each, *CONVENTIONS)} == {"wrong_limit"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("column", "rows", "amount"),
     [

@@ -153,6 +153,7 @@ def test_noise_raises_no_alarm(name, random):
         assert er3a.diagnose(robot, silent) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "noise_mm", "every"),
     [

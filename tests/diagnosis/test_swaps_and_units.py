@@ -177,7 +177,6 @@ class Search:
 
 CORRUPTED: list[tuple[str, list[str], dict[tuple[int, int], float]]] = [
     ("er3_600", ["rows 2 and 3"], {(D, 3): 0.03}),
-    ("er3_600", ["alpha in deg", "d x 1000"], {}),
     ("er3a_c60", ["convention", "direction3"], {}),
 ]
 

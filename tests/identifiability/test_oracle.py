@@ -141,6 +141,7 @@ def found_elsewhere() -> list[oracle.Rows]:
     speaking = [k for k, entry in enumerate(free) if entry.name in free_of("er3_600")]
     asked = Asked(robot, requirements_of(stated))
     extents = Extents(asked, table, free, speaking, gauge_of(robot, free), ToolRange(robot, table))
+    assert extents.met
     arms = [extents.region.tables(direction[None], amounts[None]) for direction, amounts in extents.elsewhere]
     return [{name: getattr(arm, name) for name in oracle.COLUMNS} for arm in arms]
 
@@ -164,18 +165,8 @@ def test_the_drawing_settles_no_entry_of_the_er3_600():
 @pytest.mark.long
 def test_tables_far_away_meet_the_drawing():
     """Tables that evidence finds far from the er3_600's, with some joints reversed, are put to the oracle."""
-    robot, references = load_robot("er3_600"), load_references("er3_600")
-    drawn = [each for each in references.references if each.document == "drawing_v1_1"]
-    free = [entry for entry in continuous_of(robot) if entry.name in free_of("er3_600")]
-    table = tables_of(robot)
-    every, gauge = continuous_of(robot), gauge_of(robot, continuous_of(robot))
-    speaking = [k for k, entry in enumerate(every) if entry in free]
-    extents = Extents(Asked(robot, requirements_of(drawn)), table, every, speaking, gauge, ToolRange(robot, table))
-    assert extents.met
-    assert extents.elsewhere
-    for direction, amounts in extents.elsewhere:
-        arm = extents.region.tables(direction[None], amounts[None])
-        rows = {name: getattr(arm, name) for name in oracle.COLUMNS}
+    assert found_elsewhere()
+    for rows in found_elsewhere():
         assert oracle.worst(rows, independent("er3_600"))[0] <= FEASIBLE
 
 

@@ -15,6 +15,7 @@ import er3a
 from er3a.errors import InputError
 from er3a.files.arithmetic import amount_of
 from er3a.files.dh_table import read_dh_table
+from er3a.pipeline.study import load_study
 
 # a mm, alpha deg, d mm, offset deg of an IRB 120
 IRB120 = [(0, -90, 290, 0), (270, 0, 0, -90), (70, -90, 0, 0), (0, 90, 302, 0), (0, -90, 0, 0), (0, 0, 72, 180)]
@@ -182,7 +183,7 @@ ROWS = st.tuples(LENGTHS, st.sampled_from([0, 90, -90, 180, 60]), LENGTHS, st.sa
 
 
 @pytest.mark.long
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     rows=st.lists(ROWS, min_size=2, max_size=7),
     form=st.sampled_from(FORMS),
@@ -300,4 +301,13 @@ def test_a_table_comes_from_standard_input_and_from_a_text(monkeypatch, tmp_path
     np.testing.assert_allclose(numbers(content), IRB120)
     with pytest.warns(er3a.InputWarning):
         robot = er3a.read_table(text)
+    np.testing.assert_allclose(robot.a, [row[0] / 1000 for row in IRB120])
+
+
+def test_a_study_names_a_table_as_it_is_found(tmp_path):
+    (tmp_path / "mine.md").write_text(markdown(IRB120, list(NAMES), "q{}"))
+    study = load_study("config/small.yaml")
+    entry = study.entry("er3_600").model_copy(update={"file": str(tmp_path / "mine.md")})
+    with pytest.warns(er3a.InputWarning):
+        robot = study.model_copy(update={"robots": {"mine": entry}}).robot("mine")
     np.testing.assert_allclose(robot.a, [row[0] / 1000 for row in IRB120])

@@ -14,10 +14,11 @@ import psutil
 import pytest
 
 from er3a.files.kept_files import half_written
-from er3a.pipeline.stages.registry import STAGES
 from testing.processes import started
 from testing.small_study import STUDY
 from tests.conftest import ROBOT, leave_one_robot
+
+STAGES_RUN = ("validation", "workspace", "inverse")
 
 
 def finished_results(run) -> list[Path]:
@@ -32,9 +33,11 @@ def finished_results(run) -> list[Path]:
 
 @pytest.mark.long
 def test_kill_9_in_mid_run_then_the_same_bytes_on_one_core(small_study, fresh_project):
+    """Of some stages; the campaign on kills has all, with pages and recordings."""
     run = fresh_project("killed")
     leave_one_robot(run.folder / STUDY)
-    command = [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--", "--cores", "2"]
+    wanted = [f"results/{ROBOT}/{stage}/summary.json" for stage in STAGES_RUN]
+    command = [sys.executable, "-m", "er3a", "run", "--study", STUDY, "--", "--cores", "2", *wanted]
     quiet = subprocess.DEVNULL
     with started(command, cwd=run.folder, env=run.environment(), stdout=quiet, stderr=quiet):
         deadline = time.monotonic() + 120
@@ -44,17 +47,13 @@ def test_kill_9_in_mid_run_then_the_same_bytes_on_one_core(small_study, fresh_pr
     assert finished
     assert any((run.folder / ".snakemake/locks").iterdir()), "the killed run should have left its lock"
 
-    done = run.make_run("--cores", "1")
+    done = run.make_run("--cores", "1", *wanted)
     assert "left its lock" in done.stderr
-    results = [path for path in (small_study.folder / "results" / ROBOT).rglob("*") if path.is_file()]
-    assert len(results) >= 2 * len(STAGES)
-    for path in results:
-        assert (run.folder / path.relative_to(small_study.folder)).read_bytes() == path.read_bytes(), path.name
-    for path in (small_study.folder / "reports" / ROBOT).rglob("*.rrd"):
-        command = [Path(sys.executable).with_name("rerun"), "rrd", "compare", "--unordered", path]
-        command.append(run.folder / path.relative_to(small_study.folder))
-        compared = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert compared.returncode == 0, f"{path}: {compared.stderr[-500:]}"
+    for stage in STAGES_RUN:
+        results = [path for path in (small_study.folder / "results" / ROBOT / stage).rglob("*") if path.is_file()]
+        assert len(results) >= 2
+        for path in results:
+            assert (run.folder / path.relative_to(small_study.folder)).read_bytes() == path.read_bytes(), path.name
     for path, changed in finished.items():
         assert path.stat().st_mtime_ns == changed, f"{path} was finished and yet made again"
 

@@ -108,6 +108,7 @@ def stranger(tmp_path: Path) -> Iterator[tuple[Path, Callable[..., str]]]:
     assert not list(folder.rglob("ran"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [("-c", "import numba"), ("-Pm", "snakemake", "-s", ROOT / "Snakefile", "-n")])
 def test_the_poison_works(tmp_path, words):
     """As of a Python and a Snakemake that nobody calls with care."""
@@ -119,6 +120,7 @@ def test_the_poison_works(tmp_path, words):
     assert marker.exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "code"),
     [
@@ -159,6 +161,7 @@ def test_a_folder_written_into_that_links_elsewhere_is_refused_and_nothing_there
     assert (foreign / "locks/precious").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", CODE_OF_LIBRARIES)
 def test_a_folder_with_code_of_libraries_is_refused_by_jobs_too(stranger, place):
     folder, call = stranger
@@ -168,10 +171,10 @@ def test_a_folder_with_code_of_libraries_is_refused_by_jobs_too(stranger, place)
         assert call("er3a", *words, code=2).startswith(f"error: {place}: ")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "environment", "code"),
     [
-        (("--profile", "site"), {}, 2),
         ((), {"SNAKEMAKE_PROFILE": "site"}, 2),
         (("--workflow-profile", "site"), {}, 2),
         (("--workflow-profile", "slurm"), {}, 0),

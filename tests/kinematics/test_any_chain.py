@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from er3a.files.robot_library import load_robot
@@ -41,7 +41,6 @@ def stanford() -> Robot:
     )
 
 
-@settings(max_examples=100)
 @given(data=st.data(), robot=chains())
 def test_any_chain_agrees_with_pinocchio(data, robot):
     q, peer = data.draw(joints_within(robot))[None], PinocchioArm(robot)
@@ -55,7 +54,6 @@ def test_any_chain_agrees_with_pinocchio(data, robot):
         np.testing.assert_allclose(forward(same, q), forward(robot, q), rtol=0, atol=1e-11)
 
 
-@settings(max_examples=40)
 @given(data=st.data(), robot=chains(coupled=False))
 def test_many_tables_have_the_frames_of_one(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])
@@ -64,7 +62,6 @@ def test_many_tables_have_the_frames_of_one(data, robot):
 
 
 @pytest.mark.long
-@settings(max_examples=40)
 @given(robot=chains())
 def test_no_sample_leaves_the_bound_and_single_precision_follows_double(robot):
     grid, draw = make_grid(robot, 16), Draw(7, 600, 2)
@@ -141,7 +138,6 @@ def test_the_sums_limit_is_named():
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.InputWarning")
-@settings(max_examples=60)
 @given(robot=chains())
 def test_any_chain_is_written_and_read_back(robot, tmp_path_factory):
     robot = robot.replace(

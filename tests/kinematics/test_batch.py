@@ -39,7 +39,7 @@ def test_the_careful_solver_agrees(robot, random):
     np.testing.assert_allclose(solved.q[regular], slots[regular], rtol=0, atol=1e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved(data, robot):
     q = np.array([data.draw(joints_within(robot)) for _ in range(3)])

@@ -61,11 +61,11 @@ ARMS = {
 @pytest.mark.parametrize("code", [code for code in ARMS if code != "spherical_wrist"])
 def test_the_own_joints_are_found_and_all_rows_meet_the_task(code, random):
     robot, slots = ARMS[code]
-    q = random.uniform(robot.lower, robot.upper, (30, robot.joints))
+    q = random.uniform(robot.lower, robot.upper, (12, robot.joints))
     T = forward(robot, q)
     found = inverse_batch(robot, T, q)
     assert found.method.arm_class == code
-    assert found.q.shape == (30, slots, robot.joints)
+    assert found.q.shape == (12, slots, robot.joints)
     own = np.abs(found.q - q[:, None]).max(axis=2)
     assert np.nanmin(np.where(np.isnan(own), np.inf, own), axis=1).max() < 1e-6
     miss = np.abs(forward(robot, np.nan_to_num(found.q)) - T[:, None])[found.solved]

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from er3a.geometry.transforms import rot_z
@@ -137,7 +137,6 @@ def test_multistart_finds_nothing_more(name):
         assert all(nearest(found.q[n], row) < 1e-6 for row in peers)
 
 
-@settings(max_examples=25)
 @given(st.integers(0, 2**31), st.sampled_from(["puma", "ur5", "crx"]), st.sampled_from([1e-8, 1e-6, 1e-4, 1e-2]))
 @example(2536, "puma", 1e-8)  # no more than noise in four of ten readings
 @example(1021, "puma", 1e-3)  # ten zeros within five degrees
@@ -295,7 +294,6 @@ def test_classes(name, code):
     assert chain_solver(chain, np.zeros(len(chain) - 1, dtype=bool)).code == code
 
 
-@settings(max_examples=60)
 @given(st.lists(st.floats(-3.1, 3.1), min_size=1, max_size=8, unique=True), st.integers(0, 1000))
 def test_zeros_on_a_circle(angles, seed):
     random = np.random.default_rng(seed)

@@ -73,7 +73,7 @@ def nearest_member(motions: Sequence, q: np.ndarray) -> float:
 def test_the_self_motion_through_the_given_joints_is_found_beside_singular_poses(random):
     """Bends of shoulder, elbow and wrist from 1e-8 to 1e-2 rad, two by two or all: curves that nearly cross there."""
     reported = [-0.3417005342503683, 1e-5, 1.2263000935014405, -1.7252251095202824, -1.9644417498133784, -1e-5, -0.58]
-    for case in range(10):
+    for case in range(5):
         robot = seven((0.40, 0.42)[case % 2], random)
         limits = np.array([2.97, 2.09, 2.97, 3.15, 2.97, 2.09, 3.05])
         robot = robot.replace(lower=-limits, upper=limits) if case % 4 >= 2 else robot

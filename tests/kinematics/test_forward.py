@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -44,7 +44,6 @@ def test_jacobian_agrees_with_pinocchio(robot, random):
     np.testing.assert_allclose(jacobian(robot, q), PinocchioArm(robot).jacobian(q), rtol=0, atol=1e-12)
 
 
-@settings(max_examples=60)
 @given(data=st.data(), robot=arms())
 def test_random_arms_agree_with_pinocchio(data, robot):
     q = data.draw(joints_within(robot))[None]
@@ -90,7 +89,6 @@ def test_jacobian_agrees_with_central_differences(robot, random):
     np.testing.assert_allclose(jacobian(robot, q), expected, rtol=0, atol=1e-8)
 
 
-@settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_each_frame_is_the_product_of_the_rows_up_to_it(data, robot):
     q = data.draw(joints_within(robot))

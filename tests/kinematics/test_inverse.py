@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import er3a
@@ -71,7 +71,6 @@ def test_all_slots_of_a_large_batch_reproduce_their_poses(robot, random):
 
 
 @pytest.mark.long
-@settings(max_examples=200)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved(data, robot):
     q = data.draw(joints_within(robot))
@@ -86,7 +85,6 @@ def test_random_arms_are_solved(data, robot):
 
 
 @pytest.mark.long
-@settings(max_examples=40)
 @given(data=st.data(), robot=arms(orthogonal_wrist=True))
 def test_each_branch_finds_all_branches_again(data, robot):
     """With an orthogonal wrist, a shoulder branch has all four roots or none."""
@@ -159,7 +157,6 @@ def test_rows_outside_use_the_turn_nearest_to_the_range():
     assert below[3] == pytest.approx(215)
 
 
-@settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_nearest_equivalents_are_the_best_of_all_turns(data, robot):
     q, q_ref = data.draw(joints_within(robot)), data.draw(joints_within(robot))

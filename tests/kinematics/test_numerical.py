@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import er3a
@@ -44,7 +44,6 @@ def test_all_reachable_poses_are_solved(robot, random, respect_limits):
 
 
 @pytest.mark.long
-@settings(max_examples=60)
 @given(data=st.data(), robot=arms())
 def test_random_arms_are_solved_within_their_limits(data, robot):
     q = data.draw(joints_within(robot))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import qmc
 
 from er3a.numerics.quasi_random import quasi_random_points
 
 
 def test_points_fill_the_box_more_evenly_than_random_ones(random):
+    from scipy.stats import qmc  # takes a second to import
+
     lower, upper = np.array([-1.0, 0, 2, 3, -5, 6]), np.array([1.0, 0, 4, 8, 5, 7])
     points = quasi_random_points(lower, upper, 512)
     assert points.shape == (512, 6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from er3a.errors import NotWristPartitionedError
@@ -30,7 +30,6 @@ def test_determinant_is_a_constant_times_the_three_factors(robot, random):
 
 
 @pytest.mark.long
-@settings(max_examples=40)
 @given(data=st.data(), robot=arms())
 def test_determinant_of_random_arms_is_a_constant_times_the_three_factors(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])
@@ -75,7 +74,6 @@ def test_factors_need_a_wrist_partitioned_arm():
 
 
 @pytest.mark.long
-@settings(max_examples=50)
 @given(data=st.data(), robot=arms(), length=number(0.1, 2))
 def test_conditioning_agrees_with_singular_values(data, robot, length):
     q = data.draw(joints_within(robot))

@@ -30,6 +30,7 @@ def by_search(rows, T, starts):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["crx", pytest.param("manseur_doty", marks=pytest.mark.long)])
 def test_each_reading_of_the_loop_by_itself_finds_the_rows_of_all(name, random):
     arm, own = prepared(links(name)), random.uniform(-np.pi, np.pi, (1, 6))

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -60,7 +60,6 @@ def test_too_far_says_by_how_much(robot, outside):
 
 
 @pytest.mark.long
-@settings(max_examples=100)
 @given(
     lengths_m=st.tuples(number(0, 0.3), number(0.1, 1), number(-0.15, 0.15), number(0.2, 1)),
     angle=number(-1.2, 1.2),
@@ -81,7 +80,6 @@ def test_boundary_of_the_reach(lengths_m, angle, outside):
         assert gap.min() == pytest.approx(outside, abs=1e-12)
 
 
-@settings(max_examples=100)
 @given(
     lengths_m=st.tuples(number(0, 0.3), number(0.5, 1), number(-0.1, 0.1), number(0.2, 0.3)),
     angle=number(-1.2, 1.2),

@@ -52,6 +52,7 @@ def results():
     return {name: {result.name: result for result in compare_strategies(segment_of(name))} for name in LINES}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LINES)
 def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
     case = segment_of(name)

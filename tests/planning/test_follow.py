@@ -91,6 +91,7 @@ def planar_crossing(robot):
     return shifted(middle, -plane), shifted(middle, plane)
 
 
+@OTHERS_LONG
 def test_crossing_of_the_aligned_wrist_is_found_to_a_microsecond(robot):
     way = line(*planar_crossing(robot), 3.0)
     followed = follow(robot, way, np.linspace(0, 3, 100))
@@ -102,6 +103,7 @@ def test_crossing_of_the_aligned_wrist_is_found_to_a_microsecond(robot):
     assert np.ptp(followed.q[:, 3]) < 1e-5
 
 
+@OTHERS_LONG
 def test_crossing_on_a_grid_point_is_found_too(robot):
     followed = follow(robot, line(*planar_crossing(robot), 3.0), np.linspace(0, 3, 101))
     crossings = [event for event in events_of(robot, followed) if event.type == "wrist"]

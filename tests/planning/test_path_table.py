@@ -13,7 +13,7 @@ from er3a.files.path_file import read_path_table
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.programs.csv_program import write_csv
+from er3a.programs.motion_table import write_csv
 from er3a.robots.joint_limits import joint_columns
 
 RPY = "x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg"

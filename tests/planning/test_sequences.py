@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
@@ -65,7 +65,6 @@ def test_points_that_fix_no_circle_are_refused():
         arc(a, [1, 0, 0], b, 1.0)
 
 
-@settings(max_examples=60)
 @given(st.lists(st.floats(-2, 2), min_size=9, max_size=9), st.floats(1e-4, 1.0))
 def test_spin_of_a_rotation_vector_is_that_of_the_rotation(numbers, scale):
     w, v, a = np.array(numbers).reshape(3, 3) * scale

@@ -12,12 +12,16 @@ from testing.arms import OTHERS_LONG
 from testing.exact_paths import REAL, quintic_time, worst_location
 from testing.random_paths import KINDS, NEAR, Found
 
+QUICK = "joint moves"
+
 
 @OTHERS_LONG
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [QUICK, *(pytest.param(kind, marks=pytest.mark.long) for kind in KINDS if kind != QUICK)]
+)
 def test_nothing_is_missed_that_a_hundred_times_finer_sampling_finds(robot, random, kind):
     found = Found()
-    for _ in range(8):
+    for _ in range(4):
         found.add(robot, KINDS[kind](robot, random))
     assert found.missed_crossings == found.missed_passes == 0
     assert found.passes > 0

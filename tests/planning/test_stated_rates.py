@@ -16,6 +16,7 @@ def peak(curve: PPoly) -> float:
     return float(np.abs([*curve(curve.x[:-1]), *last, *curve(roots[np.isfinite(roots)])]).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degree", [1, 3, 5])
 def test_motions_and_their_peaks_are_those_of_the_polynomials_that_a_controller_makes(degree):
     random = np.random.default_rng(degree)

@@ -6,8 +6,6 @@ import warnings
 
 import numpy as np
 import pytest
-from roboticstoolbox import ctraj as toolbox_ctraj
-from roboticstoolbox import jtraj as toolbox_jtraj
 from scipy.spatial.transform import Rotation
 from spatialmath import SE3
 
@@ -27,7 +25,9 @@ def arm() -> er3a.Robot:
 
 def test_jtraj_is_the_toolbox_s_with_a_time_vector():
     q, qd, qdd = er3a.jtraj(np.zeros(6), GOAL, T)
-    theirs = toolbox_jtraj(np.zeros(6), GOAL, T)
+    from roboticstoolbox import jtraj  # takes a second to import
+
+    theirs = jtraj(np.zeros(6), GOAL, T)
     for own, other in ((q, theirs.q), (qd, theirs.qd), (qdd, theirs.qdd)):
         assert np.allclose(own, other, atol=1e-9)
 
@@ -57,7 +57,9 @@ def test_ctraj_goes_straight_and_turns_about_one_axis(arm):
 
 def test_ctraj_is_on_the_toolbox_s_trapezoid(arm):
     start, end = er3a.forward(arm, 0.3 * GOAL), er3a.forward(arm, GOAL)
-    theirs = toolbox_ctraj(SE3(start, check=False), SE3(end, check=False), len(T))
+    from roboticstoolbox import ctraj
+
+    theirs = ctraj(SE3(start, check=False), SE3(end, check=False), len(T))
     assert np.allclose(er3a.ctraj(start, end, T)[:, :3, 3], theirs.t, atol=1e-9)
 
 

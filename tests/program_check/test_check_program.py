@@ -257,7 +257,7 @@ def test_a_start_of_another_length_is_refused(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("suffix", "count"), [(".src", 20_000), (".script", 20_000), (".pgm", 100_000)])
+@pytest.mark.parametrize(("suffix", "count"), [(".src", 4000), (".pgm", 20_000)])
 def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
     angle = np.linspace(0, 60 * np.pi, count)
     x, y = 400 + 30 * np.cos(angle), 30 * np.sin(angle)
@@ -265,9 +265,6 @@ def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
     if suffix == ".src":
         lines = [f"LIN {{X {a:.3f},Y {b:.3f},Z 450,A 0,B 0,C 180}} C_DIS" for a, b in zip(x, y)]
         text = "\n".join(["DEF a( )", *lines, "END", ""])
-    elif suffix == ".script":
-        lines = [f" movel(p[{a / 1000:.6f},{b / 1000:.6f},0.45,3.14159,0,0],r=0.001)" for a, b in zip(x, y)]
-        text = "\n".join(["def a():", *lines, "end", ""])
     else:
         joints = [f"POINTJ({a:.4f},-10,-10,0,-70,0)" for a in x - 400]
         text = "\n".join(["", *(f"MJOINT({point}, v50perc, fine, tool0);" for point in joints)])

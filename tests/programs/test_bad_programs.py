@@ -45,12 +45,7 @@ LIMITS = RunLimits(operations=20_000, ways=50, rounds=20)
         ("a.script", 'def a():\n  textmsg("open)\nend\n', "a text has no end"),
         ("a.script", "def a():\n  while (True):\nend\n", "has no end"),
         ("a.script", "end\n", "without a beginning"),
-        ("a.csv", "t_s,q1_deg,q3_deg\n0,1,2\n", "q2_deg is missing"),
-        ("a.csv", "0,0,-10\n1,5,-10\n", "no joint is named by the first row (0, 0, -10)"),
-        ("a.csv", "t_s;q1_deg;q2_deg\n0;1,000;2.5\n", "decimal commas and points in one table ('1,000', '2.5')"),
-        ("a.csv", "t_s,q1_deg,q2_deg\n0,0,-10\n1,1,5,-10,5\n", "5 cells under 3 headings"),
-        ("a.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n0,0,nan,0,0,0\n", "not a finite number"),
-        ("a.csv", "t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n1,0,0,0,0,0,0\n1,0,0,0,0,0,0\n", "must rise"),
+        ("a.csv", "t_s,q1_deg\n0,1\n", "a table of joint values is a path, not a program"),
         ("a.src", "", "is empty"),
         ("a.src", "DEF a( )\nFOR i=1 TO\nENDFOR\nEND\n", "line 2: this FOR can't be read"),
         ("a.src", "DEF a( )\nSWITCH i\nCASE {\nENDSWITCH\nEND\n", "line 3: this CASE can't be read"),
@@ -165,7 +160,7 @@ def refused(path):
 
 
 @pytest.mark.long
-@settings(max_examples=120, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_damaged_programs_are_read_or_refused_clearly(data, tmp_path):
     seed = data.draw(st.sampled_from(SEEDS))
@@ -180,7 +175,7 @@ def test_damaged_programs_are_read_or_refused_clearly(data, tmp_path):
     assert error is None or (error.file == str(path) and "\n" not in str(error))
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=300), suffix=st.sampled_from([".src", ".script", ".pgm", ".XPL", ".csv", ".txt"]))
 def test_any_bytes_are_read_or_refused_clearly(content, suffix, tmp_path):
     path = tmp_path / f"any{suffix}"

@@ -10,18 +10,14 @@ from typer.testing import CliRunner
 import er3a.pipeline.messages.programs  # noqa: F401
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
-from er3a.kinematics.forward import forward
 from er3a.pipeline import cli  # noqa: F401
 from er3a.pipeline.commands.options import app
-from er3a.pipeline.messages.say import say
 from er3a.planning.commands import JointSequenceCommand
 from er3a.program_check.check_program import CheckOptions, check_program
-from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import read_program, write_program
 from er3a.programs.machine import execute
 from er3a.programs.writing import WriteOptions
-from er3a.robots.joint_limits import joint_columns, shown
 from er3a.robots.robot import Robot
 
 LENGTHS = [0.1, 0.3, 0.25, 0.05, 0.05, 0.05, 0.05, 0.05]
@@ -59,19 +55,6 @@ def test_krl_moves_as_many_axes_as_the_arm_has(joints, tmp_path):
     assert [each.kind for each in check.verdicts] == ["joint"] * len(path)
 
 
-@pytest.mark.parametrize("joints", [4, 5, 7, 8])
-def test_a_table_has_a_column_for_each_joint(joints, tmp_path):
-    robot = arm(joints)
-    q = np.random.default_rng(1).uniform(robot.lower, robot.upper, (4, joints))
-    (tmp_path / "a.csv").write_text(write_csv(np.arange(4.0), np.degrees(q), forward(robot, q)))
-    program = read_program(tmp_path / "a.csv")
-    check = check_program(program, robot, CheckOptions(start=q[0], measures=False))
-    ends = [check.motions[number].end for number in check.main]
-    np.testing.assert_allclose(np.degrees(ends), np.degrees(q), rtol=0, atol=0.51e-6)
-    with pytest.raises(InputError, match=f"the table has {joints} joints, and this arm has 6"):
-        execute(program, arm(6))
-
-
 @pytest.mark.parametrize(
     ("language", "joints"), [("krl", 7), ("krl", 8), ("urscript", 5), ("urscript", 7), ("rpl", 4), ("xpl", 8)]
 )
@@ -96,24 +79,6 @@ def test_an_arm_with_a_slide_is_refused(language, tmp_path):
     _, file = written(arm(6), language, tmp_path)
     with pytest.raises(InputError, match="joint 3 of this arm slides"):
         execute(read_program(file), arm(6, sliding=True))
-
-
-def test_a_slide_that_is_too_fast_is_told_in_millimetres_and_a_long_one_is_no_whole_turn(tmp_path):
-    """Joint 3 runs 4 m in 2 s: no turn, however many times pi metres are."""
-    robot = arm(4, sliding=True)
-    robot = robot.replace(lower=np.array([-2.5, -2.5, 0, -2.5]), upper=np.array([2.5, 2.5, 5, 2.5]))
-    q = np.array([[0.0, 0, 0, 0], [0.1, 0, 4, 0]])
-    text = write_csv(np.array([0.0, 2.0]), shown(robot, q), forward(robot, q), columns=joint_columns(robot))
-    (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(InputError, match="joint 3 is in mm, and this arm's turns"):
-        execute(read_program(tmp_path / "a.csv"), arm(4))
-    check = check_program(read_program(tmp_path / "a.csv"), robot, CheckOptions(start=q[0], measures=False))
-    found = {each.finding.code: each.finding for each in check.findings}
-    assert found.keys() == {"too_fast"}
-    assert found["too_fast"].joint == 3
-    assert found["too_fast"].limit.value == pytest.approx(500)
-    assert found["too_fast"].needed.value > 2000
-    assert "mm/s" in say(found["too_fast"])
 
 
 def test_axes_that_the_arm_does_not_have_may_be_0_and_nothing_else(tmp_path):

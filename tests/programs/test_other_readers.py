@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
-from er3a.programs.csv_program import write_csv
 from er3a.programs.instructions import (
     ArmMotion,
     Aside,
@@ -24,7 +23,6 @@ from er3a.programs.instructions import (
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
 from er3a.robots.robot import Robot
-from tests.programs.test_round_trips import ROBOT
 
 XPL = """<?xml version="1.0" encoding="utf-8"?>
 <Xpl-source><XplEnvironment>
@@ -192,34 +190,6 @@ def test_statements_outside_of_a_routine_are_the_program(tmp_path):
     execution = run(tmp_path, "a.script", "def go(x):\n  movej([x,0,0,0,0,0])\nend\ngo(0.5)\ngo(x=0.25)\n")
     assert [step.instruction.target.joints[0] for step in execution.steps] == [0.5, 0.25]
     assert [[place.line for place in step.calls] for step in execution.steps] == [[4], [5]]
-
-
-def test_a_table_without_rows_moves_nothing(tmp_path):
-    (tmp_path / "a.csv").write_text("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n")
-    assert [each.code for each in read_program(tmp_path / "a.csv").findings] == ["program_nothing_moves"]
-
-
-def test_a_table_over_time_is_written_and_read(tmp_path):
-    rng = np.random.default_rng(6)
-    joints = rng.uniform(ROBOT.lower, ROBOT.upper, (20, 6))
-    times = np.linspace(0, 3, 20)
-    text = write_csv(times, np.degrees(joints), forward(ROBOT, joints), ("a path",))
-    assert text.startswith("# a path\nt_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,roll_deg,")
-    execution = run(tmp_path, "a.csv", text)
-    back = np.array([each.target.joints for each in said(execution)])
-    np.testing.assert_allclose(np.degrees(back), np.degrees(joints), rtol=0, atol=0.51e-6)
-    poses = np.array([line.split(",")[7:10] for line in text.splitlines()[2:]], float)
-    np.testing.assert_allclose(poses, forward(ROBOT, joints)[:, :3, 3] * 1000, atol=0.51e-6)
-    assert said(execution)[1].speed.value == pytest.approx(3 / 19, abs=1e-6)
-
-
-@pytest.mark.parametrize("mark", [";", "\t"])
-def test_a_table_is_read_as_spreadsheets_write_it(tmp_path, mark):
-    rows = ["t_s,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg", "0,0,-10.5,-10,0,-70,0", "1,5.25,-10,-10,0,-70,0"]
-    text = "\n".join(row.replace(",", mark).replace(".", ",") for row in rows)
-    execution = run(tmp_path, "a.csv", text)
-    points = np.degrees([each.target.joints for each in said(execution)])
-    np.testing.assert_allclose(points, [[0, -10.5, -10, 0, -70, 0], [5.25, -10, -10, 0, -70, 0]])
 
 
 def test_a_changed_solution_or_element_is_not_taken_for_the_old_one(tmp_path):

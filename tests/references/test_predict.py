@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -195,7 +195,6 @@ def test_the_manufacturers_two_radii_conflict_and_nothing_else():
     assert not conflicts(load_references("er3a_c60").checkable)
 
 
-@settings(max_examples=50)
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(0.01, 50), st.floats(0.01, 50))
 def test_a_conflict_is_what_no_value_can_meet(first, second, u1, u2):
     pair = tuple(

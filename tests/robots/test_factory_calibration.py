@@ -110,6 +110,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OTHERS)
 def test_a_calibrated_arm_is_compared_with_its_nominal_table_by_small_numbers(name, tmp_path):
     (a, d), *deltas = OTHERS[name]

@@ -66,7 +66,7 @@ def test_names_resolve_after_files_of_that_name(tmp_path, monkeypatch):
 
 
 def test_a_study_says_where_the_numbers_are_from():
-    arm = arm_of(None, None, "irb120", name="mine")
+    arm = arm_of("irb120", "mine")
     sources = arm.robot.sources
     assert (arm.robot.name, sources["dh"].grade) == ("mine", "export")
     assert "abb_irb120_support" in arm.text
@@ -91,6 +91,7 @@ def test_an_offset_left_out_is_named(tmp_path):
     assert found["directions"]["same"]
 
 
+@pytest.mark.long
 def test_a_far_table_is_not_named(tmp_path):
     rows = [(0, -90, 290, 0, 1), (211, 0, 0, 0, 1), (33, -90, 0, 0, 1), (0, 90, 417, 0, 1), (0, -90, 0, 0, 1)]
     found = said(written(tmp_path / "table.csv", [*rows, (0, 0, 72, 0, 1)], "standard"))
@@ -113,6 +114,7 @@ def test_one_wrong_entry_or_another_unit_does_not_hide_an_arm():
     assert missed == []
 
 
+@pytest.mark.long
 def test_the_odd_one_out_of_several_sources_is_named(tmp_path):
     right = QUOTED["KUKA_KR16_2"]
     wrong = [(a, alpha, d + 10 * (k == 3), offset, sign) for k, (a, alpha, d, offset, sign) in enumerate(right)]

@@ -243,8 +243,8 @@ def test_bodies_beside_those_that_a_joint_holds_are_no_error_of_the_shapes(tmp_p
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory) -> list[tuple[str, UrdfFile, UrdfImport]]:
-    """Chains of every sixth URDF that packages bring, three of each file with several; the fleet's campaign has all."""
-    found, turn = [], cycle((True, *5 * (False,)))
+    """Chains of every twelfth URDF of packages, three of each file with several; the fleet's campaign has all."""
+    found, turn = [], cycle((True, *11 * (False,)))
     for file in urdf_files(tmp_path_factory.mktemp("expanded"), lambda name: next(turn)):
         if isinstance(file, UrdfFile):
             try:
@@ -266,7 +266,7 @@ def _has_joints(path: Path) -> bool:
 
 @pytest.mark.long
 def test_the_fleet_comes_back_and_moves_as_it_did(fleet, random, tmp_path):
-    assert len(fleet) > 25
+    assert len(fleet) > 12
     compared = 0
     for name, file, imported in fleet:
         robot = imported.robot
@@ -290,7 +290,7 @@ def test_the_fleet_comes_back_and_moves_as_it_did(fleet, random, tmp_path):
             if not any("mass and centre stay" in note or "mass was left out" in note for note in notes):
                 np.testing.assert_allclose(tau, before.torques(q, qd, qdd), atol=1e-9 * size, err_msg=name)
                 compared += 1
-    assert compared > 12
+    assert compared > 6
 
 
 # What other readers take

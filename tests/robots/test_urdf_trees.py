@@ -191,17 +191,10 @@ def test_models_of_robotics_toolbox_have_its_poses(model, random, tmp_path):
 
 PACKAGED = {
     "ur_description/urdf/ur5_robot.urdf": "three_parallel",
-    "ur_description/urdf/ur3_gripper.urdf": "three_parallel",
-    "z1_description/urdf/z1.urdf": "three_parallel",
-    "kinova_description/robots/kinova.urdf": "spherical_wrist",
     "xacro/kuka_description/kuka_kr16/urdf/kr16_2.urdf": "spherical_wrist",
-    "xacro/unimation_puma560_description/urdf/puma560_robot.urdf": "spherical_wrist",
     "xacro/abb_irb140_description/urdf/irb140.urdf": "general_six",
-    "talos_data/robots/talos_left_arm.urdf": "general_six",
     "panda_description/urdf/panda.urdf": "redundant",
-    "xarm_description/urdf/xarm7.urdf": "redundant",
     "so_arm_description/urdf/so100.urdf": "planar_wrist",
-    "xacro/lynxmotion_al5d_description/urdf/al5d_robot.urdf": "planar_wrist",
     "finger_edu_description/robots/finger_edu.urdf": "position",
 }
 

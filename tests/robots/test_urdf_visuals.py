@@ -40,6 +40,7 @@ def surface(robot, link: int) -> trimesh.Trimesh:
     return trimesh.Trimesh(found.points @ T[:3, :3].T + T[:3, 3], found.faces)
 
 
+@pytest.mark.long
 def test_links_look_as_their_urdf_says_and_are_checked_by_other_shapes(imported):
     robot = imported.robot
     assert [each.link for each in robot.visuals] == [1, 2]

@@ -14,6 +14,7 @@ ROBOT = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:pr
 OPENED = "().__class__.__base__.__subclasses__()"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "expression",
     [
@@ -31,7 +32,7 @@ OPENED = "().__class__.__base__.__subclasses__()"
     ],
 )
 def test_an_expression_reaches_no_code_and_no_end_of_the_machine(tmp_path, monkeypatch, expression):
-    monkeypatch.setattr(urdf_tree, "EXPANDING_S", 10)
+    monkeypatch.setattr(urdf_tree, "EXPANDING_S", 3)
     file = tmp_path / "a.xacro"
     file.write_text(ROBOT.replace("CODE", expression.replace("F'", f"{tmp_path}/ran'")), encoding="utf-8")
     with pytest.raises(InputError, match=r"can't be expanded|is not expanded after"), plain_urdf(file):

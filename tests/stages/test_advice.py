@@ -62,6 +62,7 @@ def refused() -> dict[str, tuple[np.ndarray, TargetResult]]:
     return {name: each for name, each in found.items() if each[1].chosen_deg is None}
 
 
+@pytest.mark.long
 def test_a_target_moved_or_turned_as_advised_is_reached_with_margin(refused):
     carried_out = 0
     for name, (T, before) in refused.items():

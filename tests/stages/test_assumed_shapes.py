@@ -119,8 +119,8 @@ def test_a_wider_margin_turns_a_pass_into_a_caution():
         assert verdict.status == status
 
 
-@pytest.mark.parametrize(("nearer", "level"), [(-0.05, "pass"), (-0.01, "note"), (0.01, "caution")])
-def test_a_motion_that_passes_near_assumed_shapes_is_named_and_a_contact_of_them_is_a_caution(tmp_path, nearer, level):
+@pytest.mark.parametrize(("nearer", "level"), [(-0.05, "pass"), (-0.01, "note"), (0.01, "caution"), (0.03, "fail")])
+def test_a_motion_near_assumed_shapes_is_named_and_fails_only_by_what_is_deep(tmp_path, nearer, level):
     (tmp_path / "a.script").write_text("movej([0.3, -0.3, -0.2, 0.0, -1.2, 0.0])\n")
     program = read_program(tmp_path / "a.script")
     robot = load_robot("er3a_c60")
@@ -133,7 +133,7 @@ def test_a_motion_that_passes_near_assumed_shapes_is_named_and_a_contact_of_them
     assert found.level == level
     assert found.shapes is not None
     drawn = check_program(program, documented(), options)
-    assert drawn.level == ("fail" if level == "caution" else "pass")
+    assert drawn.level == ("fail" if nearer > 0 else "pass")
     assert drawn.shapes is None
 
 

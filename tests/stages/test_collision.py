@@ -65,6 +65,7 @@ def test_clear_places_are_proven_by_arms_that_are_free_with_the_tool_there(resul
     assert ((robot.lower - 1e-9 <= q) & (q <= robot.upper + 1e-9)).all()
 
 
+@pytest.mark.long
 def test_shares_agree_with_other_random_vectors(results, random):
     robot, scene = load_robot(NAME), load_scene(SCENE)
     q = random.uniform(robot.lower, robot.upper, (4000, 6))

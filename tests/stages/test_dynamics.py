@@ -155,6 +155,7 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert [path.name for path in summary.paths if not path.complete] == ["line_out"]
 
 
+@pytest.mark.long
 def test_the_tables_torques_are_those_of_the_public_function(bare):
     rows = bare.results.torques
     rows = rows.take(rows.path == "joint_move")
@@ -188,6 +189,7 @@ def test_within_the_limits_it_fits(full):
     assert motor.inertia_ratio == pytest.approx(motor.inertia_high / 0.05)
 
 
+@pytest.mark.long
 def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_path):
     study, body = full[0], {"mass_kg": 0.5, "centre_mm": [0, 0, 50]}
     entry = study.robots["er3a_c60"]
@@ -401,6 +403,7 @@ def test_what_only_the_tolerances_carry_beyond_a_limit_is_marginal(tmp_path, ful
     assert (found.status, found.results.summary.verdict.finding.code) == ("caution", "dynamics.marginal")
 
 
+@pytest.mark.long
 def test_doubtful_masses_are_no_pass(tmp_path):
     def change(content: dict[str, Any]) -> None:
         limited(20.0)(content)

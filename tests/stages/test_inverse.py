@@ -97,6 +97,7 @@ def target_named(results: InverseResults, name: str) -> TargetResult:
     return next(target for target in results.summary.targets if target.name == name)
 
 
+@pytest.mark.long
 def test_article_target_has_eight_solutions_and_none_within_limits(folders):
     target = read_results(folders["er3a_c60_article"], RESULTS).results.summary.targets[0]
     assert target.name == "article_target"

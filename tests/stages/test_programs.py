@@ -7,16 +7,13 @@ import re
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
-from er3a.files.robot_writer import write_robot
 from er3a.finding import fact
-from er3a.kinematics.forward import forward
 from er3a.pipeline.language import using
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.programs import remedy
@@ -35,9 +32,6 @@ from er3a.pipeline.stages.trajectory.compute import compute as compute_paths
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.motion_faults import rate_fault
 from er3a.program_check.check_program import CheckOptions
-from er3a.programs.csv_program import write_csv
-from er3a.robots.joint_limits import joint_columns
-from testing.arms import scara
 
 ROBOTS = ("er3a_c60", "er3_600")
 
@@ -303,46 +297,6 @@ def test_unsafe_paths_have_programs_only_where_that_is_asked(study):
 
     assert languages_of("line_limits") == set()
     assert languages_of("line_limits", write_unsafe=True, programs=["krl", "csv"]) == {"krl", "csv"}
-
-
-def test_an_arm_of_seven_joints_has_its_table_checked(tmp_path):
-    """The study's speeds for six joints go on to the seventh."""
-    robot = load_robot("lbr_iiwa_14")
-    q = np.array([np.zeros(7), np.full(7, 0.2)])
-    (tmp_path / "a.csv").write_text(write_csv(np.array([0.0, 2.0]), np.degrees(q), forward(robot, q)))
-    entry = f"- {{name: a, title: a, file: {tmp_path / 'a.csv'}, start_deg: [0, 0, 0, 0, 0, 0, 0]}}"
-    (tmp_path / "programs.yaml").write_text(f"kind: programs\nprograms:\n{entry}\n")
-    study = load_study("config/gallery.yaml")
-    own = study.entry("lbr_iiwa_14").model_copy(update={"programs": str(tmp_path / "programs.yaml")})
-    study = study.model_copy(update={"robots": {"lbr_iiwa_14": own}})
-    program = compute_programs(study, "lbr_iiwa_14").summary.programs[0]
-    assert (program.outcome, program.motions) == ("pass", 2)
-
-
-def test_an_arm_that_slides_has_millimetres_in_tables_player_and_recording(tmp_path, monkeypatch):
-    """The joints of a table are those of the results, whose player and recording show the arm in them."""
-    robot = scara().replace(name="arm")
-    write_robot(robot, tmp_path / "arm.yaml")
-    targets = np.array([[0.0, 10, 100, 0], [10, 20, 150, 0]])
-    lines = "".join(f"joint,{','.join(f'{value:g}' for value in row)}\n" for row in targets)
-    (tmp_path / "a.csv").write_text("motion,q1_deg,q2_deg,q3_mm,q4_deg\n" + lines)
-    entry = f"- {{name: a, title: a, file: {tmp_path / 'a.csv'}, start_deg: [0, 10, 50, 0]}}"
-    (tmp_path / "programs.yaml").write_text(f"kind: programs\nprograms:\n{entry}\n")
-    study = load_study("config/gallery.yaml")
-    files = {"file": str(tmp_path / "arm.yaml"), "programs": str(tmp_path / "programs.yaml")}
-    own = study.entry("lbr_iiwa_14").model_copy(update=files | {"scene": None})
-    study = study.model_copy(update={"robots": {"arm": own}})
-    results = compute_programs(study, "arm")
-    assert set(joint_columns(robot)) <= set(results.motion.frame().columns)
-    np.testing.assert_allclose(results.motion.q_deg[-1], targets[-1], atol=1e-9)
-    runs = motions(robot, results)
-    monkeypatch.setattr(
-        "er3a.pipeline.stages.programs.page.record.record_stage", lambda *_, **given: runs.extend(given["runs"])
-    )
-    record(study, SimpleNamespace(results=results, robot="arm"), tmp_path / "programs.rrd")
-    assert len(runs) == 2
-    for each in runs:
-        np.testing.assert_allclose(1000 * forward(robot, each.q)[:, :3, 3], results.motion.xyz_mm, atol=1e-9)
 
 
 @pytest.mark.parametrize(("tool_mm", "expect"), [(0, None), (400, None), (400, "pass")])

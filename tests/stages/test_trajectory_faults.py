@@ -12,6 +12,7 @@ import yaml
 from lxml import etree, html
 
 from er3a.collision.bodies import Bodies
+from er3a.collision.pairs import ASSUMED_MARGIN
 from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact
@@ -22,9 +23,9 @@ from er3a.pipeline.messages.trajectory import (
     _rates,
     adjoined,
     cause_of,
-    end_facts,
     end_text,
     first_faults,
+    no_repair,
     repair_text,
     switch_text,
 )
@@ -50,7 +51,9 @@ ROBOT = "er3a_c60"
 
 def advice(path) -> str:
     """What is said of a path that may not be run as it is: its repair, or where it may end."""
-    return repair_text(path) if path.chosen else ". ".join(text for _, text in end_facts(path) if text)
+    if path.chosen:
+        return repair_text(path)
+    return end_text(path, path.sound_end) if path.sound_end else no_repair(path)
 
 
 def study_of(
@@ -184,15 +187,8 @@ def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name)
         during = np.minimum(tau, np.abs(rates) / brakes)
         q = path.clear_until.q_deg + rates * during - np.sign(rates) * brakes * during**2 / 2
         assert 1000 * bodies.distances(np.radians(q), pairs).min() >= path.clear_until.margin_mm - 0.1
-    xyz, rpy = re.search(r"x, y, z = (.*?) mm, roll, pitch, yaw = (.*?) deg", advice(path)).groups()
-    end = {"xyz_mm": [float(x) for x in xyz.split(", ")], "rpy_deg": [float(x) for x in rpy.split(", ")]}
-    shapes = results.summary.verdict.shapes
-    shown = end_text(path, path.sound_end, shapes=shapes)
-    assert f"after a stop of {path.clear_until.stop_s:.2f} s" in shown
-    within = path.clear_until.margin_mm < shapes.margin_mm
-    first = "Confirm the shapes first, which may be wrong by 20 mm"
-    assert shown.startswith(first) == within
-    assert first not in end_text(path, path.sound_end, shapes=None)
+    end = {"xyz_mm": list(path.clear_until.xyz_mm), "rpy_deg": list(path.clear_until.rpy_deg)}
+    assert f"after a stop of {path.clear_until.stop_s:.2f} s" in end_text(path, path.sound_end)
     (shorter,) = paths_of(tmp_path, name, end=end, duration_s=path.duration_s * path.clear_until.s_m / path.length_m)
     assert not shorter.collisions
     assert not shorter.out_of_limits
@@ -318,6 +314,13 @@ def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     assert path.clear_until is None
     assert "End it" not in advice(path)
     assert fault.instead is None
+    assert (path.verdict, path.fails) == ("collides", False)  # no deeper than these shapes may be wrong
+
+
+def test_a_path_that_collides_by_more_than_assumed_shapes_may_be_wrong_fails(tmp_path):
+    (path,) = compute(study_of(tmp_path, "line_collides"), ROBOT).summary.paths
+    deepest = max(touch.depth_mm for part in path.collisions for touch in part.cause.touches)
+    assert (path.fails, deepest > 1000 * ASSUMED_MARGIN) == (True, True)
 
 
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
@@ -504,7 +507,7 @@ def test_where_a_repair_is_slower_is_told_with_the_least_share_of_the_speed(tmp_
     (fault,) = faults(results)
     said = f"Slow down from t = {found.start_s:.2f} to {found.end_s:.2f} s, to {int(100 * found.part)} %"
     assert fault.to_do.startswith(said)
-    assert dict(fault.facts)["all at one pace"].startswith("Or run all of it at")
+    assert "Or run all of it at" in fault.to_do
     assert slowed(replace(path, strategy="branch"), rows, repair) is None
 
 

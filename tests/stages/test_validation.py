@@ -320,6 +320,7 @@ def test_conflicts_excuse_only_what_another_trustworthy_row_outweighs(stated, st
 REACH = AxisDistance("flange", "greatest", 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("quantity", "value", "bound"),
     [(Limit(1, "upper"), 170, 90), (Speed(1), 200, 100), (AxisAngle(1, (0, 0, 1), False), 0, 45), (REACH, 5000, 2500)],

@@ -54,6 +54,7 @@ def context_of(robot: Robot, found: ToolCapability) -> dict:
     return capability_context(robot, results, placing=placed)
 
 
+@pytest.mark.long
 def test_summary_and_tables_belong_together(done):
     overall, placed = done.capability.overall, done.placement
     cells, places = done.cells, done.places

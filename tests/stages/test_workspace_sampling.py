@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
-from scipy.stats import qmc
 
 from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
@@ -40,6 +38,8 @@ def test_philox_gives_the_published_vectors(counter, key, expected):
 
 
 def test_joints_are_uniform_independent_and_drawn_again_alone(robot):
+    from scipy import stats  # takes a second to import
+
     n, draw = 20_000, Draw(SEED, 200_000, 10)
     q = draw.joints(robot, np.full(n, 3), np.arange(n))
     unit = (q - robot.lower) / (robot.upper - robot.lower)
@@ -52,6 +52,8 @@ def test_joints_are_uniform_independent_and_drawn_again_alone(robot):
 
 def test_sobol_points_are_those_of_scipy(robot):
     """Unshifted, and with a seed shifted by one exclusive or per dimension."""
+    from scipy.stats import qmc
+
     ours = direction_numbers(10)[:, :30] >> np.uint64(10)
     theirs = qmc.Sobol(10, scramble=False, bits=30)
     number, point = np.arange(1, 65), np.zeros((64, 10), dtype=np.uint64)
@@ -113,7 +115,6 @@ lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)
 angles = st.lists(st.floats(-3.2, 3.2), min_size=6, max_size=6)
 
 
-@settings(max_examples=40)
 @given(a=lengths, d=lengths, alpha=angles, q=angles, tool=st.tuples(lengths, angles), modified=st.booleans())
 def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
     robot = load_robot("er3_600").replace(

@@ -34,6 +34,7 @@ def ball(frame: int, radius: float, x: float, colour: str) -> dict:
     return {"frame": frame, "name": colour, "kind": "sphere", "radius": radius, "T": T.tolist(), "colour": colour}
 
 
+@pytest.mark.long
 def test_what_is_near_covers_what_is_far_and_lies_where_perspective_puts_it():
     """A ball of radius r at distance d ends r / sqrt(d^2 - r^2) from the middle, in focal lengths."""
     near, far = ball(0, 0.2, 1.0, "#0000ff"), ball(0, 0.9, -1.0, "#ff0000")

@@ -58,6 +58,7 @@ def kept_in(home) -> list[str]:
     return [str(path) for path in Path(home["HOME"]).rglob("*rerun*")]
 
 
+@pytest.mark.long
 def test_writing_a_recording_leaves_no_statistics(written):
     path, environment = written
     assert path.stat().st_size > 0

@@ -81,6 +81,7 @@ def test_joint_angles_become_poses_by_the_robots_own_table(tmp_path, poses):
         load_hand_eye(tmp_path / "set.yaml")
 
 
+@pytest.mark.long
 def test_what_a_controller_gives_is_placed_by_the_robots_base(tmp_path):
     """Joint angles, and flange poses and touched points as the controller has them, are of one arm on a pedestal."""
     robot = load_robot("er3a_c60")
@@ -211,6 +212,7 @@ def test_vision_files_name_all_that_they_rest_on(name):
     assert all(each.is_file() for each in vision_files(file))
 
 
+@pytest.mark.long
 def test_the_command_ends_with_an_error_where_a_calibration_cant_be_used(tmp_path, poses):
     flange, target = poses
     table = columns(flange, "flange", "quaternion")

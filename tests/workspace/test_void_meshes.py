@@ -1,14 +1,11 @@
-"""Surfaces of voids: closed and of the volume that they are of; single changes of a table."""
+"""Surfaces of voids: closed and of the volume that they are of."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from er3a.files.robot_library import load_robot
-from er3a.finding import fact
 from er3a.geometry.vectors import TURN
-from er3a.workspace.causes import relaxed_limit, single_changes
 from er3a.workspace.voids import Blocks, mesh
 
 AROUND = 36
@@ -44,17 +41,3 @@ def test_a_sector_s_mesh_and_a_bar_s_are_closed():
     sector = AROUND / 2 * np.sin(TURN / AROUND) * 0.03**2 * 9 / AROUND
     assert volume(*mesh(blocks((5, 4)), mask)) == pytest.approx(0.02 * sector, rel=1e-9)
     assert volume(*mesh(blocks((5, 4), bar=0.36), mask)) == pytest.approx(0.02 * 0.03 * 0.09, rel=1e-9)
-
-
-@pytest.mark.long
-def test_single_changes_of_the_article_s_table():
-    upper_2 = relaxed_limit((2,), (1.0,), "upper", "deg", 155.0, (60.0, 1.0))
-    found = single_changes(load_robot("er3a_c60_article"), fact("void_disappears", limits=(upper_2,)), 1)
-    left = {
-        (f"{change.column}{change.joint}", change.tried): change.left_litres for change in found if change.left_litres
-    }
-    assert left["offset2", -90.0][1] < 1 < 150 < left["offset2", 180.0][0]
-    assert left["upper2", 215.0][1] < 1
-    assert {tried for entry, tried in left if entry == "a2"} == {-650.0, 325.0, 1300.0}
-    assert not {entry for entry, _ in left} & {"offset1", "offset4", "offset6"}  # they turn the reach into itself
-    assert [high for _, high in left.values()] == sorted(high for _, high in left.values())

@@ -1,16 +1,15 @@
-"""Writes the page on the article, with its steps in order and three tables compared, in each language."""
+"""Writes the page on the article, with its statements in order and three tables compared, in each language."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from babel import Locale
-from markupsafe import Markup, escape
 
 from er3a.files.kept_files import write_text
 from er3a.geometry.transforms import translation
@@ -20,7 +19,6 @@ from er3a.pipeline.article.article_numbers import (
     LINE,
     MOVE,
     WINDOW_Z_MM,
-    Agreement,
     ArticleNumbers,
     TableNumbers,
     agreements,
@@ -30,19 +28,18 @@ from er3a.pipeline.article.article_numbers import (
 )
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
-from er3a.pipeline.messages.article import AGREEMENT, ITEMS, SECTIONS, Item
+from er3a.pipeline.messages.article import AGREEMENT, ITEMS
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.numbers import NOTHING, at_least, at_most, fixed, number
-from er3a.pipeline.messages.say import joined
-from er3a.pipeline.messages.trajectory import event_word, strategy_word
+from er3a.pipeline.messages.numbers import NOTHING, at_least, at_most, fixed, number, numbers
+from er3a.pipeline.messages.trajectory import event_word
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Provenance, checksum_file, input_records, result_records
-from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
 from er3a.pipeline.viewing.figures import house_style, new_figure
-from er3a.pipeline.viewing.page import Picture, stage_head
+from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import MODEL, MUTED, REFERENCE
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -50,10 +47,9 @@ from er3a.robots.robot import Robot
 ROLES = (N_("the article's table"), N_("the same with offset 2 = −90°"), N_("the real ER3A-C60"))
 COLOURS = (REFERENCE, MODEL, MUTED)  # printed, corrected, real
 APART_M = 1.8  # between two arms that stand side by side
-STAGES_OF_THE_REAL_ARM = ("collision", "programs", "vision", "dynamics")  # codes of items, and stages
-PAGES = {"3.2": "teach", "4.1": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
+PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
 """The page of the printed table that shows more, by section of the article; for all others its validation page."""
-BADGES = {"agrees": "pass", "differs": "fail", "in_part": "caution", "not_examined": "no_reference", "done": "done"}
+BADGES: dict[str, Mark] = {"differs": "fail", "in_part": "caution", "agrees": "pass", "not_examined": "no_reference"}
 
 
 def write_article(study: Study, tables: ArticleTables, results: Path, folder: Path) -> None:
@@ -64,8 +60,8 @@ def write_article(study: Study, tables: ArticleTables, results: Path, folder: Pa
     ResultError
         if results of a table are missing or damaged
     """
-    numbers = article_numbers(study, tables, results)
-    text = json.dumps(asdict(numbers) | {"agreements": agreements(numbers)}, indent=1) + "\n"
+    found = article_numbers(study, tables, results)
+    text = json.dumps(asdict(found) | {"agreements": agreements(found)}, indent=1) + "\n"
     write_text(results / "article.json", text)
     pages = study.article_pages()
     for code in language.LANGUAGES:  # a page of another run would be of other results, and of no language now
@@ -76,12 +72,12 @@ def write_article(study: Study, tables: ArticleTables, results: Path, folder: Pa
         own = study.model_copy(update={"report": study.report.model_copy(update={"language": code})})
         language.use(code, own.own_titles())
         with house_style():
-            _write(study, tables, results, numbers, folder / name)
+            _write(study, tables, results, found, folder / name)
 
 
-def _write(study: Study, tables: ArticleTables, results: Path, numbers: ArticleNumbers, output: Path) -> None:
+def _write(study: Study, tables: ArticleTables, results: Path, found: ArticleNumbers, output: Path) -> None:
     others = {code: name for code, name in study.article_pages().items() if name != output.name}
-    rows = list(_rows(study, tables, results, numbers))
+    rows = list(_rows(tables, found))
     robots = [study.robot(name) for name in tables.names]
     page.render(
         Path(__file__).with_name("article.html.j2"),
@@ -93,68 +89,60 @@ def _write(study: Study, tables: ArticleTables, results: Path, numbers: ArticleN
             seed=study.seed,
         ),
         others=[(code, Locale(code).display_name, name) for code, name in others.items()],
-        counts=[(status, BADGES[status], sum(row["status"] == status for row in rows)) for status in AGREEMENT],
-        agreement_words=AGREEMENT,
-        sections=[(code, title, [row for row in rows if row["section"] == code]) for code, title in SECTIONS.items()],
-        compared=_compared(numbers),
+        answer=_answer(tables, found, rows),
+        rows=rows,
+        compared=_compared(found),
         roles=[tr(word) for word in ROLES],
         robots=[(name, study.pages(name)) for name in tables.names],
-        zero=_zero_pose(robots, numbers),
+        zero=_zero_pose(robots, found),
         player=_player(robots, results, tables),
         drawing_head=drawing_head(),
     )
 
 
-def _rows(study: Study, tables: ArticleTables, results: Path, numbers: ArticleNumbers) -> Iterator[dict[str, Any]]:
-    found, parts = agreements(numbers), _parts(numbers)
-    for place, item in enumerate(ITEMS, start=1):
-        status: Agreement = found.get(item.code, "done")
-        finds, address = tr(item.finds, **parts), f"{tables.printed}/{PAGES.get(item.section, 'validation')}.html"
-        if item.code in STAGES_OF_THE_REAL_ARM:
-            address = f"{tables.real}/{item.code}.html"
-            status, verdict = _of_the_real_arm(study, tables.real, results, item)
-            finds = joined([finds, verdict], " ")
+def _answer(tables: ArticleTables, found: ArticleNumbers, rows: list[dict[str, Any]]) -> Answer:
+    """What the page says first: whose table it is, which entry explains most, and where the article is right."""
+    groups = [Group(tr(AGREEMENT[status]), [_row(row) for row in rows if row["status"] == status]) for status in BADGES]
+    counts = (f"{table.statements_met} / {table.statements}" for table in (found.printed, found.corrected))
+    return Answer(
+        tr("Another arm's table."),
+        tr("Offset 2 = {fault_deg:.0f}° mends most.", fault_deg=found.fault_deg),
+        keys=list(zip(counts, (tr("statements hold as printed"), tr("with offset 2 = −90°")))),
+        groups=groups,
+        fix=Fix(tr("Use the real arm's table."), f"{tables.real}/validation.html", instead=False),
+    )
+
+
+def _row(row: dict[str, Any]) -> ListRow:
+    return ListRow(row["badge"], row["title"], tr("section {section}", section=row["section"]), f"#item-{row['code']}")
+
+
+def _rows(tables: ArticleTables, found: ArticleNumbers) -> Iterator[dict[str, Any]]:
+    agree, parts = agreements(found), _parts(found)
+    for item in ITEMS:
+        status = agree[item.code]
         yield {
-            "number": place,
             "code": item.code,
             "section": item.section,
             "title": tr(item.title),
             "says": tr(item.says),
-            "finds": _with_code(finds),
-            "how": item.how,
-            "why": tr(item.why, **parts) if item.why and status != "agrees" else "",
+            "finds": tr(item.finds, **parts),
+            "why": tr(item.why, **parts) if status != "agrees" else "",
             "status": status,
+            "word": tr(AGREEMENT[status]),
             "badge": BADGES[status],
-            "page": address if status != "not_examined" else "",
+            "page": f"{tables.printed}/{PAGES.get(item.section, 'validation')}.html",
         }
 
 
-def _of_the_real_arm(study: Study, real: str, results: Path, item: Item) -> tuple[Agreement, str]:
-    """Whether a stage examined the real arm, and its verdict in words."""
-    if item.code in study.stages(real):
-        head = stage_head(results / real / item.code, STAGES[item.code])
-        if head.status != "not_computed":
-            return "done", tr("The real arm: {verdict}", verdict=head.text)
-    return "not_examined", tr("This study does not examine the real arm.")
-
-
-def _with_code(text: str) -> Markup:
-    """A text whose words in backticks are code."""
-    plain, *rest = text.split("`")
-    parts = [Markup("<code>{}</code>").format(part) if k % 2 == 0 else escape(part) for k, part in enumerate(rest)]
-    return escape(plain) + Markup("").join(parts)
-
-
-def _parts(numbers: ArticleNumbers) -> dict[str, Any]:
+def _parts(found: ArticleNumbers) -> dict[str, Any]:
     """The fields of the items' texts: those of :class:`ArticleNumbers`, and of its tables with a letter before them."""
-    parts = dict(vars(numbers))
-    for letter, table in (("p", numbers.printed), ("c", numbers.corrected), ("r", numbers.real)):
+    parts = dict(vars(found))
+    for letter, table in (("p", found.printed), ("c", found.corrected), ("r", found.real)):
         parts |= {f"{letter}_{key}": value for key, value in (vars(table) | _worded(table)).items()}
-    for key in ("circle_error_mm", "missed_after_mm", "residual_mm", "round_trip_deg", "same_pose_deg"):
+    for key in ("missed_after_mm", "round_trip_deg"):
         rounding = abs(parts[key]) < NOTHING
         parts[key] = tr("less than {bound}", bound="10⁻⁶") if rounding else number(parts[key], 2)
-    parts["way_chosen"] = strategy_word(parts["strategy"]) if parts["strategy"] else "–"
-    parts["ways_usable"] = joined(map(strategy_word, numbers.strategies_usable)) or "–"
     return parts
 
 
@@ -162,51 +150,45 @@ def _worded(table: TableNumbers) -> dict[str, Any]:
     """Numbers of a table as texts show them."""
     return {
         "tool_z": table.tool_mm[2],
-        "example": _listed(table.example_mm, 2),
-        "example_rpy": _listed(table.example_rpy_deg, 2),
         "volume": _between(table.volume_m3, "m³"),
         "void": _between(table.void_litres, "L") if table.void_litres else "–",
         "void_z": fixed(table.void_mm[2], 0) if table.void_mm else "–",
-        "line": outcome_word(table.line) if table.line else tr("not examined"),  # type: ignore[arg-type]
-        "crossings": (_listed(table.crossings_s, 4) or "–") if table.line else tr("not examined"),
+        "line": outcome_word(table.line) if table.line else "–",  # type: ignore[arg-type]
+        "crossings": numbers(table.crossings_s, 4) or "–",
         "line_speed": number(table.line_speed_deg_s, 4),
     }
-
-
-def _listed(values: tuple[float, ...], decimals: int) -> str:
-    return joined((fixed(value, decimals) for value in values), ", ")
 
 
 def _between(bounds: tuple[float, float], unit: str) -> str:
     return f"{at_least(bounds[0], unit)} … {at_most(bounds[1], unit)}"
 
 
-def _compared(numbers: ArticleNumbers) -> list[list[str]]:
+def _compared(found: ArticleNumbers) -> list[list[str]]:
     """The rows of the comparison: what is compared, then a cell for each table."""
-    rows: list[tuple[str, Callable[[TableNumbers], str]]] = [
-        (
-            tr("Statements of the article that hold"),
-            lambda t: tr("not examined") if t.statements is None else f"{t.statements_met} / {t.statements}",
-        ),
-        (
-            tr("Independent checks against CAD models and a URDF that pass"),
-            lambda t: f"{t.checks_met} / {t.checks}",
-        ),
-        (tr("Upper arm from the vertical, all joints at 0"), lambda t: f"{fixed(t.upper_arm_deg, 1)}°"),
-        (tr("Forearm from the vertical, all joints at 0"), lambda t: f"{fixed(t.forearm_deg, 1)}°"),
-        (tr("Tool at joint angles 0: x, y, z (mm)"), lambda t: _listed(t.tool_mm, 2)),
-        (tr("Branches of the article's target within the limits"), lambda t: f"{t.within_limits} / {t.solutions}"),
-        (tr("Greatest reach of the tool from axis 1 (mm)"), lambda t: fixed(t.reach_mm, 1)),
-        (tr("Reached volume, proven (m³)"), lambda t: _worded(t)["volume"]),
-        (tr("Largest enclosed void, proven (L)"), lambda t: _worded(t)["void"]),
-        (tr("Its centre: z (mm)"), lambda t: _worded(t)["void_z"]),
-        (tr("The article's straight line"), lambda t: _worded(t)["line"]),
-        (tr("It is singular at t (s)"), lambda t: _worded(t)["crossings"]),
-    ]
-    return [[label, *map(cell, (numbers.printed, numbers.corrected, numbers.real))] for label, cell in rows]
+    cells = {
+        tr("Statements of the article that hold"): "{statements_met} / {statements}",
+        tr("Independent checks against CAD models and a URDF that pass"): "{checks_met} / {checks}",
+        tr("Upper arm from the vertical, all joints at 0"): "{upper_arm_deg:.1f}°",
+        tr("Forearm from the vertical, all joints at 0"): "{forearm_deg:.1f}°",
+        tr("Tool at joint angles 0: x, y, z (mm)"): "{tool_mm}",
+        tr("Tool at the article's example: x, y, z (mm)"): "{example_mm}",
+        tr("Branches of the article's target within the limits"): "{within_limits} / {solutions}",
+        tr("Greatest reach of the tool from axis 1 (mm)"): "{reach_mm:.1f}",
+        tr("Reached volume, proven (m³)"): "{volume}",
+        tr("Largest enclosed void, proven (L)"): "{void}",
+        tr("Its centre: z (mm)"): "{void_z}",
+        tr("The article's straight line"): "{line}",
+        tr("It is singular at t (s)"): "{crossings}",
+    }
+    parts = []
+    for table in (found.printed, found.corrected, found.real):
+        points = {"tool_mm": numbers(table.tool_mm, 2), "example_mm": numbers(table.example_mm, 2)}
+        known = vars(table) | _worded(table) | points
+        parts.append({key: "–" if value is None else value for key, value in known.items()})
+    return [[label, *(language.filled(text, text, part) for part in parts)] for label, text in cells.items()]
 
 
-def _zero_pose(robots: list[Robot], numbers: ArticleNumbers) -> Picture:
+def _zero_pose(robots: list[Robot], found: ArticleNumbers) -> Picture:
     figure, axes = new_figure(width=7.0, height=5.2)
     axes.axhspan(*WINDOW_Z_MM, color=MUTED, alpha=0.12, linewidth=0, label=tr("window of the article's plot"))
     for robot, role, colour in zip(robots, ROLES, COLOURS):
@@ -220,8 +202,8 @@ def _zero_pose(robots: list[Robot], numbers: ArticleNumbers) -> Picture:
         tr(
             "All joints at 0, from the side. As printed the tool is at z = {printed} mm, with offset 2 = −90° at "
             "{corrected} mm.",
-            printed=fixed(numbers.printed.tool_mm[2], 2),
-            corrected=fixed(numbers.corrected.tool_mm[2], 2),
+            printed=fixed(found.printed.tool_mm[2], 2),
+            corrected=fixed(found.corrected.tool_mm[2], 2),
         ),
     )
 

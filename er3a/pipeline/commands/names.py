@@ -61,7 +61,6 @@ COMMANDS = {
         ROBOT_FILES,
         "Write a robot file from a factory calibration; huge d values that cancel become Hayati parameters.",
     ),
-    "mesh": ("robot_files", ROBOT_FILES, "Split a mesh into convex pieces, for robot and scene files."),
     "calibrate": (
         "robot_files",
         ROBOT_FILES,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,12 +22,11 @@ from er3a.robots.robot import Robot
 if TYPE_CHECKING:
     from er3a.pipeline.program_reports import CheckedFile
 
-LEAST_S = 1.0  # to read a file for which no time is left
 ProgramFiles = Annotated[
     list[Path],
     typer.Argument(
         callback=given_files,
-        help="robot programs (the language is detected), or tables of joint values over time (.csv)",
+        help="robot programs (the language is detected)",
     ),
 ]
 RobotOption = Annotated[str, typer.Option("--robot", help="a robot's name or file")]
@@ -52,7 +51,7 @@ BaselineFile = Annotated[
 Verdicts = Annotated[bool, typer.Option("--verdicts", help="print a line for each motion, also for those that pass")]
 Seconds = Annotated[
     float,
-    typer.Option(help="time to read files and to prove clearance between points of motions, without compiling", min=1),
+    typer.Option(help="time to read each file, and then to prove clearance between points of its motions", min=1),
 ]
 
 
@@ -80,7 +79,7 @@ def check_program(
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
     from er3a.pipeline.program_reports import accepted, checked_file, json_of, sarif_of, without
-    from er3a.pipeline.progress import TimeBudget, shown_work, work_clock
+    from er3a.pipeline.progress import shown_work, time_left
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
     from er3a.programs.execution import RunLimits
@@ -95,13 +94,12 @@ def check_program(
             limits=RunLimits(assumed=names, assumed_values=values),
         )
     silenced = accepted(baseline) if baseline else frozenset()
-    budget, checked = TimeBudget(seconds, len(files)), []
+    checked = []
     with shown_work("reading") as at:
         for file in files:
             at(f"{file}: checking")
-            begun, end = budget.next_piece()
-            own = replace(options, keep_on=_until(end, work_clock))
-            found = checked_file(file, arm, own, doubts, max(end - begun, LEAST_S))
+            own = replace(options, keep_on=time_left(seconds))
+            found = checked_file(file, arm, own, doubts, seconds)
             checked.append(without(found, silenced))
     if sarif is not None:
         _write(sarif, json.dumps(sarif_of(checked), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
@@ -126,10 +124,6 @@ def _print_checked(checked: Sequence[CheckedFile], arm: Robot, every: bool, verd
     missed = tuple(dict.fromkeys(left for each in checked for left in each.missed))
     for line in filter(None, (*map(cycle_line, checked), shapes_line(arm), missed_line(missed))):
         print_note(line)
-
-
-def _until(end: float, clock: Callable[[], float]) -> Callable[[], bool]:
-    return lambda: clock() < end
 
 
 def _assumed(given: list[str]) -> tuple[tuple[str, ...], dict[str, bool | float]]:

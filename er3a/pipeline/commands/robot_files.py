@@ -1,4 +1,4 @@
-"""Commands for robot files: URDF import and export, calibration, hand-eye, meshes, schemas."""
+"""Commands for robot files: URDF import and export, calibration, hand-eye, schemas."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ import typer
 
 from er3a.errors import Er3aError, InputError
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.formats.mesh_file import Unit
 from er3a.pipeline.commands import options
 from er3a.pipeline.language import LANGUAGES, using
 from er3a.pipeline.progress import shown_work
@@ -25,7 +24,6 @@ from er3a.pipeline.progress import shown_work
 if TYPE_CHECKING:
     from er3a.calibration.calibrate import Calibration
     from er3a.calibration.observations import Measurement
-    from er3a.files.pieces_file import PiecesFile
     from er3a.robots.robot import Robot
 
 
@@ -115,30 +113,6 @@ def import_calibration(
         options.print_note(f"{output}: without shapes, masses and references of {robot}: they belong to its own table")
     write_robot(found.replace(name=output.stem, title=f"{found.title}, as calibrated by its factory"), output)
     print(f"{output}: written")
-
-
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
-def mesh(
-    file: Annotated[Path, typer.Argument(help="a closed mesh: STL, OBJ, DAE or GLB")],
-    unit: Annotated[Unit, typer.Option(help="unit of the mesh's lengths: m or mm")],
-    output: Annotated[Path, typer.Option(help="the file of convex pieces to write, .json")],
-    threshold: Annotated[float, typer.Option(min=0.01, max=1, help="greatest concavity left in a piece")] = 0.05,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the search for cuts")] = 0,
-    as_json: options.AsJson = False,
-):
-    """Split a mesh into convex pieces, for robot and scene files."""
-    if output.suffix != ".json":
-        raise Er3aError(f"{output}: files of convex pieces end in .json; write --output {output.stem}.json")
-    with shown_work(f"{file}: splitting into convex pieces"):
-        found = import_mesh(file, output, unit, threshold, seed)
-    if as_json:
-        options.print_json(
-            found.model_dump(exclude={"pieces_mm"}) | {"output": str(output), "pieces": len(found.pieces_mm)}
-        )
-        return
-    print(f"{output}: written; convex pieces: {len(found.pieces_mm)}, of {found.triangles} triangles")
-    print(f"the mesh sticks out of the pieces by at most {found.uncovered_mm:.3g} mm, added to the pieces as a margin")
-    print(f"the pieces stick out of the mesh by {found.excess_mm:.3g} mm, as measured")
 
 
 def _check_options(output: Path | None, words: str) -> None:
@@ -375,44 +349,3 @@ def schema(
     for file, content in schemas.items():
         write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     write_text(docs / "dictionary.md", data_dictionary())
-
-
-DIGITS = 6
-"""Of corners, in mm: a nanometre."""
-
-
-def import_mesh(source: Path, output: Path, unit: Unit, threshold: float, seed: int) -> PiecesFile:
-    """Split a mesh into convex pieces and write them to a file.
-
-    Raises
-    ------
-    InputError
-        for a mesh that can't be used, see :func:`er3a.formats.mesh_file.read_mesh`
-    """
-    import numpy as np
-
-    from er3a.collision.meshes import convex_pieces
-    from er3a.files.kept_files import sha256, write_text
-    from er3a.files.pieces_file import PiecesFile, checksum_of
-    from er3a.formats.mesh_file import read_mesh
-
-    mesh = read_mesh(source, unit)
-    found = convex_pieces(mesh.vertices, mesh.faces, threshold, seed)
-    rounded = [np.round(piece * 1000, DIGITS).tolist() for piece in found.pieces]
-    content = PiecesFile(
-        kind="pieces",
-        source=source.name,
-        source_sha256=sha256(source),
-        unit=unit,
-        triangles=len(mesh.faces),
-        threshold=threshold,
-        seed=seed,
-        # with what rounding the corners may take away
-        uncovered_mm=float(np.ceil(found.uncovered * 1000 * 10**DIGITS) + 2) / 10**DIGITS,
-        excess_mm=round(found.excess * 1000, DIGITS),
-        sha256=checksum_of(rounded),
-        pieces_mm=rounded,
-    )
-    text = json.dumps(content.model_dump(), indent=1) + "\n"
-    write_text(output, text)
-    return content

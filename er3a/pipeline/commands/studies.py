@@ -29,40 +29,38 @@ if TYPE_CHECKING:
 def new(
     folder: Annotated[Path, typer.Argument(help="folder to write the study into; existing files are kept")],
     *,
-    urdf: Annotated[Path | None, typer.Option(help="the arm, as URDF or xacro")] = None,
-    xacro: options.Xacro = None,
-    base: options.Base = None,
-    tip: options.Tip = None,
-    dh: Annotated[Path | None, typer.Option(help="the arm, as a D-H table in any form (- is standard input)")] = None,
-    robot: Annotated[str | None, typer.Option(help="the arm, as the name or file of an er3a robot")] = None,
+    source: Annotated[
+        str,
+        typer.Option("--robot", "--urdf", "--dh", help="the arm: a robot's name or file, a URDF or xacro, a D-H table"),
+    ],
     name: Annotated[str | None, typer.Option(help="the robot's name in the study (default: its file's)")] = None,
-    convention: Annotated[
-        Convention | None, typer.Option(help="D-H convention of the table (default: standard)")
-    ] = None,
+    convention: Annotated[Convention, typer.Option(help="D-H convention of a table")] = "standard",
     length_unit: Lengths = None,
     angle_unit: Angles = None,
     column: options.Columns = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
+    xacro: options.Xacro = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
     from er3a.pipeline.new_study.arms import arm_of
     from er3a.pipeline.new_study.write import write_study
 
-    ends, arguments = (base, tip), tuple(xacro or ())
+    form: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
+    form |= {"columns": options.columns_of(column), "base": base, "tip": tip, "xacro": xacro or ()}
     with shown_work(f"{folder}: reading the arm") as at:
-        form: Any = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-        form["columns"] = options.columns_of(column)
-        arm = arm_of(urdf, dh, robot, name=name, ends=ends, xacro=arguments, **form)
+        arm = arm_of(source, name, **form)
         compiles = "" if STAGES["trajectory"].compiled.exists() else "; the first time er3a compiles, up to two minutes"
         at(f"{folder}: searching for targets and paths that the arm can do{compiles}")
-        written = write_study(arm, folder)
+        files, shortcoming = write_study(arm, folder)
     for note in arm.notes:
         options.print_note(note)
-    for file in written.files:
+    for file in files:
         print(f"{file}: written")
     print(f"Next: cd {shlex.quote(str(folder))} && er3a run")
-    if urdf is not None:
+    if not arm.references:
         print(f"To hold it against the arm's pendant: er3a confirm {arm.robot.name} --plan")
-    for shortcoming in written.shortcomings:
+    if shortcoming:
         typer.secho(f"WARNING: {shortcoming}", fg="red", bold=True, err=True)
 
 

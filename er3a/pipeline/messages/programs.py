@@ -26,6 +26,7 @@ from er3a.pipeline.messages.say import (
 )
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramSummary
 from er3a.planning.motion_faults import RateCause, rate_ratio
+from er3a.program_check.check_program import ProgramCheck
 from er3a.program_check.program_check_findings import RANKS, Level, NotFollowedReason
 
 LEVELS: dict[Level, str] = {
@@ -110,6 +111,7 @@ KEY_FIGURES = {
 
 TEXTS = texts(
     {
+        "unreadable": "{problem}. {remedy}",
         "programs.none": "The list of programs is empty.",
         "programs.verdict": (
             "[{programs:?}{passed} of {programs} programs pass.][ Fail: {failed:, }.][ Caution: {caution:, }.][ "
@@ -132,10 +134,7 @@ TEXTS = texts(
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
         "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
         "motion_collides": "collision ({assumed:shapes}): {touches:3; }",
-        "bodies_touch": (
-            "{pair} after {at:.4g}, {depth_mm:.1f} mm deep[{enlarged_mm:?} (shapes up to {enlarged_mm:.1f} mm larger "
-            "than their meshes)]"
-        ),
+        "bodies_touch": "{pair} after {at:.4g}, {depth_mm:.1f} mm deep",
         "speed_not_given": "no usable speed (given: {word:speed_given}); {assumed:g} assumed",
         "suspect_number": "{text} looks like {kind:suspect}; expected: {usual}",
         "frames_from_robot_file": (
@@ -267,7 +266,7 @@ def remedies(findings: Sequence[Finding | FindingAt]) -> list[str]:
     return list(dict.fromkeys(filter(None, said)))
 
 
-def cycle_text(program: ProgramSummary) -> str:
+def cycle_text(program: ProgramSummary | ProgramCheck) -> str:
     """How long a program takes, and what that leaves out."""
     cycle = program.cycle
     low, high = f"{cycle.blended_s:.2f}", f"{cycle.stopping_s:.2f}"

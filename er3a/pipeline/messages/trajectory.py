@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Finding, is_one
+from er3a.finding import is_one
 from er3a.pipeline.language import N_, as_text, with_unit
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
@@ -47,25 +47,12 @@ STRATEGIES: dict[StrategyName, str] = {
     "planned": N_("planned motion of the joints"),
 }
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
-FactName = Literal["clearance", "time", "singularity", "limits", "start", "pace", "repair", "end"]
-FACTS: dict[FactName, str] = {
-    "clearance": N_("clearance"),
-    "time": N_("time"),
-    "singularity": N_("singularity"),
-    "limits": N_("joint limits"),
-    "start": N_("start"),
-    "pace": N_("all at one pace"),
-    "repair": N_("why"),
-    "end": N_("where it may end"),
-}
-"""What is said of a motion to be run instead, beside what it is."""
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
 AT_EDGE = 1e-3  # s, before the edge of the reach, where the arm is stretched
 MOMENT = 0.001  # s
 LEAST_CHANGE = 0.5  # deg or mm
 ADJOINING = 0.05  # s, between stretches that are told as one
-FULL_SPEED = 0.995  # of a joint's limit, which rounds to 100 %
 WHOLE = 10.0  # from which on numbers are rounded to whole ones
 PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 
@@ -100,11 +87,6 @@ TEXTS = texts(
             "Or run all of it at {percent:.3g} % of the programmed speed: {needed:.4g} s in all, its times × "
             "{longer:.4g}"
         ),
-        "advice.clear_until": (
-            "It is {margin_mm:.1f} mm clear up to t = {t_s:.4g} s ({far:.1f} mm), also in a stop ({stop_s:.2f} s). End "
-            "it with the tool at x, y, z = {xyz_mm:.1f, } mm, roll, pitch, yaw = {rpy_deg:.2f, } deg (joints "
-            "{q_deg:.2f, }). Or move the path, or what it hits: {pair} touch at {contact_mm:.0f, } mm"
-        ),
         "advice.within_reach": (
             "[From t = {first:.4g} s: {what}; ]out of reach from t = {t:.4g} s ({far:.1f} mm)[: move its end or the "
             "workpiece nearer{first:!}]"
@@ -117,15 +99,8 @@ TEXTS = texts(
         "advice.no_part": "Run no part of it",
         "advice.near": "it begins near a singular pose",
         "advice.clear": "{clearance:.1f} mm clear",
-        "advice.of_assumed": "Confirm the shapes first, which may be wrong by {error:g} mm",
         "advice.slowly": "It is quicker than the {programmed:.2f} s programmed: another motion",
         "advice.region": "It still passes near the singular pose",
-        "advice.full_speed": "A joint moves at full speed: start slowly",
-        "limits_assumed": "Joint speeds or accelerations are assumed: what passes may be too fast.",
-        "advice.limits": (
-            "It uses [{speed:.0%} of joint speeds and ]{acceleration:.0%} of joint accelerations, in part assumed"
-            "[{speed:?}: begin at 10 % override]"
-        ),
         "advice.tool": "the tool [leaves the path by {far} mm, {turned} deg][stays on the path{far:!}]",
         "advice.swing": "J{joint} turns by {swing:.0f} deg",
         "advice.switch": (
@@ -356,36 +331,13 @@ def no_repair(path: model.PathSummary) -> str:
     return _within_reach(path) or sentence("advice.none", why=why)
 
 
-def _of_assumed(clearance_mm: float, shapes: Finding | None) -> str:
-    """That assumed shapes may be wrong by more than a clearance; empty where that is not so."""
-    if shapes is None or clearance_mm >= shapes.margin_mm:
-        return ""
-    return sentence("advice.of_assumed", error=shapes.margin_mm)
-
-
-def _until(path: model.PathSummary) -> str:
-    """Up to where a path may be run: to the last point with the margin, unless something else is wrong before."""
-    end = path.sound_end
-    if end is None:
-        return ""
-    if path.clear_until and end.t_s >= path.clear_until.t_s:
-        return _clear(path)
-    return sentence("advice.end", margin=None, **vars(end))
-
-
-def end_text(path: model.PathSummary, end: model.SoundEnd, *, shapes: Finding | None) -> str:
-    """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured, of
-    assumed ``shapes`` or of given ones; that first, where assumed ones may be wrong by more."""
+def end_text(path: model.PathSummary, end: model.SoundEnd) -> str:
+    """That a path may be run to a point of it, and by how much it is clear up to there, if that was measured; then why
+    no motion repairs it."""
     last, parts = path.clear_until, vars(end) | {"margin": None}
-    if last:
+    if last and end.t_s >= last.t_s:
         parts |= {"margin": last.margin_mm, "stop_s": last.stop_s}
-    assumed = _of_assumed(last.margin_mm, shapes) if last else ""
-    return sentence("finding", finding=joined([assumed, sentence("advice.end", **parts)], ". "))
-
-
-def end_facts(path: model.PathSummary) -> list[tuple[FactName, str]]:
-    """Why a path that is to end earlier has no repair, and where exactly it may end."""
-    return [("repair", no_repair(path)), ("end", _until(path))]
+    return sentence("finding", finding=joined([sentence("advice.end", **parts), no_repair(path)], ". "))
 
 
 def whole_pace(path: model.PathSummary) -> str:
@@ -407,24 +359,21 @@ def _within_reach(path: model.PathSummary) -> str:
     return sentence("advice.within_reach", t=part.t0_s, far=part.s0_m * 1000, first=before, what=first.text)
 
 
-def _clear(path: model.PathSummary) -> str:
-    """How far a path that collides could be used; empty for others."""
-    last = path.clear_until
-    if last is None or path.unreachable:
-        return ""
-    pair = path.collisions[0].cause.touches[0].pair
-    return sentence("advice.clear_until", **vars(last), far=last.s_m * 1000, pair=pair)
-
-
 def reasons(tried: model.TriedStrategy) -> str:
     """Why a strategy is not possible or not usable; empty where it is."""
     return joined(listed(tried.reasons))
 
 
-def repair_text(path: model.PathSummary, limits: model.LimitsUsed | None = None) -> str:
-    """All that is said of the strategy that was chosen; ``limits``: of the joints, whose assumed ones are named."""
-    facts = repair_facts(path, limits, None)
-    return joined([repair_lead(path), *(text for _, text in facts), whole_pace(path)], ". ")
+def repair_text(path: model.PathSummary, slowed: Slowed | None = None, switch: str = "") -> str:
+    """All that is said of the strategy that was chosen; ``switch``: of its start, as :func:`switch_text` says it."""
+    tried, motion = _chosen(path)
+    passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
+    quicker = tried.name == "planned" and motion.duration_s < path.duration_s
+    facts = [
+        sentence("advice.slowly", programmed=path.duration_s) if quicker else "",
+        sentence("advice.region") if passes else "",
+    ]
+    return sentence("finding", finding=joined([repair_lead(path, slowed), *facts, switch, whole_pace(path)], ". "))
 
 
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
@@ -435,7 +384,7 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
         tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
-    clearance = _clearance_kept(motion)
+    clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
     way = word("advice", ADVICE, tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)
@@ -450,51 +399,6 @@ def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.Strateg
     if tried is None or tried.motion is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
     return tried, tried.motion
-
-
-def _clearance_kept(motion: model.StrategyMotion) -> float | None:
-    """mm, rounded down as it is shown."""
-    return None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
-
-
-def repair_facts(
-    path: model.PathSummary, limits: model.LimitsUsed | None, shapes: Finding | None
-) -> list[tuple[FactName, str]]:
-    """What else is said of the strategy that was chosen, and what it takes of ``limits`` that are assumed."""
-    tried, motion = _chosen(path)
-    clearance = _clearance_kept(motion)
-    passes = path.singularities and not path.in_joint_space and not motion.keeps_clear
-    quicker = tried.name == "planned" and motion.duration_s < path.duration_s
-    unsaid = limits is None or not any(limits.speed_assumed)
-    full = unsaid and (motion.max_joint_speed_ratio or 0.0) >= FULL_SPEED
-    facts: list[tuple[FactName, str]] = [
-        ("clearance", "" if clearance is None else _of_assumed(clearance, shapes)),
-        ("time", sentence("advice.slowly", programmed=path.duration_s) if quicker else ""),
-        ("singularity", sentence("advice.region") if passes else ""),
-        ("limits", _of_limits(motion, limits) if limits else ""),
-        ("limits", sentence("advice.full_speed") if full else ""),
-    ]
-    return [(name, text) for name, text in facts if text]
-
-
-def fact_word(name: FactName) -> str:
-    """What a fact is about."""
-    return word("trajectory.fact", FACTS, name)
-
-
-def _of_limits(motion: model.StrategyMotion, limits: model.LimitsUsed) -> str:
-    """What of assumed limits a motion takes; empty where none is assumed."""
-    if not any(limits.speed_assumed) and not limits.acceleration_assumed:
-        return ""
-    speed = None
-    if any(limits.speed_assumed):
-        speed = max(most / limit for most, limit in zip(motion.max_joint_speed_deg_s, limits.speed_deg_s))
-    return sentence("advice.limits", speed=speed, acceleration=motion.max_joint_acceleration_ratio)
-
-
-def limits_assumed(speed: Sequence[bool], acceleration: bool) -> str:
-    """That passing rests on assumed limits of the joints; empty where none is assumed."""
-    return sentence("limits_assumed") if any(speed) or acceleration else ""
 
 
 def _leaves(far_mm: float, turned_deg: float) -> str:

@@ -12,7 +12,7 @@ from er3a.pipeline.messages.numbers import at_least, at_most
 from er3a.pipeline.messages.say import FORMATS, joined, say, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
-from er3a.workspace.causes import SingleChange, VoidCause
+from er3a.workspace.causes import VoidCause
 
 KEY_FIGURES = {
     "greatest_reach": N_("greatest reach from axis 1"),
@@ -26,14 +26,6 @@ KEY_FIGURES = {
 VOID_KINDS = {"enclosed": N_("enclosed"), "open": N_("open pocket")}
 
 
-ENTRIES = {
-    "a": N_("a{joint}"),
-    "d": N_("d{joint}"),
-    "offset": N_("offset {joint}"),
-    "direction": N_("direction {joint}"),
-    "lower": N_("lower limit {joint}"),
-    "upper": N_("upper limit {joint}"),
-}
 TEXTS = texts(
     {
         "workspace.flat": "The tool point moves on a surface, on a line or not at all: there is no volume.",
@@ -42,22 +34,16 @@ TEXTS = texts(
         "workspace.void_unexpected": (
             "An enclosed void of at least {litres:at_least L} L lies away from the shoulder, at ({x_mm:.0f}, "
             "{y_mm:.0f}, {z_mm:.0f}) mm. Cause: {cause}. Never widen a limit of the arm for it. That is not "
-            "normal: a limit, a zero or a direction of joint 2 or 3 may be wrong.[ {changes}]"
+            "normal: a limit, a zero or a direction of joint 2 or 3 may be wrong."
         ),
         "workspace.void_at_shoulder": (
             "An enclosed void of at least {litres:at_least L} L surrounds the shoulder: normal. Its centre is "
             "({x_mm:.0f}, {y_mm:.0f}, {z_mm:.0f}) mm; no other was found."
         ),
-        "void_changes": (
-            "Single changes of the table that leave less than a tenth of it: {named:4, } ({count} of {tried}; "
-            "undecided: {undecided}). References must tell which is right."
-        ),
         "void_disappears": "{limits:limit, }; it disappears at {extended:extended or }",
         "void_of_several_limits": "several limits together[; {most}]",
         "void_of_geometry": "geometry: {remaining_ratio:.0%} of it stays without any joint limit[; {most}]",
         "relaxed_limit": "it shrinks by {filled:.0%} at {limit}",
-        "workspace.pockets": "open pockets: {count}",
-        "workspace.voids": "enclosed voids: {count}",
         "workspace.capability_missing": "{lacks}",
         "inverse_unknown": "no method here finds all inverse solutions of this arm",
         "joint_one_shared": "joint 1 is coupled or limited together with others, so no azimuth stands for another",
@@ -97,31 +83,6 @@ TEXTS = texts(
         ),
     }
 )
-
-
-CHANGED_FIRST = ("offset", "direction", "lower", "upper", "a", "d")
-
-
-@says("workspace.void_unexpected")
-def _(found: Finding) -> str:
-    return say_as(found, changes=_changes(found))
-
-
-def _changes(found: Finding) -> str:
-    """The single changes of the table that take the void away; empty where none was tried or none does."""
-    decided = [(change, change.left_litres[1]) for change in found.single_changes if change.left_litres]
-    least = [change for change, litres in decided if litres < 0.1 * found.litres]
-    if not least:
-        return ""
-    named = [*map(change_text, sorted(least, key=lambda change: CHANGED_FIRST.index(change.column)))]
-    tried = len(found.single_changes)
-    return sentence("void_changes", count=len(least), tried=tried, named=named, undecided=tried - len(decided))
-
-
-def change_text(change: SingleChange) -> str:
-    """An entry and the value that was tried, such as "offset 2 = 90 deg"."""
-    tried = as_text(change.tried, ".6g" if change.unit else "+.6g")
-    return f"{tr(ENTRIES[change.column], joint=change.joint)} = {with_unit(tried, change.unit)}"
 
 
 @says("void_disappears")

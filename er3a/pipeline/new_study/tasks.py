@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import label_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError
@@ -175,11 +174,6 @@ class TaskSearch:
         self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
         self.drawn = reach.q[:JUDGED]
         self.fit = self.drawn[self._fits(self.drawn)]
-
-    def always_overlapping(self) -> list[str]:
-        """Pairs of bodies that overlap at all joint values drawn, which no arm can do."""
-        always = np.flatnonzero(self.bodies.overlaps(self.drawn).all(axis=0))
-        return [label_of(self.bodies.pairs[k]) for k in always]
 
     def spots(self) -> list[Spot]:
         """Poses far from one another: at most ``MAX_TARGETS``, fewer where the arm reaches no more of those tried."""

@@ -10,7 +10,6 @@ from typing import Any
 
 import jinja2
 
-from er3a.collision.pairs import label_of
 from er3a.errors import Er3aError
 from er3a.files.kept_files import ROOT, write_atomically, write_text
 from er3a.files.reference_sets import FORMATS
@@ -32,34 +31,28 @@ SAMPLES = 8_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class WrittenStudy:
-    """The files that were written, and why targets or paths are none that the arm can do, or were not examined for."""
-
-    files: tuple[Path, ...]
-    shortcomings: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class FoundTasks:
     """Scene, targets and paths of a study.
 
     Attributes
     ----------
-    safe : whether targets and paths are within limits, away from singular poses and clear of collisions; else the
-        path is a move between two targets, which are drawn joint values unless there were ``clear`` ones
-    shortcomings : see :class:`WrittenStudy`
+    clear : whether targets are within limits, away from singular poses and clear of collisions; else they are drawn
+    shortcoming : why targets or the path are none that the arm can do; empty if they are
     """
 
     scene: dict[str, Any]
     spots: list[Spot]
     paths: list[dict[str, Any]]
     clear: bool
-    safe: bool
-    shortcomings: tuple[str, ...]
+    shortcoming: str
 
 
-def write_study(arm: Arm, folder: Path) -> WrittenStudy:
+def write_study(arm: Arm, folder: Path) -> tuple[list[Path], str]:
     """Write a study of an arm into a folder.
+
+    Returns
+    -------
+    files, shortcoming : that were written, and what they fall short of
 
     Raises
     ------
@@ -87,7 +80,7 @@ def write_study(arm: Arm, folder: Path) -> WrittenStudy:
         write_text(folder / place, text)
     for surface, content in surface_files(arm.robot.meshes).items():
         write_atomically(folder / "data" / "robots" / surface, partial(Path.write_bytes, data=content))
-    return WrittenStudy(tuple(folder / place for place in texts if place not in aids), found.shortcomings)
+    return [folder / place for place in texts if place not in aids], found.shortcoming
 
 
 def _found(arm: Arm) -> FoundTasks:
@@ -99,37 +92,17 @@ def _found(arm: Arm) -> FoundTasks:
         spots = search.spots()
         clear = len(spots) >= MIN_TARGETS
         if clear and (paths := search.paths(spots)):
-            return FoundTasks(scene, spots, paths, True, True, tuple(_unexamined(arm, search)))
+            return FoundTasks(scene, spots, paths, clear, "")
     if clear:
         shortcoming = "The path is a move of the joints between two targets: none that was tried is safe."
     else:
-        shortcoming, spots = _without_targets(arm, search), search.any_spots()
-    return FoundTasks(scene, spots, search.any_path(spots), clear, False, (shortcoming, *_unexamined(arm, search)))
-
-
-def _unexamined(arm: Arm, search: TaskSearch) -> list[str]:
-    """Which collisions were not looked at, if any."""
-    if not search.bodies.in_error:
-        return []
-    pairs = ", ".join(label_of(pair) for pair in search.bodies.in_error)
-    return [f"Collisions of {pairs} were not examined: these shapes overlap where no arm's can. {_remedy(arm)}"]
-
-
-def _remedy(arm: Arm) -> str:
-    """What to do about shapes that overlap always."""
-    return f"Correct the shapes, or allow the contact, in data/robots/{arm.robot.name}.yaml."
-
-
-def _without_targets(arm: Arm, search: TaskSearch) -> str:
-    """Why there are no targets."""
-    text = (
-        f"Targets and path are joint values drawn at random, not tasks: of {len(search.drawn)} joint vectors drawn "
-        f"within the limits {len(search.fit) or 'none'} are away from the limits (8 deg or a twentieth of a joint's "
-        "range), away from singular poses and clear of collisions."
-    )
-    if always := search.always_overlapping():
-        text += f" {', '.join(always)} overlap in all of them, which no arm can do. {_remedy(arm)}"
-    return text
+        spots = search.any_spots()
+        shortcoming = (
+            f"Targets and path are joint values drawn at random, not tasks: of {len(search.drawn)} joint vectors drawn "
+            f"within the limits {len(search.fit) or 'none'} are away from the limits (8 deg or a twentieth of a joint's"
+            " range), away from singular poses and clear of collisions."
+        )
+    return FoundTasks(scene, spots, search.any_path(spots), clear, shortcoming)
 
 
 def _targets(found: FoundTasks) -> list[dict[str, Any]]:

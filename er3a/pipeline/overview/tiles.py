@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Plane, Scene
-from er3a.collision.shapes import solid_pieces
+from er3a.collision.scene import Scene
 from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.workspace import millimetres
@@ -24,6 +22,7 @@ from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Group
+from er3a.pipeline.viewing.drawn import outlines
 from er3a.robots.robot import Robot
 
 Results = Mapping[str, Stored[Any]]
@@ -106,13 +105,10 @@ def _from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, pl
     letters, size = 0.075 * reach, AROUND * reach
     parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, low, high))]
     for solid in scene.solids if scene else ():
-        if isinstance(solid, Plane):
+        if not (seen := [1000 * corners for corners in outlines(solid, [0, 1])]):
             continue
-        for piece in solid_pieces(solid):
-            corners = 1000 * piece[ConvexHull(piece[:, :2]).vertices][:, :2]
-            parts.append(Markup('<polygon class="solid" points="{}"/>').format(_seen(corners)))
-        middle = 1000 * np.concatenate(solid_pieces(solid)).mean(axis=0)
-        parts.append(_word(middle, letters, own_title(solid.name), ""))
+        parts += [Markup('<polygon class="solid" points="{}"/>').format(_seen(corners)) for corners in seen]
+        parts.append(_word(np.concatenate(seen).mean(axis=0), letters, own_title(solid.name), ""))
     bottom, top = (1000 * corner for corner in placing.tray.corners)
     corners = np.array([[bottom[0], bottom[1]], [top[0], bottom[1]], [top[0], top[1]], [bottom[0], top[1]]])
     parts.append(Markup('<polygon class="tray" points="{}"/>').format(_seen(corners)))

@@ -65,7 +65,7 @@ class Fault:
     a program what weighs most, then what fails before that. ``cause``: what all of it comes from, such as a singular
     pose, empty where nothing is known.
     ``status`` and ``verdict``: of all of it; ``meant``: whether its file expects that, said in words by ``expected``
-    (empty where it expects nothing). ``facts``: what else is to be known of what to do, each after what it is about.
+    (empty where it expects nothing).
     ``address``: of the place on the robot's pages, which the player shows there; ``instead``: a motion that may be run,
     and where the player shows it.
     """
@@ -81,7 +81,6 @@ class Fault:
     address: str
     instead: tuple[str, str] | None = None
     cause: str = ""
-    facts: tuple[tuple[str, str], ...] = ()
 
     @property
     def when(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from typing import Protocol
+from typing import Any
 
 from er3a.finding import Finding, fact
 from er3a.kinematics.solutions import TargetOutcome
@@ -15,26 +15,9 @@ from er3a.vision.vision_findings import GraspOutcome
 Outcome = TargetOutcome | PathVerdict | ProgramOutcome | GraspOutcome
 
 
-class Judged(Protocol):
-    """A target, a path or an object with what it came to, and what it is said to come to.
-
-    A path can come to more than one outcome (``outcomes``, the first first), and all of them can be expected.
-    """
-
-    @property
-    def name(self) -> str:
-        """By which its file calls it."""
-        ...
-
-    @property
-    def expect(self) -> Outcome | tuple[Outcome, ...] | None:
-        """What its file says that it is to come to; None or empty where nothing is said."""
-        ...
-
-    @property
-    def outcome(self) -> Outcome:
-        """What it came to, of several outcomes the gravest."""
-        ...
+Judged = Any
+"""A target, a path or an object with ``name``, ``outcome`` (what it came to, the gravest of ``outcomes`` if it has
+several) and ``expect`` (what its file says that it is to come to: None, one or several)."""
 
 
 def came_to(judged: Judged) -> tuple[Outcome, ...]:

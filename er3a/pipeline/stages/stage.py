@@ -6,62 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from er3a.files.robot_library import LoadFields
 from er3a.files.yaml_file import StrictModel
 from er3a.finding import AnyFinding
 from er3a.numerics.jit import kernels_folder
 from er3a.robots.robot import Robot
 
-
-class RobotFiles(Protocol):
-    """The files that a study names for a robot."""
-
-    @property
-    def targets(self) -> str:
-        """Path of the file of targets."""
-        ...
-
-    @property
-    def paths(self) -> str:
-        """Path of the path file."""
-        ...
-
-    @property
-    def programs(self) -> str | None:
-        """Path of the file that lists robot programs; None where there are none."""
-        ...
-
-    @property
-    def vision(self) -> str | None:
-        """Path of the file of what the camera sees; None without a camera."""
-        ...
-
-    @property
-    def confirm(self) -> str | None:
-        """Path of the file of joint values and poses of the controller; None without."""
-        ...
-
-
-class StudyFiles(Protocol):
-    """What a stage asks of a study to name its inputs; :class:`er3a.pipeline.study.StudyBase` says what each gives."""
-
-    def entry(self, name: str) -> RobotFiles:
-        """The study's entry for a robot."""
-        ...
-
-    def references(self, name: str) -> list[str]:
-        """Names of the reference sets of a robot."""
-        ...
-
-    def scenes(self, name: str, stage: str) -> list[Path]:
-        """Files of the scene of a robot in a stage; empty in open space."""
-        ...
-
-    def loads(self, name: str) -> list[LoadFields]:
-        """What hangs on a robot's flange, as far as the study says."""
-        ...
+StudyFiles = Any
+"""What a stage asks of a study to name its inputs: ``er3a.pipeline.study.StudyBase``, which imports the stages."""
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,7 @@ export function rotZ(angle) {
 }
 
 export const translation = (x, y, z) => [[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1]];
+export const IDENTITY = translation(0, 0, 0);
 
 /** [roll, pitch, yaw] of R = Rz(yaw) Ry(pitch) Rx(roll) [2]; at pitch +-90 deg the roll is set to 0. */
 export function rollPitchYaw(T) {

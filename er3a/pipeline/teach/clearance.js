@@ -1,6 +1,6 @@
 /** How far the arm is from its surroundings and from itself, pair by pair of the bodies that the collision stage watches. */
 
-import { add, moved, norm, scaled, subtract } from "er3a/algebra";
+import { IDENTITY, add, moved, norm, scaled, subtract } from "er3a/algebra";
 import { ballAround, bodyDistance } from "er3a/distance";
 import { write } from "er3a/readouts";
 import { surfaceDistance } from "er3a/surface";
@@ -29,7 +29,7 @@ export function nearestPair({ bodies, pairs }, base, T) {
     if (!places.has(i)) places.set(i, link === WORLD ? points : points.map((point) => moved(frame(link), point)));
     return places.get(i);
   };
-  const frameOf = (i) => (bodies[i].link === WORLD ? null : frame(bodies[i].link));
+  const frameOf = (i) => (bodies[i].link === WORLD ? IDENTITY : frame(bodies[i].link));
   const surfaces = (pair) => pair.bodies.some((i) => bodies[i].surface);
   let best = null;
   const waiting = [];

@@ -17,11 +17,10 @@
  */
 
 import {
-  add, column, cross, dot, multiply, rotX, rotY, rotZ, scaled, singularValues, subtract, translation, turned, unit,
+  IDENTITY, add, column, cross, dot, multiply, rotX, rotY, rotZ, scaled, singularValues, subtract, translation, turned, unit,
 } from "er3a/algebra";
 
 export const POSE = [0, 1, 2, 3, 4, 5]; // rows of a Jacobian: along and about x, y, z
-const IDENTITY = translation(0, 0, 0);
 
 /**
  * Each link's constant transform in two steps: along its joint's axis, then across to the next axis. Entry 0 is what

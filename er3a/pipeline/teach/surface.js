@@ -6,7 +6,7 @@
  * surface, but has a point of one of its shells inside a closed one, is inside as a whole.
  */
 
-import { add, column, dot, moved, multiply, norm, scaled, subtract, turnedBack } from "er3a/algebra";
+import { IDENTITY, add, column, dot, moved, multiply, norm, scaled, subtract, turnedBack } from "er3a/algebra";
 import { bodyDistance } from "er3a/distance";
 
 const TOUCHING = 1e-9; // m; what is nearer crosses
@@ -101,7 +101,7 @@ export function surfaceDistance(a, T, b, S, r, far) {
     return { distance, near: [lowest, subtract(lowest, scaled(normal, distance))], deep: false };
   }
   const back = inverted(T);
-  const seen = b.surface ? multiply(back, S) : [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
+  const seen = b.surface ? multiply(back, S) : IDENTITY;
   const points = b.surface ? null : r.map((p) => moved(back, p));
   const core = b.surface ? CORE : { ...b, radius: 0 };
   const round = points && boxAround(points);

@@ -16,7 +16,7 @@ import rerun.blueprint as rrb
 
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Box, Cylinder, Plane, Solid, Sphere
-from er3a.collision.shapes import Body, arm_bodies, hull_faces, solid_pieces
+from er3a.collision.shapes import Body, arm_bodies, hull_faces
 from er3a.geometry.transforms import inverted
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton
@@ -248,7 +248,7 @@ def body_shape(body: Body, colour: tuple[int, ...], solid: bool = False) -> Shap
         return rr.Ellipsoids3D(centers=body.points, radii=[body.radius], colors=[colour])
     if len(body.points) == 2:
         return capsules(body.points[:1], np.diff(body.points, axis=0), body.radius, colour, solid)
-    return pieces_mesh([body.points], colour)
+    return _mesh(body.points, hull_faces(body.points), colour)
 
 
 def solid_shapes(
@@ -282,21 +282,8 @@ def solid_shapes(
             case Plane():
                 shape = rr.Boxes3D(sizes=[[size, size, _PLANE_THICKNESS]], **style)
             case _:
-                T, shape = np.eye(4), pieces_mesh(solid_pieces(each), colour)
+                shape = _mesh(each.points, each.faces, colour)
         yield each.name, rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3]), shape
-
-
-def pieces_mesh(pieces: Sequence[Reals], colour: tuple[int, ...]) -> rr.Mesh3D:
-    """Convex pieces as one mesh.
-
-    Parameters
-    ----------
-    pieces : corners (k, 3) of each, m
-    colour : red, green, blue and perhaps alpha, 0 to 255
-    """
-    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    triangles = [start + hull_faces(piece) for start, piece in zip(starts, pieces)]
-    return _mesh(np.concatenate(pieces), np.concatenate(triangles), colour)
 
 
 def _mesh(points: Reals, faces: Integers, colour: tuple[int, ...]) -> rr.Mesh3D:

@@ -16,8 +16,8 @@ import scipy
 
 from er3a.collision.meshes import simplified
 from er3a.collision.pairs import link_label
-from er3a.collision.scene import Box, Cylinder, Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import ArmShapes, arm_shapes, hull_faces, solid_pieces
+from er3a.collision.scene import Box, Cylinder, Mesh, Plane, Scene, Solid, Sphere
+from er3a.collision.shapes import ArmShapes, arm_shapes, hull_faces, placed_points, solid_corners
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames
@@ -190,7 +190,7 @@ def drawn_scene(solids: Sequence[Solid], robot: Robot, frame: int = 0) -> list[S
 
 
 def _measures(solid: Solid, robot: Robot) -> Shape:
-    """Kind and measures of a solid; one that there is no shape for as the hulls of its pieces."""
+    """Kind and measures of a solid, of a mesh those of fewer triangles."""
     match solid:
         case Box():
             return {"kind": "box", "T": np.asarray(solid.T).tolist(), "size": np.asarray(solid.size).tolist()}
@@ -204,8 +204,35 @@ def _measures(solid: Solid, robot: Robot) -> Shape:
             T = _along(top - 2 * PLANE_THICKNESS * solid.normal, top - PLANE_THICKNESS * solid.normal)
             size = [PLANE_SIZE * drawn_size(robot)] * 2 + [PLANE_THICKNESS]
             return {"kind": "box", "T": T.tolist(), "size": size, "pale": True, "colour": GRID}
-    pieces = solid_pieces(solid)
-    starts = np.cumsum([0, *(len(piece) for piece in pieces)])
-    faces = np.concatenate([start + hull_faces(piece) for start, piece in zip(starts, pieces)])
-    points = np.concatenate(pieces)
-    return {"kind": "mesh", "T": np.eye(4).tolist(), "points": points.tolist(), "faces": faces.tolist()}
+        case Mesh():
+            points, faces = simplified(solid.points, solid.faces, MAX_FACES)
+            return {"kind": "mesh", "T": solid.T.tolist(), "points": points.tolist(), "faces": faces.tolist()}
+
+
+OUTLINED = 500  # triangles of a mesh whose outline is drawn
+_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
+CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
+
+
+def outlines(solid: Solid, shown: list[int]) -> list[Reals]:
+    """What a solid covers, seen along an axis: of a mesh the triangles.
+
+    Parameters
+    ----------
+    solid : of a scene
+    shown : the two axes (0, 1, 2) of the drawing
+
+    Returns
+    -------
+    polygons : corners (k, 2), m, of each; a plane has none
+    """
+    match solid:
+        case Plane():
+            return []
+        case Sphere():
+            return [solid.T[:3, 3][shown] + solid.radius * CIRCLE]
+        case Mesh():
+            points, faces = simplified(placed_points(solid), solid.faces, OUTLINED)
+            return list(points[faces][:, :, shown])
+    corners = solid_corners(solid)[:, shown]
+    return [corners[scipy.spatial.ConvexHull(corners).vertices]]

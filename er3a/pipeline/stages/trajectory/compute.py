@@ -43,7 +43,7 @@ from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.names import FAULTS, PathVerdict, StrategyName
+from er3a.planning.names import PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
@@ -299,12 +299,12 @@ def _motion(robot: Robot, cost: StrategyCost, clearance: model.MinClearance | No
 
 
 def path_summary(
-    robot: Robot,
+    task: AvoidanceTask,
     motion: Motion,
     found: judgement.Judgement,
     along: ClearanceAlong,
     avoided: Avoided,
-    limits: JointLimits,
+    assumed_margin: float,
 ) -> model.PathSummary:
     """All that is known of a path, for the stage's summary.
 
@@ -313,16 +313,17 @@ def path_summary(
     found : its faults by the joints
     along : its clearance
     avoided : what was tried where it is not safe
-    limits : that it was judged by
+    assumed_margin : m, by how much assumed shapes of the arm may be wrong
 
     Returns
     -------
     summary : in mm, deg and s; its verdict is the gravest of its own and "collides"
     """
+    robot, limits = task.robot, task.limits
     followed, entry = motion.followed, motion.entry
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
-    contacts = judgement.collisions(along)
+    contacts = judgement.collisions(robot, along, assumed_margin)
     speed, acceleration = found.max_rates or (None, None)
     missed_mm, missed_deg = corner_misses(robot, motion.built)
     return model.PathSummary(
@@ -414,7 +415,7 @@ def _judged(
     avoided = task.avoid(motion, found, along)
     checks = _checks(robot, motion, found, task.near, limits)
     path = replace(
-        path_summary(robot, motion, found, along, avoided, limits),
+        path_summary(task, motion, found, along, avoided, assumed_margin),
         clear_until=judgement.last_safe_stop(surroundings, motion, found, along, task.margin, limits.acceleration),
         of_program=tuple(map(finding_at, each.found)),
     )
@@ -576,7 +577,7 @@ def _verdict(
 
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
     code = "trajectory.safe" if safe == count else "trajectory.some_unsafe" if safe else "trajectory.none_safe"
-    failed = any(_fails(path) for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
+    failed = any(path.fails for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
     status: Status = (
         pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
     )
@@ -597,12 +598,6 @@ def _verdict(
     near, shown = count - safe - sum(map(len, unsafe.values())), demonstrations(judged, "safe")
     counts = fact(code, paths=count, safe=safe, near_assumed=near, demonstrations=shown, **unsafe)
     return Verdict(status, counts)
-
-
-def _fails(path: model.PathSummary) -> bool:
-    """Whether a path can't be run as it is: it collides, leaves limits, no joints follow it, or its program fails."""
-    lost = path.verdict == "singular" and (bool(path.jumps) or not path.joint_speed_bounded)
-    return path.verdict in FAULTS or lost or any(each.level == "fail" for each in path.of_program)
 
 
 def _figures(

@@ -11,6 +11,7 @@ import scipy
 from er3a.collision.along import ClearanceAlong, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import label_of
+from er3a.collision.shapes import surely_touch
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.singularity import NearSingular
@@ -161,12 +162,13 @@ def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
     )
 
 
-def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[Finding]]:
+def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motion_faults.Interval[Finding]]:
     """Stretches of a motion on which bodies overlap.
 
     Parameters
     ----------
     along : clearance along the motion
+    margin : m, by how much assumed shapes of the arm may be wrong
 
     Returns
     -------
@@ -179,7 +181,14 @@ def collisions(along: ClearanceAlong) -> list[motion_faults.Interval[Finding]]:
             fact(
                 "bodies_overlap",
                 touches=tuple(
-                    fact("pair_touches", pair=each.pair, t0_s=each.start, depth_mm=each.depth * 1000, t_s=each.at)
+                    fact(
+                        "pair_touches",
+                        pair=each.pair,
+                        t0_s=each.start,
+                        depth_mm=each.depth * 1000,
+                        t_s=each.at,
+                        certain=surely_touch(robot, each.pair, each.depth, margin),
+                    )
                     for each in contact.touches
                 ),
             ),

@@ -22,7 +22,7 @@ from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.motion_faults import LimitCause, RateCause
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import FAULTS, PathVerdict, StrategyName
 from er3a.planning.way_around import NoWayAround
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
@@ -295,6 +295,16 @@ class PathSummary:
         }
         spans = {name: [(part.t0_s, part.t1_s) for part in parts] for name, parts in faults.items()}
         return in_order(self.verdict, spans, self.duration_s)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it can't be run as it is: it is at fault, no joints follow it, or its program fails. Only bodies that
+        touch for certain are a fault."""
+        faults = set(FAULTS).intersection(self.outcomes)
+        if not any(touch.certain for part in self.collisions for touch in part.cause.touches):
+            faults -= {"collides"}
+        lost = self.verdict == "singular" and (bool(self.jumps) or not self.joint_speed_bounded)
+        return bool(faults) or lost or any(each.level == "fail" for each in self.of_program)
 
     @property
     def chosen(self) -> TriedStrategy | None:

@@ -22,9 +22,9 @@ from er3a.planning.moves import JointMove
 from er3a.planning.names import PathVerdict
 from er3a.planning.profiles import Times
 from er3a.planning.stated_rates import StatedMotion
-from er3a.programs.csv_program import write_csv
 from er3a.programs.from_commands import listing_of
 from er3a.programs.languages import not_written, write_program
+from er3a.programs.motion_table import write_csv
 from er3a.programs.program_names import LanguageName
 from er3a.programs.writing import HEAD, WriteOptions, ascii_text, head_line, program_name
 from er3a.robots.joint_limits import joint_columns, meant, shown

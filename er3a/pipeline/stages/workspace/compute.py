@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
-from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
@@ -30,7 +29,6 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
 from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells
-from er3a.workspace.causes import single_changes
 from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Hull, Void, convex_hull, pocket_block, proven_voids
 
@@ -51,8 +49,8 @@ def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdic
     enclosed = [void for void in voids if void.kind == "enclosed"]
     unexpected = [void for void in enclosed if not void.holds_shoulder]
     if unexpected:
-        found = {"cause": unexpected[0].cause, "single_changes": ()}
-        return Verdict("caution", fact("workspace.void_unexpected", **_size_and_place(unexpected[0]), **found))
+        found = fact("workspace.void_unexpected", **_size_and_place(unexpected[0]), cause=unexpected[0].cause)
+        return Verdict("caution", found)
     if undecided > SETTLED:
         return Verdict("caution", fact("workspace.unsettled", undecided_percent=100 * undecided))
     if enclosed:
@@ -141,9 +139,6 @@ def _summary(
 ) -> model.WorkspaceSummary:
     settings, grid, hull = study.section(WorkspaceSettings), samples.grid, samples.hull
     judged = judge(hull.volume, voids, proven.proof.width)
-    if is_one(judged.finding, "workspace.void_unexpected") and not wrist_partition_missing(robot):
-        tried = single_changes(robot, judged.finding.cause, study.seed)
-        judged = replace(judged, finding=judged.finding.but(single_changes=tried))
     examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_kept)

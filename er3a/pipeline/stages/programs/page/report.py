@@ -17,7 +17,6 @@ from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.messages.trajectory import limits_assumed
 from er3a.pipeline.player.motions import Fault, PlayedMotion, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
@@ -58,9 +57,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         sections=sections,
         entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
-        limits_assumed=limits_assumed(
-            summary.assumed_speed, any(each.reason == "own_accelerations" for each in summary.assumed)
-        ),
         faults={fault.name: fault for fault in wrong},
         player=player(robot, played, scene, opened=opened(wrong)),
         bodies=[each.name for each in scene.solids] if scene else [],

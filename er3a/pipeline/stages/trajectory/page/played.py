@@ -18,28 +18,23 @@ from er3a.pipeline.messages.planning import rate_needed, times_needed
 from er3a.pipeline.messages.programs import remedies, remedy
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.trajectory import (
-    FactName,
     FaultText,
     Slowed,
     cause_of,
     cause_text,
-    end_facts,
     end_text,
     event_word,
-    fact_word,
     first_faults,
     no_repair,
     path_text,
-    repair_facts,
     repair_lead,
+    repair_text,
     switch_text,
-    whole_pace,
 )
 from er3a.pipeline.player.motions import Fault, FaultMoment, Mark, PlayedEvent, PlayedMotion, Weight, address_of
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RATES, rate_ratio
-from er3a.planning.names import FAULTS, PathVerdict
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -48,11 +43,6 @@ LARGEST_PART = 0.9  # of a path's time, up to which it is slower only there
 MIN_LENGTH = 1e-6  # m
 SINGULAR_AXES = {"wrist": (4, 6), "elbow": (2, 3), "shoulder": (1,)}  # rows of the table that such a pose is of
 RANKS: tuple[Weight, ...] = ("fail", "caution", "plain")
-
-
-def weight_of(verdict: PathVerdict) -> Weight:
-    """How much a verdict weighs."""
-    return "fail" if verdict in FAULTS else "plain" if verdict == "safe" else "caution"
 
 
 def motions(
@@ -87,10 +77,8 @@ def worst_first(paths: Sequence[model.PathSummary]) -> list[model.PathSummary]:
 
 
 def _weight_of(path: model.PathSummary) -> Weight:
-    """That of its verdict, or of what was found in its program if that weighs more."""
-    weights: list[Weight] = [weight_of(path.verdict)]
-    weights += ["fail" if each.level == "fail" else "caution" for each in path.of_program]
-    return min(weights, key=RANKS.index)
+    """How much its verdict weighs, with what was found in its program."""
+    return "fail" if path.fails else "plain" if path.verdict == "safe" and not path.of_program else "caution"
 
 
 def faults(results: model.TrajectoryResults) -> list[Fault]:
@@ -109,7 +97,7 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
             wrong = [*_faults(path), *wrong]
         status, verdict = shown_verdict(path, near)
         own = results.avoidance.take(results.avoidance.path == path.name)
-        to_do, facts, instead = _to_do(path, rows, own, results.summary)
+        to_do, instead = _to_do(path, rows, own, results.summary)
         moments = tuple(_linked(_moment(fault, rows), path.name) for fault in wrong)
         found.append(
             Fault(
@@ -124,7 +112,6 @@ def faults(results: model.TrajectoryResults) -> list[Fault]:
                 address_of("trajectory", path.name, moments[0].seen_s or 0.0, path.name),
                 instead,
                 cause_of(path),
-                tuple((fact_word(name), text) for name, text in facts if text),
             )
         )
     return found
@@ -178,26 +165,22 @@ def _assumed(part: model.Stretch[Any]) -> bool:
 
 def _to_do(
     path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows, summary: model.TrajectorySummary
-) -> tuple[str, list[tuple[FactName, str]], tuple[str, str] | None]:
-    """What to do instead of running a path as it is, what else is to be known of that, and the motion that may be run
-    with its address."""
-    shapes = summary.verdict.shapes
+) -> tuple[str, tuple[str, str] | None]:
+    """What to do instead of running a path as it is, and the motion that may be run with its address."""
     if path.chosen:
         name, repair = repaired(path), motions.take(motions.strategy == path.strategy)
-        lead = sentence("finding", finding=repair_lead(path, slowed(path, rows, repair)))
-        facts = repair_facts(path, summary.joint_limits, shapes)
-        facts += [("start", _switch(path, rows, motions)), ("pace", whole_pace(path))]
-        return lead, facts, (name, address_of("trajectory", name, 0.0, path.name))
+        text = repair_text(path, slowed(path, rows, repair), _switch(path, rows, motions))
+        return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), [], None
+        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), None
     last = path.sound_end
     if last is None:
         todo = advised(path, rows)
-        return sentence("finding", finding=todo) if todo else "", [], None
+        return sentence("finding", finding=todo) if todo else "", None
     name = tr("{path}, up to {time} s", path=path.name, time=fixed(last.t_s, 3))
     address = address_of("trajectory", path.name, last.t_s, path.name, last.t_s)
-    return end_text(path, last, shapes=shapes), end_facts(path), (name, address)
+    return end_text(path, last), (name, address)
 
 
 def slowed(path: model.PathSummary, rows: model.PathChecks, repair: model.AvoidanceRows) -> Slowed | None:
@@ -238,7 +221,7 @@ def advised(path: model.PathSummary, rows: model.PathChecks) -> str:
     no_part = sentence("advice.no_part")
     if not path.in_joint_space and len(rows) and rows.near_singular[0]:
         return joined([sentence("path.cause", event=no_part, pose=sentence("advice.near")), no_repair(path)], ". ")
-    return joined([no_repair(path), no_part if weight_of(path.verdict) == "fail" else ""], ". ")
+    return joined([no_repair(path), no_part if path.fails else ""], ". ")
 
 
 def _switch(path: model.PathSummary, rows: model.PathChecks, motions: model.AvoidanceRows) -> str:
@@ -256,12 +239,12 @@ def repaired(path: model.PathSummary) -> str:
 
 def shown_verdict(path: model.PathSummary, near: Finding | None) -> tuple[Weight, str]:
     """A path's verdict in colour and words; ``near`` as of :func:`near_assumed`."""
+    weight = _weight_of(path)
     if path.verdict == "safe" and path.of_program:
-        weight = _weight_of(path)
         return weight, tr("fault in its program") if weight == "fail" else tr("doubt in its program")
     if path.verdict == "safe" and near:
         return "caution", tr("clear of assumed shapes only")
-    return weight_of(path.verdict), joined(map(outcome_word, path.outcomes), ", ")
+    return weight, joined(map(outcome_word, path.outcomes), ", ")
 
 
 def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> Finding | None:

@@ -87,7 +87,7 @@ def runs_of_path(robot: Robot, results: TrajectoryResults, path: PathSummary) ->
         shapes=[*still, *_trail(shown, HIGHLIGHT)],
     )
     if path.chosen and path.chosen.motion:
-        to_do = repair_text(path, results.summary.joint_limits)
+        to_do = repair_text(path)
         repair: MotionRows = motions.take((motions.path == path.name) & (motions.strategy == path.strategy))
         repaired = repair.take(_frames(repair))
         yield Run(

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,8 +13,7 @@ from matplotlib.lines import AxLine, Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.scene import Plane, Scene, Solid, Sphere
-from er3a.collision.shapes import solid_pieces
+from er3a.collision.scene import Plane, Scene
 from er3a.finding import Finding
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
@@ -33,16 +31,15 @@ from er3a.pipeline.messages.workspace import (
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
-from er3a.pipeline.stages.workspace.page.workspace_figures import name_level, slide_names
+from er3a.pipeline.stages.workspace.page.workspace_figures import slide_names
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.drawn import outlines
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
-_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
-CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
 def tray_rows(
@@ -188,16 +185,8 @@ def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
             axes.add_artist(Polygon(1000 * outline, **_STYLE))
 
 
-def outlines(solid: Solid, shown: list[int]) -> list[Reals]:
-    """The outline of each convex piece of a solid, corners (k, 2) in m, seen along the axis that is not shown."""
-    if isinstance(solid, Sphere):
-        return [np.asarray(solid.T)[:3, 3][shown] + solid.radius * CIRCLE]
-    return [piece[scipy.spatial.ConvexHull(piece).vertices] for piece in (own[:, shown] for own in solid_pieces(solid))]
-
-
 SHADES = "viridis_r"
 PIXELS = 301
-_HEIGHTS = (0.25, 0.5, 0.75)
 _LABEL = 0.035  # height of a label, of the longer side of a drawing
 
 
@@ -243,28 +232,6 @@ def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: mod
             else (tr("from axis 1, in the arm's zero plane (mm)"), tr("height along axis 1 (mm)"))
         )
         equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
-    return figure
-
-
-def level_slices(
-    capability: model.CapabilitySummary, cells: model.CapabilityCells, percent: Reals, label: str
-) -> Figure:
-    """A percentage of each cell, NaN where unknown, in three slices across axis 1, or along the slide."""
-    lookup, origin = model.CellLookup(capability, cells), across_slide(capability)
-    line = lookup.reach * np.linspace(0 if lookup.bars else -1, 1, PIXELS)
-    along = np.linspace(0, capability.bar_m, PIXELS) if lookup.bars else line
-    x, y = np.meshgrid(line, along, indexing="ij")
-    figure, axes = new_figure(1, 3, width=12.0, height=4.1, sharey=True)
-    for panel, height in zip(axes, _quantiles(cells, lookup.bars)):
-        rho, place = (x, y) if lookup.bars else (np.hypot(x, y), np.arctan2(y, x))
-        row = lookup.row(rho, place, np.full(x.shape, height))
-        values = np.ma.masked_invalid(_looked_up(percent, row))
-        mesh = panel.pcolormesh(
-            (line + origin[0]) * 1000, along * 1000, values.T, cmap=SHADES, vmin=0, vmax=100, rasterized=True
-        )
-        names = name_level(panel, capability.frame if lookup.bars else None, height, origin)
-        equal_scale(panel, names[0] if panel is axes[1] else "", names[1] if panel is axes[0] else "", fill=False)
-    figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
 
 
@@ -319,13 +286,6 @@ def _looked_up(values: Reals | model.Singles, row: Integers) -> np.ma.MaskedArra
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
 
-def _quantiles(cells: model.CapabilityCells, bars: bool) -> Reals:
-    """Heights below which 25, 50 and 75 % of the reached volume lie."""
-    heights, row = np.unique(cells.z_m, return_inverse=True)
-    volume = np.bincount(row, weights=None if bars else cells.rho_m)
-    return np.interp(_HEIGHTS, volume.cumsum() / volume.sum(), heights)
-
-
 def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals) -> None:
     local = (skeleton(robot, np.zeros(robot.joints)) - frame.origin_m) @ np.array(frame.axes).T * 1000
     local[:, [0, 2]] += 1000 * origin
@@ -377,7 +337,7 @@ def capability_context(
     return {
         "missing": "",
         "asked_text": _asked_text(capability),
-        "capability_pictures": _pictures(robot, results, capability) if len(results.capability) else [],
+        "capability_picture": _picture(robot, results, capability) if len(results.capability) else None,
         "task_text": _task_text(placement.task, capability),
         "tray_line": placing.line if placing else no_box_text(results.summary),
         "tray_places": placing.rows if placing else [],
@@ -420,32 +380,14 @@ def _placement_context(
     }
 
 
-def _pictures(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> list[Picture]:
-    cells = results.capability
-    upright, reached = (
-        (
-            tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability"),
-            tr("Slices along the slide of joint 1: reachability"),
-        )
+def _picture(robot: Robot, results: model.WorkspaceResults, capability: model.CapabilitySummary) -> Picture:
+    """Slices of what the tool can do."""
+    title = (
+        tr("Slices across the slide of joint 1: reachability, IK solutions, manipulability")
         if capability.bar_m
-        else (
-            tr("Slices through axis 1: reachability, IK solutions, manipulability"),
-            tr("Slices across axis 1: reachability"),
-        )
+        else tr("Slices through axis 1: reachability, IK solutions, manipulability")
     )
-    of_reached = level_slices(
-        capability, cells, 100.0 * cells.reachability.astype(float), tr("tool orientations reached (%)")
-    )
-    return [
-        Picture(upright_slices(robot, capability, cells), upright, _slices_caption(capability)),
-        Picture(of_reached, reached, _level_caption(capability)),
-    ]
-
-
-def _level_caption(capability: model.CapabilitySummary) -> str:
-    if capability.sectors == 1:
-        return tr("Joint 1 makes a full turn, so what counts is the distance from axis 1 and the height alone.")
-    return tr("Joint 1 is limited: blank parts are out of its reach.")
+    return Picture(upright_slices(robot, capability, results.capability), title, _slices_caption(capability))
 
 
 def _slices_caption(capability: model.CapabilitySummary) -> str:

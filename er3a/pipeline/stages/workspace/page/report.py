@@ -135,9 +135,6 @@ def _context(
             else tr("Side sections about axis 1: density of the samples, and proven cells"),
             _section_caption(summary),
         ),
-        "slices": Picture(
-            workspace_figures.slices(results), tr("Three level slices of the proof"), _slices_caption(summary)
-        ),
     }
 
 
@@ -166,14 +163,4 @@ def _section_caption(summary: model.WorkspaceSummary) -> str:
         "left were merely not sampled. Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
         checked=number(summary.proof.points_checked),
         inside=summary.proof.points_in_empty_cells,
-    )
-
-
-def _slices_caption(summary: model.WorkspaceSummary) -> str:
-    enclosed = len(summary.enclosed_voids)
-    pockets = len(summary.voids) - enclosed
-    return tr(
-        "In the hull: {voids}, {pockets}. Every point of the blue area is reached; place nothing outside it.",
-        voids=sentence("workspace.voids", count=enclosed),
-        pockets=sentence("workspace.pockets", count=pockets),
     )

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection, QuadMesh
-from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
@@ -55,9 +55,8 @@ PROOF = {
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 PROOF_BLUE = "#cfe3f2"
-SLICE_PIXELS, _CLOUD_CELLS = 321, 80
+_CLOUD_CELLS = 80
 PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
-WITHIN = 0.05  # of the reached heights: nearer to an end, a height is no slice's
 
 
 def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
@@ -179,53 +178,6 @@ def _about(axis: model.AxisSummary, points: Reals) -> Reals:
     height = offset @ axis.direction
     away = np.sqrt(np.maximum(0, (offset**2).sum(axis=1) - height**2))
     return np.stack([away, height], axis=1)
-
-
-def slices(results: model.WorkspaceResults) -> Figure:
-    """Slices of the proof across axis 1, or along the slide."""
-    bars = results.summary.proof.bars
-    figure, axes = new_figure(1, 3, width=12.0, height=5.0)
-    size, origin = results.proof.rho_m[:, 1].max(), _origin_across(bars)
-    low, high = ([0.0, 0.0], [size, bars.length_m]) if bars else ([-size, -size], [size, size])
-    across, along = np.linspace(low, high, SLICE_PIXELS).T
-    x, y = np.meshgrid(across, along, indexing="ij")
-    for panel, height in zip(axes, slice_heights(results)):
-        shades = ListedColormap(list(PROOF.values()))
-        rho, azimuth = (x, 360 * y / bars.length_m) if bars else (np.hypot(x, y), np.degrees(np.arctan2(y, x)) % 360)
-        shown = _slice(results.proof, rho, azimuth, height)
-        panel.pcolormesh(
-            (across + origin[0]) * 1000, along * 1000, shown.T, cmap=shades, vmin=-0.5, vmax=3.5, rasterized=True
-        )
-        first, second = name_level(panel, bars.frame if bars else None, height, origin)
-        equal_scale(panel, first, second if panel is axes[0] else "", fill=False)
-    states = [state for kind, state in enumerate(PROOF) if kind != WEDGE]
-    handles = [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
-
-
-def name_level(axes: Axes, slide: model.SectionFrame | None, height: float, origin: Reals) -> tuple[str, str]:
-    """Title a level slice by its height (m); returns the labels of its axes."""
-    if slide:
-        axes.set_title(tr("at {height} mm across it", height=fixed(1000 * (height + origin[1]), 0)))
-        return slide_names(slide)[0], tr("along the slide (mm)")
-    axes.set_title(tr("{height} mm up axis 1", height=fixed(1000 * height, 0)))
-    return tr("from axis 1, in the arm's zero plane (mm)"), tr("across it (mm)")
-
-
-def slice_heights(results: model.WorkspaceResults) -> list[float]:
-    """Three heights (m) along axis 1: of the largest enclosed void, or else the shoulder, and midway to both ends.
-
-    Quarters of the reached heights where the shoulder lies at an end of them or joint 1 slides.
-    """
-    axis, enclosed = results.summary.axis, results.summary.enclosed_voids
-    reached = results.proof.z_m[results.proof.empty_ratio < 1]
-    low, high = reached[:, 0].min(), reached[:, 1].max()
-    point = np.array(enclosed[0].centroid_m if enclosed else axis.shoulder_m)
-    middle = float((point - axis.point_m) @ axis.direction)
-    if results.summary.proof.bars or min(middle - low, high - middle) < WITHIN * (high - low):
-        return np.quantile([low, high], [0.25, 0.5, 0.75]).tolist()
-    return [(low + middle) / 2, middle, (middle + high) / 2]
 
 
 def _slice(proof: model.ProofCells, rho: Reals, azimuth: Reals, z: float) -> Integers:
