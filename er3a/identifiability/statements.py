@@ -4,7 +4,7 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -230,11 +230,11 @@ class ToolRange:
         off : mm and deg, each at its own worst pose; the largest that was found, not proven
         """
         both = join([self.table, other])
-        mm, deg = (
-            peak(lambda q, off=off: off(*self._tool(both, q)), self.lower, self.upper, self.points)[1] * unit
-            for off, unit in ((shift_between, MM), (turn_between, 180 / np.pi))
-        )
-        return ToolOff(mm, deg)
+
+        def most(off: Callable[[Reals, Reals], Reals]) -> float:
+            return peak(lambda q: off(*self._tool(both, q)), self.lower, self.upper, self.points)[1]
+
+        return ToolOff(MM * most(shift_between), float(np.degrees(most(turn_between))))
 
     def signature(self, tables: Tables) -> Reals:
         """Numbers that are equal for tables whose tools move alike.
