@@ -10,9 +10,7 @@ ratios of joints, and what couples them, as its coupling; the table that goes th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -69,9 +67,7 @@ from er3a.calibration.terms import (
     places_of,
 )
 from er3a.comparison.entries import Entry
-from er3a.diagnosis.faults import Faults, repairs_of
 from er3a.finding import Finding, fact, is_one
-from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
@@ -88,9 +84,6 @@ FAR_WIDEST = {"mm": 1.0, "deg": 2.0}
 ROUGHLY = 10.0
 FAR_REST = 0.004
 """Of an arm's whole length: a root mean square that no tracker leaves of an arm whose table is right."""
-AS_GOOD = 1.1  # times what the table leaves
-LIKELIEST = 8  # mistakes that are tried
-NEAR_STEPS = 15  # a table that is not far off is fitted in about four
 FEW_SPARE = 10
 """Degrees of freedom below which what remains says how large noise is, but not where; at least as many as numbers."""
 
@@ -680,11 +673,8 @@ def _error_left_out(observations: PointObservations, found: Fit) -> float:
 
 
 def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> Calibration:
-    try:
-        used = _without_outliers(robot, every)
-        model = _model(robot, every.take(used).merged(), free_ratios)
-    except CalibrationError as error:
-        raise _explained(robot, every, error) from None
+    used = _without_outliers(robot, every)
+    model = _model(robot, every.take(used).merged(), free_ratios)
     for _ in range(OUTLIER_ROUNDS):
         off = _off_mm(robot, every, model, used)
         again = _out_of(every, off, used[every.pose_of]) <= 1.0
@@ -719,89 +709,11 @@ def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
 
 
 def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> Finding | None:
-    """Why measurements and table can't belong together: what fits with one mistake undone is named; corrections or
-    residuals far beyond those of arms and trackers are an error of some other kind."""
+    """Why measurements and table can't belong together: corrections or residuals far beyond those of arms and
+    trackers."""
     far = _far_off(robot, found.estimates)
     too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
-    if not (far or too_much or found.scatter > MAX_SCATTER):
-        return None
-    swapped, faults = _mistakes_named(
-        robot, [each.parameter for each in found.estimates], observations, AS_GOOD * found.rms_after_mm
-    )
-    if swapped or faults or far or too_much:
-        return fact("far_from_table", entries=far, rest_mm=found.rms_after_mm, swapped=swapped, faults=faults)
-    return None
-
-
-def _mistakes_named(
-    robot: Robot, kept: Sequence[Entry], observations: PointObservations, most_mm: float
-) -> tuple[tuple[int, int] | None, Faults]:
-    """The mistakes with one of which undone the measurements leave least: joints whose columns are swapped, or faults
-    of the table, all that do equally well.
-
-    The candidates are the diagnosis's. Those whose points, once base and tool are placed, are nearest to the measured
-    ones are fitted, with small corrections alone.
-
-    Parameters
-    ----------
-    kept : the entries that are estimated
-    most_mm : root mean square that may remain
-    """
-    fitted: list[tuple[float, tuple[int, int] | None, Faults]] = []
-    for swapped, faults, arm, seen in _likeliest_mistakes(robot, kept, observations):
-        with suppress(CalibrationError):
-            other = fit(arm, kept, seen, most_steps=NEAR_STEPS)
-            rms, plain = seen.rms_mm(other.after * observations.deviation_mm), np.zeros(len(kept))
-            if rms <= min(most_mm, FAR_REST * whole_length_mm(robot)) and not _far_off(
-                arm, _estimates(arm, observations, other, plain, plain)
-            ):
-                fitted.append((rms, swapped, faults))
-    best = min(fitted, key=lambda each: each[0], default=None)
-    if best is None or best[1]:
-        return (best[1] if best else None), ()
-    return None, tuple(fault for rms, _, faults in fitted if rms <= AS_GOOD * best[0] for fault in faults)
-
-
-def _likeliest_mistakes(
-    robot: Robot, kept: Sequence[Entry], observations: PointObservations
-) -> list[tuple[tuple[int, int] | None, Faults, Robot, PointObservations]]:
-    """Mistakes that bring the table's points nearest to the measured ones: joints swapped, or the fault of the table;
-    the arm without it, and what was observed of it."""
-    if robot.rows != robot.joints:
-        return []
-    candidates: list[tuple[tuple[int, int] | None, Faults, Robot, PointObservations]] = []
-    coupling = np.eye(robot.joints) if robot.coupling is None else robot.coupling
-    for first, second in combinations(range(robot.joints), 2):
-        if robot.slides[first] == robot.slides[second]:
-            order = np.arange(robot.joints)
-            order[[first, second]] = second, first
-            columns = coupling @ np.eye(robot.joints)[order] @ np.linalg.inv(coupling)
-            seen = replace(observations, row_values=observations.row_values @ columns.T)
-            candidates.append(((first + 1, second + 1), (), robot, seen))
-    for repair in repairs_of(tables_of(robot)):
-        table = repair.apply(tables_of(robot))
-        if not is_one(repair.fault, "wrong_limits", "swapped_limits"):
-            candidates.append((None, (repair.fault,), robot_of(table, 0, robot), observations))
-
-    def left(arm: Robot, seen: PointObservations) -> float:
-        amounts = places_at(arm, kept, seen)
-        return seen.rms_mm(seen.predict(arm, kept, amounts[None])[0] - seen.values_mm)
-
-    return sorted(candidates, key=lambda each: left(*each[2:]))[:LIKELIEST]
-
-
-def _explained(robot: Robot, every: PointObservations, error: CalibrationError) -> CalibrationError:
-    """An error that no corrections fit, with the mistake that explains it, if one does."""
-    finding = error.finding
-    if not is_one(finding, "no_correction_fits"):
-        return error
-    kept = choose_level(robot, every.merged()).kept
-    swapped, faults = _mistakes_named(robot, kept, every, finding.rest_mm)
-    if not (swapped or faults):
-        return error
-    return CalibrationError(
-        fact("far_from_table", entries=(), rest_mm=finding.rest_mm, swapped=swapped, faults=faults), str(error)
-    )
+    return fact("far_from_table", entries=far, rest_mm=found.rms_after_mm) if far or too_much else None
 
 
 def _without_outliers(robot: Robot, every: PointObservations) -> Flags:

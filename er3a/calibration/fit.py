@@ -461,7 +461,6 @@ def fit(
     kept: Sequence[Entry],
     observations: PointObservations,
     terms: Sequence[JointTerm] = (),
-    most_steps: int = MAX_STEPS,
 ) -> Fit:
     """Corrections, and coefficients of terms, that meet the observations best, by weighted least squares [1]_.
 
@@ -472,7 +471,6 @@ def fit(
     ----------
     kept : k entries to correct
     terms : of measured points only
-    most_steps : where only small corrections are of interest, a few are enough
 
     Returns
     -------
@@ -484,12 +482,12 @@ def fit(
         if the steps don't end
     """
     if not observations.all_touched:
-        return _fit(robot, kept, observations, terms, 0.0, most_steps)
+        return _fit(robot, kept, observations, terms, 0.0)
     with suppress(CalibrationError):
-        found = _fit(robot, kept, observations, terms, 0.0, most_steps)
+        found = _fit(robot, kept, observations, terms, 0.0)
         if np.abs(found.amounts).max() < FAR_OFF * PLAUSIBLE:
             return found
-    return replace(_fit(robot, kept, observations, terms, 1 / PLAUSIBLE, most_steps), ran_off=True)
+    return replace(_fit(robot, kept, observations, terms, 1 / PLAUSIBLE), ran_off=True)
 
 
 def _fit(
@@ -498,7 +496,6 @@ def _fit(
     observations: PointObservations,
     terms: Sequence[JointTerm],
     holding: float,
-    most_steps: int,
 ) -> Fit:
     """``holding``: by how much corrections are held at 0, per rad or m."""
     kept, terms, deviation = tuple(kept), tuple(terms), observations.deviation_mm
@@ -527,7 +524,7 @@ def _fit(
         return np.vstack([J, held])
 
     before, rest = weighted(np.zeros(len(unknowns)))[:n], weighted(unknowns)
-    for number in range(most_steps):
+    for number in range(MAX_STEPS):
         J = slopes(unknowns)
         step = np.linalg.lstsq(J, -rest, rcond=None)[0]
         gain = np.linalg.norm(J @ step)
@@ -547,7 +544,7 @@ def _fit(
             )
     rest_mm = observations.rms_mm(rest[:n] * deviation)
     raise CalibrationError(
-        fact("no_correction_fits", steps=most_steps, rest_mm=rest_mm),
-        f"no corrections make the table fit: after {most_steps} steps the positions are still {rest_mm:.3g} mm off. "
+        fact("no_correction_fits", steps=MAX_STEPS, rest_mm=rest_mm),
+        f"no corrections make the table fit: after {MAX_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
         "The table has a gross fault or is another arm's; er3a confirm names what is other",
     )

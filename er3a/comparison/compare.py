@@ -23,11 +23,12 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
+from er3a.numerics.peaks import box_points, peak
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
 VerdictWord = Literal["equal", "in_doubt", "same_arm", "other_arm", "other_joint_count"]
@@ -35,8 +36,6 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-SAMPLES = 192  # joint vectors at which the two flanges are compared before the worst is sought
-SWEEPS = 2
 ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, and poses of the first
 ALIGN_POWER = 4  # of a distance, by which it counts
 TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
@@ -565,12 +564,12 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
         return np.asarray((gap.reshape(len(poses), 12) * size[:, None] ** ALIGN_POWER).ravel())
 
     best = x = np.zeros(12 + a.rows)
-    least, worst = worst_pose(_shift, lambda poses: flanges(best, poses), a)
+    least, worst = worst_pose(shift_between, lambda poses: flanges(best, poses), a)
     for _ in range(ALIGNED if least > NO_OFFSET else 0):
         q = np.concatenate([q, worst[None]])
         x = scipy.optimize.leastsq(off, x, (q, least), maxfev=ALIGN_TRIES, full_output=True)[0]
         now = x
-        gap, worst = worst_pose(_shift, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
+        gap, worst = worst_pose(shift_between, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
         if gap < least:
             best, least = x, gap
     return moved(best)
@@ -589,25 +588,44 @@ def _distances(
         u = row_values(a, q)
         return forward_of_rows(a, u), _aligned_flanges(a, b, alignment, u)
 
-    mm = [1000 * largest_gap(_shift, flanges, ranges) for flanges in (printed, aligned)]
-    deg = [math.degrees(largest_gap(_turn, flanges, ranges)) for flanges in (printed, aligned)]
+    mm = [1000 * worst_pose(shift_between, flanges, ranges)[0] for flanges in (printed, aligned)]
+    deg = [math.degrees(worst_pose(turn_between, flanges, ranges)[0]) for flanges in (printed, aligned)]
     return mm[0], mm[1], deg[0], deg[1]
 
 
-def _shift(one: Reals, other: Reals) -> Reals:
+def shift_between(one: Reals, other: Reals) -> Reals:
+    """Distances between origins.
+
+    Parameters
+    ----------
+    one, other : (k, 4, 4), m
+
+    Returns
+    -------
+    shift : (k,), m
+    """
     shift: Reals = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
     return shift
 
 
-def _turn(one: Reals, other: Reals) -> Reals:
-    between = np.swapaxes(one[:, :3, :3], -1, -2) @ other[:, :3, :3]
-    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(between).magnitude())
+def turn_between(one: Reals, other: Reals) -> Reals:
+    """Angles between orientations.
+
+    Parameters
+    ----------
+    one, other : (k, 4, 4)
+
+    Returns
+    -------
+    turn : (k,), rad
+    """
+    return rotation_angle(one[:, :3, :3], other[:, :3, :3])
 
 
-def largest_gap(
+def worst_pose(
     off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
-) -> float:
-    """The largest of what two flanges are off over an arm's joint ranges, as far as sampling and climbing find it.
+) -> tuple[float, Reals]:
+    """The largest of what two flanges are off over an arm's joint ranges, as far as :func:`peak` finds it.
 
     Parameters
     ----------
@@ -618,36 +636,11 @@ def largest_gap(
     Returns
     -------
     largest : no bound: the true one may be a little larger
+    q : (n,), rad or m, where it was found
     """
-    return worst_pose(off, flanges, robot)[0]
-
-
-def worst_pose(
-    off: Callable[[Reals, Reals], Reals], flanges: Callable[[Reals], tuple[Reals, Reals]], robot: Robot
-) -> tuple[float, Reals]:
-    """The same, with the joint values at which it was found.
-
-    Parameters
-    ----------
-    off, flanges, robot : as of :func:`largest_gap`
-
-    Returns
-    -------
-    largest, q : and (n,), rad or m
-    """
-    generator = np.random.default_rng(0)
-    q = generator.uniform(robot.lower, robot.upper, (SAMPLES, robot.joints))
-    values = off(*flanges(q))
-    best = q[int(values.argmax())]
-    steps = np.linspace(0.0, 1.0, 17)
-    for _ in range(SWEEPS if values.max() > NO_OFFSET else 0):
-        for j in range(robot.joints):
-            tried = np.tile(best, (len(steps) + 1, 1))
-            tried[1:, j] = robot.lower[j] + steps * (robot.upper[j] - robot.lower[j])
-            gaps = off(*flanges(tried))
-            best = tried[int(gaps.argmax())]
-            values = np.append(values, gaps.max())
-    return float(values.max()), best
+    lower, upper = np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper)
+    q, largest = peak(lambda q: off(*flanges(q)), lower, upper, box_points(lower, upper))
+    return largest, q
 
 
 # Units ----------------------------------------------------------------------------------------------------------------

@@ -13,11 +13,11 @@ from functools import cache
 
 import numpy as np
 
-from er3a.comparison.compare import largest_gap
 from er3a.files.kept_files import ROOT
 from er3a.geometry.transforms import transform
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
+from er3a.numerics.peaks import box_points, peak
 from er3a.robots.robot import Grade, Robot, Source
 
 ARMS, SOURCES = ROOT / "data" / "arms" / "arms.csv", ROOT / "data" / "arms" / "sources.csv"
@@ -57,13 +57,13 @@ class KnownArm:
     @property
     def reach(self) -> float:
         """Greatest distance of the flange from the first axis, m, as far as sampling and climbing find it."""
-        base = self.robot.base
+        base, (lower, upper) = self.robot.base, (self.robot.lower, self.robot.upper)
 
-        def off(flange: Reals, _: Reals) -> Reals:
-            across = (flange[:, :3, 3] - base[:3, 3]) @ base[:3, :2]
-            return np.asarray(np.linalg.norm(across, axis=1))
+        def across(q: Reals) -> Reals:
+            away = (forward(self.robot, q)[:, :3, 3] - base[:3, 3]) @ base[:3, :2]
+            return np.asarray(np.linalg.norm(away, axis=1))
 
-        return largest_gap(off, lambda q: (forward(self.robot, q), base), self.robot)
+        return peak(across, lower, upper, box_points(lower, upper))[1]
 
 
 @cache

@@ -4,22 +4,23 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from er3a.comparison.compare import shift_between, turn_between
 from er3a.diagnosis.conclusions import Conclusion
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.diagnosis.faults import entry_of
 from er3a.diagnosis.ranking import usable
 from er3a.finding import Finding, fact, is_one
-from er3a.geometry.transforms import rotation_angle
 from er3a.identifiability.entries import continuous_of, document_of, entries_of
 from er3a.identifiability.feasible import MET
-from er3a.identifiability.requirements import Asked, box_points, peak, requirements_of
+from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.kinematics.table_batch import Tables, frames_of, join, tables_of
 from er3a.numerics.arrays import Reals
+from er3a.numerics.peaks import box_points, peak
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import MM
 from er3a.references.reference import Documents, Reference, ReferenceSet, conflicts
@@ -216,10 +217,9 @@ class ToolRange:
         self.robot, self.table = robot, table
         self.lower, self.upper = np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper)
         self.points = box_points(self.lower, self.upper)
-        self._own = self._tool(table, self.points)[0]
 
     def off(self, other: Tables) -> ToolOff:
-        """How far the tool of another table is off at most over the joint ranges, by :func:`peak`.
+        """How far the tool of another table is off at most over the joint ranges.
 
         Parameters
         ----------
@@ -230,20 +230,11 @@ class ToolRange:
         off : mm and deg, each at its own worst pose; the largest that was found, not proven
         """
         both = join([self.table, other])
-        theirs = self._tool(other, self.points)[0]
-        best: list[float] = []
-        for measure, factor in ((_distance, MM), (rotation_off, 180 / np.pi)):
 
-            def apart(q: Reals, measure=measure) -> Reals:  # type: ignore[no-untyped-def]
-                """Difference (N,), m or rad, of both tools at joint values (N, n)."""
-                T = self._tool(both, q)
-                result: Reals = measure(T[0], T[1])
-                return result
+        def most(off: Callable[[Reals, Reals], Reals]) -> float:
+            return peak(lambda q: off(*self._tool(both, q)), self.lower, self.upper, self.points)[1]
 
-            first = measure(self._own, theirs)
-            start = self.points[np.argsort(-first, kind="stable")[:24]]
-            best.append(peak(apart, self.lower, self.upper, start)[1] * factor if first.max() > 1e-12 else 0.0)
-        return ToolOff(*best)
+        return ToolOff(MM * most(shift_between), float(np.degrees(most(turn_between))))
 
     def signature(self, tables: Tables) -> Reals:
         """Numbers that are equal for tables whose tools move alike.
@@ -265,22 +256,3 @@ class ToolRange:
     def _tool(self, tables: Tables, q: Reals) -> Reals:
         T: Reals = frames_of(tables, self.robot, q)[:, :, -1] @ self.robot.tool
         return T
-
-
-def _distance(one: Reals, other: Reals) -> Reals:
-    distance: Reals = np.linalg.norm(one[..., :3, 3] - other[..., :3, 3], axis=-1)
-    return distance
-
-
-def rotation_off(one: Reals, other: Reals) -> Reals:
-    """Angle between the orientations of transforms.
-
-    Parameters
-    ----------
-    one, other : (..., 4, 4)
-
-    Returns
-    -------
-    angle : (...,), rad, 0 to pi
-    """
-    return rotation_angle(one[..., :3, :3], other[..., :3, :3])

@@ -608,6 +608,7 @@ def test_small_shifts_change_what_is_observed_by_its_derivative(kind, random):
         np.arange(20),
         (),
         np.zeros(20, int),
+        np.tile(np.eye(3), (20, 1, 1)),
         (kind,),
     )
     shift, step = random.normal(size=(20, 3)), 1e-6

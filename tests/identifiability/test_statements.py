@@ -11,8 +11,8 @@ from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.reactions import bases_of, count_checks
-from er3a.identifiability.requirements import peak
 from er3a.identifiability.statements import inconsistent_with_own_text, not_the_robot_described
+from er3a.numerics.peaks import peak
 from er3a.pipeline.messages.say import say
 from er3a.references.reference import Document, Documents
 

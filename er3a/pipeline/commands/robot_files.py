@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from enum import StrEnum
 from functools import partial
@@ -153,6 +154,17 @@ def _measured(path: Path, arm: Robot) -> Sequence[Measurement]:
     return rows
 
 
+def _explained(path: Path, arm: Robot, rows: Sequence[Measurement]) -> list[str]:
+    """What is between the arm and measurements that don't fit, as ``er3a confirm`` has it; nothing of touches."""
+    from er3a.confirmation.confirm import confirm
+    from er3a.pipeline.messages.confirm import lines_of
+
+    seen = arm.without_tool() if rows[0].point == "flange" else arm
+    with suppress(Er3aError):
+        return lines_of(confirm(seen, path), seen)
+    return []
+
+
 def _renamed(found: Calibration, name: str) -> Robot:
     """The corrected robot as it is written."""
     alone = " (without terms beyond a robot file)" if found.beyond else ""
@@ -214,7 +226,7 @@ def calibrate(
         with shown_work(f"{robot}: estimating corrections"):
             found = calibrate_robot(arm, rows, [each.value for each in fixed or ()])
     except CalibrationError as error:
-        raise Er3aError(say(error.finding)) from None
+        raise Er3aError("\n".join([say(error.finding), *_explained(measurements, arm, rows)])) from None
     corrected = _renamed(found, output.stem if output else f"{arm.name}_calibrated")
     settled = len(found.open) < len(found.estimates)
     record = {"output": str(output) if output and settled else None, **calibration_record(found, arm, rows, others)}
@@ -230,7 +242,8 @@ def calibrate(
         options.print_json(record)
     else:
         lines = [lines_of(found, rows, others), *([held_back_line(found, others)] if others else [])]
-        print("\n".join([*lines, *([f"{html}: written"] if html else [])]))
+        why = [] if found.fits else _explained(measurements, arm, rows)
+        print("\n".join([*lines, *why, *([f"{html}: written"] if html else [])]))
     if output and not settled:
         raise Er3aError(
             f"{output}: not written, as these measurements settle none of the table's numbers; measure more"

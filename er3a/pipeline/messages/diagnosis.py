@@ -120,11 +120,9 @@ TEXTS = texts(
             "calibration can repair this table."
         ),
         "far_from_table": (
-            "[Measurements and table belong together after one correction: {shown:; }.][Measurements and table don't "
-            "belong together (far off: {why}). Check the order, signs and zeros of the joints, and whose table it is."
-            "{shown:!}]"
+            "Measurements and table don't belong together (far off: {why}). Check the order, signs and zeros of the "
+            "joints, and whose table it is; er3a confirm names what is other."
         ),
-        "swapped_columns": "swap columns J{first} and J{second}",
     }
 )
 WORDS.update(
@@ -204,8 +202,4 @@ def _(found: Finding) -> str:
 
 @says("far_from_table")
 def _(found: Finding) -> str:
-    shown = listed(found.faults or ())
-    if found.swapped:
-        shown = [sentence("swapped_columns", first=found.swapped[0], second=found.swapped[1])]
-    why = joined(found.entries, ", ") or with_unit(as_text(found.rest_mm, ".3g"), "mm")
-    return say_as(found, shown=shown, why=why)
+    return say_as(found, why=joined(found.entries, ", ") or with_unit(as_text(found.rest_mm, ".3g"), "mm"))
