@@ -223,6 +223,7 @@ def test_a_load_that_lifts_the_arm_is_no_sag(random):
     assert ("sag", 2) not in [(each.kind, each.joint) for each in found.beyond.terms if found.beyond]
 
 
+@pytest.mark.long
 def test_what_is_a_choice_between_base_tool_and_table_is_said(random):
     bench = Bench("seven", random)
     rows = bench.measured(60, 0.05)
@@ -705,6 +706,7 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "term", "poses"), [("seven", 0, 70), ("six", 1, 70)])
 def test_few_poses_find_a_term_without_trying_all(name, term, poses, random):
     """Couplings are many: without them measurements are enough for the others, or for ratios."""

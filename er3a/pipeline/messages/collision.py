@@ -24,7 +24,7 @@ KEY_FIGURES = words(
         "undecided_pairs": "Pairs undecided",
     }
 )
-HOMES = words({"study": "as the study has it", "zero": "joints at 0", "chosen": "chosen away from singular poses"})
+HOMES = words({"study": "as given", "zero": "joints at 0", "chosen": "chosen away from singular poses"})
 STATES: dict[PairState, str] = words(
     {
         "never": "never collide",
