@@ -8,9 +8,6 @@ from snakemake.utils import min_version
 min_version("9.10")
 
 
-report: "workflow/report/study.rst"
-
-
 include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/views.smk"

@@ -16,6 +16,8 @@ SWITCHES = (
     "use-gl=angle",
     "use-angle=swiftshader",
     "enable-unsafe-swiftshader",
+    "disable-gpu-rasterization",  # pages are painted faster without a graphics processor that is computed, too
+    "disable-gpu-compositing",
     "disable-quic",
     "no-first-run",
     "disable-background-networking",

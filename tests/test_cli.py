@@ -103,6 +103,7 @@ def _own_sigterm():
     signal.signal(signal.SIGTERM, before)
 
 
+@pytest.mark.long
 def test_urdf_out_and_in(call, tmp_path):
     urdf, robot = tmp_path / "arm.urdf", tmp_path / "arm.yaml"
     assert call("export-urdf", "er3_600", "--output", urdf).returncode == 0

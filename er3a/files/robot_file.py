@@ -17,6 +17,7 @@ from er3a.files.units import (
     MAX_DISTANCE_MM,
     RESIDUE_MM,
     SHORTEST_PLAIN_LENGTH_MM,
+    JointsDeg,
     Triple,
     check_degrees,
     doubt,
@@ -739,6 +740,7 @@ class RobotFile(InputFile):
     drives: DriveGroup | None = None
     wrist_load: WristLoadGroup | None = None
     weight: Weight | None = None
+    home_deg: JointsDeg | None = None
     _surfaces: tuple[LinkMesh, ...] = PrivateAttr(())
 
     @property
@@ -846,6 +848,16 @@ class RobotFile(InputFile):
                 self.collision.check({"base", *(f"link_{k}" for k in range(1, count + 1))})
             except ValueError as error:
                 raise ValueError(f"collision.{error}") from None
+        return self
+
+    @model_validator(mode="after")
+    def _home_within_limits(self):
+        if self.home_deg is not None and len(self.home_deg) != len(self.limits.rows):
+            raise ValueError(f"home_deg: {len(self.home_deg)} joint values | The arm has {len(self.limits.rows)}")
+        for row, value in zip(self.limits.rows, self.home_deg or ()):
+            low, high = (row.lower_deg, row.upper_deg) if row.lower_mm is None else (row.lower_mm, row.upper_mm)
+            if low is not None and high is not None and not low <= value <= high:
+                raise ValueError(f"home_deg: J{row.joint} at {value:g} is outside its limits | Give a pose it can take")
         return self
 
     @model_validator(mode="after")

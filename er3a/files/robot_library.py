@@ -24,6 +24,7 @@ from er3a.formats.urdf import import_urdf
 from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
+from er3a.robots.joint_limits import meant
 from er3a.robots.masses import Load, together
 from er3a.robots.robot import (
     CombinedLimit,
@@ -251,6 +252,8 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
     )
+    if content.home_deg is not None:
+        robot = robot.replace(home=meant(robot, np.array(content.home_deg)))
     if content.dh.has_far_normals:
         robot = with_near_rows(robot)
     groups_of_masses = [getattr(content, group) for group in MASS_GROUPS]

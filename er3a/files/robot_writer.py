@@ -126,6 +126,8 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         content["envelopes"] = sourced("envelopes") | _shapes(robot)
     if robot.visuals:
         content["visuals"] = [link_visual(each) for each in robot.visuals]
+    if robot.home is not None:
+        content["home_deg"] = [_tidy(value) for value in shown(robot, robot.home)]
     if robot.pair_rules:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
     for group, fields in mass_groups(robot).items():

@@ -416,13 +416,48 @@ def _some(names: list[str]) -> str:
 def urdf_root(path: Path) -> ElementTree.Element:
     """The ``<robot>`` of a URDF that holds joints.
 
-    Prefixes that the file does not declare are read as parts of the names, as by parsers that know no namespaces.
-
     Raises
     ------
     InputError
         for a file that is not a URDF, such as xacro that is not expanded
     """
+    root = _robot_element(path)
+    if root.find("joint") is None:
+        raise InputError(path, "robot", "holds no joints", "Give a URDF of a serial arm")
+    return root
+
+
+def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
+    """The joint values of a group state of an SRDF: of those that give all joints the one named home, else the first.
+
+    Parameters
+    ----------
+    path : the SRDF, expanded if it is xacro
+    joints : names, in the order of the values
+
+    Returns
+    -------
+    q : (n,), rad or m
+
+    Raises
+    ------
+    InputError
+        for a file that is none, and one in which no state gives all joints
+    """
+    states: dict[str, Reals] = {}
+    for state in _robot_element(path).iter("group_state"):
+        name, values = state.get("name", ""), {each.get("name"): each for each in state.iter("joint")}
+        if values.keys() >= set(joints):
+            given = [_numbers(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]
+            states[name] = np.array(given)
+    if not states:
+        raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
+    return states.get("home", next(iter(states.values())))
+
+
+def _robot_element(path: Path) -> ElementTree.Element:
+    """The ``<robot>`` of a URDF or SRDF. Prefixes that the file does not declare are read as parts of the names, as by
+    parsers that know no namespaces."""
     text = read_text(path, MAX_BYTES, "Remove all but the links and joints of the arm")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise InputError(path, None, "holds a document type or entities", "Remove them; a URDF needs none")
@@ -437,8 +472,6 @@ def urdf_root(path: Path) -> ElementTree.Element:
         raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
     if (where := _xacro(root)) is not None:
         raise InputError(path, where or None, "is xacro, which has to be expanded to a URDF", EXPAND)
-    if root.find("joint") is None:
-        raise InputError(path, "robot", "holds no joints", "Give a URDF of a serial arm")
     return root
 
 

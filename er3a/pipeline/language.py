@@ -15,11 +15,12 @@ from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from string import Formatter
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 LanguageCode = Literal["en", "zh"]
 LANGUAGES = get_args(LanguageCode)  # English and those that have a catalogue
 MOST_DECIMALS = 9  # of numbers that have to be shown as different
+TableT = TypeVar("TableT")
 KEYED = "key"  # the context of texts whose key, not whose English, is their entry in a catalogue
 TITLE = "title"  # the context of titles and notes that er3a writes into files
 CATALOGUES = Path(__file__).with_name("messages") / "locale"
@@ -55,6 +56,34 @@ def N_(text: str) -> str:
     text : unchanged
     """
     return text
+
+
+def words(table: TableT) -> TableT:
+    """Mark the values of a table of words for the catalogues, as :func:`N_` marks one.
+
+    Parameters
+    ----------
+    table : a literal: texts by code, or tables and tuples of these
+
+    Returns
+    -------
+    table : unchanged
+    """
+    return table
+
+
+def terms(table: Mapping[str, str]) -> Mapping[str, str]:
+    """Mark both the keys and the values of a table for the catalogues.
+
+    Parameters
+    ----------
+    table : a literal
+
+    Returns
+    -------
+    table : unchanged
+    """
+    return table
 
 
 def written_title(text: str) -> str:

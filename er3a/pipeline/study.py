@@ -283,7 +283,7 @@ class StudyBase(InputFile):
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
     def home(self, name: str) -> Reals | None:
-        """The home that the study gives a robot.
+        """The home that the study gives a robot, else that of its file.
 
         Parameters
         ----------
@@ -291,7 +291,7 @@ class StudyBase(InputFile):
 
         Returns
         -------
-        q : (n,), rad or m; None if it gives none
+        q : (n,), rad or m; None if neither gives one
 
         Raises
         ------
@@ -300,7 +300,7 @@ class StudyBase(InputFile):
         """
         entry, robot = self.entry(name), self.robot(name)
         if entry.home_deg is None:
-            return None
+            return robot.home
         field = f"robots.{self._base(name)}.home_deg"
         if len(entry.home_deg) != robot.joints:
             raise InputError(None, field, f"{len(entry.home_deg)} joint values", f"The arm has {robot.joints}")

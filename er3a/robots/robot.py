@@ -160,6 +160,7 @@ class Robot(ByValue, Displayed):
         used in comparisons of robots
     pair_rules : pairs of links that the robot file allows, or requires to be checked
     masses : of links, and the limits of drives and wrist, as far as known
+    home : (n,), rad or m, where the arm rests and places are joined to; None if its file gives none
     derived : what :func:`er3a.robots.robot.derived` keeps of this robot
     sources : for each group of values ("dh", "zero", "limits", "speeds", "base", "flange", "tool", "envelopes",
         "inertia", "drives", "wrist_load", "weight") its source and grade
@@ -200,6 +201,7 @@ class Robot(ByValue, Displayed):
     visuals: tuple[LinkMesh, ...] = field(default=(), compare=False)
     pair_rules: tuple[PairRule, ...] = ()
     masses: Masses = field(default_factory=Masses)
+    home: Reals | None = None
     sources: Mapping[str, Source] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -216,6 +218,8 @@ class Robot(ByValue, Displayed):
             self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
         if self.coupling is not None:
             self._keep("coupling", np.array(as_floats(self.coupling, "coupling")), (rows, joints))
+        if self.home is not None:
+            self._keep("home", np.array(as_floats(self.home, "home")), (joints,))
         self._refuse_wrong(rows, joints)
         object.__setattr__(self, "sources", ReadOnly(self.sources))
         object.__setattr__(self, "origins", ReadOnly(self.origins))

@@ -19,6 +19,8 @@ from er3a.pipeline.results import Provenance
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import Picture, render
 
+pytestmark = pytest.mark.long
+
 TEMPLATE = """{% extends "base.html.j2" %}
 {% block title %}Test{% endblock %}
 {% block header %}<h1>Test page</h1>{% endblock %}

@@ -48,7 +48,7 @@ USABLE = "return performance.getEntriesByName('usable').length > 0"
 
 def serious_faults(browser, **options) -> list[tuple[str, list[str]]]:
     """What axe-core calls serious or worse: the rule, and the first elements that break it."""
-    found = Axe().run(browser, options=options)["violations"]
+    found = Axe().run(browser, options={"resultTypes": ["violations"], **options})["violations"]
     serious = [fault for fault in found if fault["impact"] in ("serious", "critical")]
     return [(fault["id"], [node["html"][:200] for node in fault["nodes"][:3]]) for fault in serious]
 

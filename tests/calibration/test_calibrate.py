@@ -392,6 +392,7 @@ def test_a_wrong_sign_of_alpha_is_named(name, joint, random):
     assert f"alpha {joint}" in say(finding)
 
 
+@pytest.mark.long
 def test_a_joints_zero_that_is_far_off_is_named(random):
     robot = load_robot("er3a_c60")
     rows = measured(robot, random.uniform(-1, 1, (40, 6)), 0.05, random)
@@ -417,6 +418,7 @@ def test_a_frame_may_stand_at_a_measured_point(random, tmp_path):
     assert len(er3a.calibrate(robot, path).estimates) > 20
 
 
+@pytest.mark.long
 def test_a_tool_that_was_measured_instead_of_the_flange_is_named(random):
     robot, tool = load_robot("er3a_c60"), np.eye(4)
     tool[:3, 3] = 0.015, 0.0, 0.101

@@ -31,7 +31,6 @@ from er3a.kinematics.chain import row_values
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages.calibration import (
     calibration_record,
-    held_back_line,
     held_back_warning,
     idle_texts,
     lines_of,
@@ -224,6 +223,7 @@ def test_a_load_that_lifts_the_arm_is_no_sag(random):
     assert ("sag", 2) not in [(each.kind, each.joint) for each in found.beyond.terms if found.beyond]
 
 
+@pytest.mark.long
 def test_what_is_a_choice_between_base_tool_and_table_is_said(random):
     bench = Bench("seven", random)
     rows = bench.measured(60, 0.05)
@@ -447,13 +447,6 @@ def test_two_lines_whose_points_are_swapped_are_set_aside(random):
     found = er3a.calibrate(bench.robot, rows)
     assert [each.row for each in found.outliers] == [2, far + 2]
     assert bench.error(found) < 0.1
-
-
-def test_a_worst_position_beyond_all_fitted_poses_is_named():
-    rows = [Measurement(row, (10.0 * row, -10.0 * row), "tool", (0.0, 0.0, 0.0)) for row in range(2, 6)]
-    off = np.array([0.1, 0.3])
-    assert held_back_line(rows[1:], [rows[2], rows[0]], off).endswith("(row 2, beyond all fitted poses in J1, J2)")
-    assert held_back_line(rows, rows[:2], off).endswith("0.3 mm at worst (row 3)")
 
 
 def reached(bench: Bench, target: np.ndarray, normal: np.ndarray | None, count: int, length: float = 0.0) -> np.ndarray:
@@ -713,6 +706,7 @@ def test_too_few_touches_say_how_many_it_takes(kind, count, least, random):
     assert [each.correction for each in found.estimates] == pytest.approx(alone, rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "term", "poses"), [("seven", 0, 70), ("six", 1, 70)])
 def test_few_poses_find_a_term_without_trying_all(name, term, poses, random):
     """Couplings are many: without them measurements are enough for the others, or for ratios."""

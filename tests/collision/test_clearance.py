@@ -142,6 +142,7 @@ def with_capsule(tmp_path, change):
     return load_robot(tmp_path / "arm.yaml")
 
 
+@pytest.mark.long
 def test_turns_of_an_arm_are_measured_once(random, monkeypatch):
     arm = load_robot("ur5e")
     bodies, q = Bodies(arm, None), joints_at_random(arm, random, 30)

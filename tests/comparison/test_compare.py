@@ -193,6 +193,7 @@ def test_a_twist_of_the_wrong_sign_is_named_against_other_frames():
     assert [each.entries for each in found.causes] == [("alpha4",)]
 
 
+@pytest.mark.long
 def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():
     right = er3a.Robot.from_dh(
         a=[0, 0.43, 0.02, 0, 0, 0], alpha=np.radians([90, 0, -90, 90, -90, 0]), d=[0.67, 0.15, 0, 0.43, 0, 0]
@@ -257,6 +258,7 @@ def test_a_unit_that_makes_two_tables_equal_is_named_with_its_table(columns, fac
     assert er3a.compare(found.corrected, right).verdict == "equal"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("heading", "own", "told"),
     [
@@ -290,6 +292,7 @@ def test_the_unit_that_is_named_is_the_one_of_the_heading(tmp_path, heading, own
         assert (done.exit_code, f"({told})" in done.stdout) == (1, True), done.output
 
 
+@pytest.mark.long
 def test_a_unit_is_named_beside_an_entry_that_is_wrong_too():
     right = er3a.to_standard(er3a.load_robot("er3_600"))
     slipped = right.replace(a=(right.a + np.array([0, 0, 0.02, 0, 0, 0])) / 25.4, d=right.d / 25.4)
@@ -325,6 +328,7 @@ def test_limits_are_compared_as_the_other_arms_zeros_and_directions_have_them():
     assert found.differences[0].b - found.differences[0].a == pytest.approx(2)
 
 
+@pytest.mark.long
 def test_limits_on_sums_of_joints_are_not_compared_and_follow_corrected_zeros_and_directions():
     right = er3a.load_robot("er3a_c60")
     limit = CombinedLimit((0.0, 1.0, 1.0, 0.0, 0.0, 0.0), *np.radians([-60.0, 90.0]))
@@ -433,6 +437,7 @@ OF_URDF = """<robot name="r"><link name="base"/>
 <joint name="camera" type="fixed"><parent link="base"/><child link="beside"/></joint></robot>"""
 
 
+@pytest.mark.long
 def test_masses_drives_and_shapes_of_two_urdfs_are_named_as_not_compared(tmp_path):
     shape = '<collision><geometry><mesh filename="package://nowhere/none.stl"/></geometry></collision>'
     links = {
@@ -459,6 +464,7 @@ def test_masses_drives_and_shapes_of_two_urdfs_are_named_as_not_compared(tmp_pat
     assert json.loads(ran("one", "bare", "--json").output)["not_examined"] == []
 
 
+@pytest.mark.long
 def test_numbers_of_doubtful_unit_stand_where_the_verdict_does(tmp_path):
     arm = er3a.load_robot("er3_600").replace(name="arm", references=(), tool=translation(0, 0, 0.0002))
     write_robot(arm, tmp_path / "arm.yaml")
@@ -501,6 +507,7 @@ def compared(*words) -> tuple[int, str]:
     return done.exit_code, done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("given", [{"scale": 1e-3}, {"scale": 1 / 25.4}, {"scale": 0.1}, {"twice": True}])
 def test_a_table_in_other_units_than_it_says_is_not_usable_as_printed(given, tmp_path):
     right = with_columns(tmp_path).rename(tmp_path / "right.csv")
@@ -585,6 +592,7 @@ def test_links_too_long_in_metres_are_in_inches_and_that_is_said_first_of_anothe
     assert re.match(r".*columns a, d: 9.59 mm at most may be inches; another arm", said)
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize("decimals", [2, 4])
 def test_twists_in_radians_are_named_or_read_where_no_heading_says_degrees(decimals, tmp_path):
@@ -688,6 +696,7 @@ def test_a_flange_turned_about_a_diagonal_is_alpha_and_offset_of_the_last_row():
     assert er3a.compare(found.corrected, right).verdict == "equal"
 
 
+@pytest.mark.long
 def test_two_exchanged_rows_are_one_slip():
     right, order = irb120(), [0, 1, 2, 4, 3, 5]
     wrong = right.replace(**{column: getattr(right, column)[order] for column in ("a", "alpha", "d")})
@@ -697,6 +706,7 @@ def test_two_exchanged_rows_are_one_slip():
     assert found.directions.same
 
 
+@pytest.mark.long
 def test_the_other_convention_is_named_with_another_wrong_entry():
     right = irb120()
     found = er3a.compare(changed(right, "d", {4: 0.332}).replace(convention="modified"), right)
@@ -704,6 +714,7 @@ def test_the_other_convention_is_named_with_another_wrong_entry():
     assert [(each.entry, each.b) for each in found.geometry.differences] == [("d4", 302)]
 
 
+@pytest.mark.long
 def test_two_arms_of_other_geometry_are_aligned_as_well_as_can_be():
     """Axes 5 and 6 that are a little off each other move the flange a little; other zeros and ends take up the rest."""
     right = irb120()

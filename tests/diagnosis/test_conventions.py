@@ -44,6 +44,7 @@ def test_conventions_are_named_whatever_their_number(name, seed):
     assert np.abs(er3a.forward(best.corrected, q)[:, :3, 3] * MM - stated).max() < 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shift_mm", [(15, 0, 0), pytest.param((0, 20, 100), marks=pytest.mark.long)])
 def test_a_flange_defined_elsewhere_is_no_wrong_last_row(shift_mm):
     right = er3a.to_standard(er3a.load_robot("er3_600"))

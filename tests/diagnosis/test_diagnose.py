@@ -61,6 +61,7 @@ def test_a_right_table_gets_no_diagnosis(name):
     assert er3a.diagnose(to_modified(load_robot(name)), name) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("entries", "named"),
     [

@@ -233,6 +233,7 @@ def test_of_an_arm_that_hardly_moves_the_bound_is_what_it_holds(arm):
         np.testing.assert_allclose(found.bound, held, rtol=2e-3, atol=1e-3)
 
 
+@pytest.mark.long
 def test_a_bound_that_the_budget_cuts_short_still_holds(arm, monkeypatch):
     whole = worst_holding(arm_model(arm)).bound
     monkeypatch.setattr(pose_bound, "MAX_CORNERS", 1)
@@ -261,6 +262,7 @@ def test_the_worked_example_of_a_manual():
         assert most * (1 - 1e-9) <= use.most < most * 1.01
 
 
+@pytest.mark.long
 def test_forces_on_the_tool_count_to_the_wrists_moments(arm):
     """A tool of 120 mm, pushed across by 100 N: joint 5 holds that by a lever of 198.5 mm, besides 1 kg at 30 mm."""
     tool = np.eye(4)

@@ -23,7 +23,7 @@ from testing.fleet import robot_of_toolbox
 
 G = 9.81
 RELATIVE = 1e-9
-MOTIONS = 20
+MOTIONS = 8
 
 
 def random_body(random: np.random.Generator) -> MassBody:
@@ -195,6 +195,7 @@ def test_mass_matrix_and_gravity_are_lagranges(arm):
     assert np.abs(er3a.gravity(arm, q) - held).max() < RELATIVE * np.abs(held).max()
 
 
+@pytest.mark.long
 def test_a_load_counts_as_part_of_the_last_link():
     arm = er3a.load_robot("er3a_c60")
     load = Load(3.0, (0.02, -0.01, 0.08), (0.004, 0.005, 0.003, 1e-4, -2e-4, 3e-4))
@@ -309,6 +310,7 @@ def test_energy_over_a_path_is_the_work_of_the_torques():
     assert work == pytest.approx(energy[1] - energy[0], rel=1e-6)
 
 
+@pytest.mark.long
 def test_walls_and_ceilings_turn_gravity():
     arm = er3a.load_robot("er3a_c60")
     ceiling = arm.base.copy()

@@ -30,6 +30,7 @@ def test_all_equivalent_rows_put_the_flange_where_the_table_does(convention, ran
     assert len(np.unique(rows, axis=0)) > 500
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("reach", [AxisDistance("flange", "greatest", 1), SectionExtent("flange", "greatest", "z")])
 def test_an_extreme_is_that_of_the_flange_where_it_stands_off_the_table(reach, random):
     """What evidence seeks, from few places, is what the search from many finds, which goes through forward."""

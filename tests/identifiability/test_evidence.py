@@ -420,6 +420,7 @@ def test_derived_documents_prove_nothing(random):
         assert evidence_of(robot, stated, documents, only=["a2"])["a2"].status in statuses
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("manual", "counts"), [pytest.param(-5.0, True, marks=pytest.mark.long), (0.0, False)])
 def test_a_contradiction_outvotes_a_measurement_only_where_the_table_meets_it(manual, counts):
     """A tracker shows the flange 5 mm higher than the table has it; the table's own manual states something else."""

@@ -17,6 +17,7 @@ from er3a.pipeline.messages.say import say
 from er3a.references.reference import Document, Documents
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "independent", "consistency", "claims"), [("er3_600", 11, 45, 0), ("er3a_c60", 24, 67, 2)]
 )

@@ -22,11 +22,9 @@ from filelock import FileLock
 from typer.testing import CliRunner
 
 from er3a.errors import ResultError
-from er3a.files.robot_library import load_robot
 from er3a.pipeline.cli import app
 from er3a.pipeline.results import FORMAT_VERSION, check_results, checksum_file, write_checksums
 from er3a.pipeline.run_study import mark_pages
-from er3a.pipeline.stages.registry import STAGES as REGISTRY
 from er3a.pipeline.study import load_study
 from er3a.pipeline.verdicts import read_verdicts
 from testing.small_study import stages_of
@@ -72,18 +70,11 @@ def test_every_stage_leaves_results_a_page_and_a_recording(small_study):
 
 
 @pytest.mark.long
-def test_snakemake_s_report_holds_every_page_with_its_caption(small_study, tmp_path):
+def test_snakemake_s_report_holds_every_page(small_study, tmp_path):
     small_study.snakemake("--report", str(tmp_path / "report.zip"))
     with zipfile.ZipFile(tmp_path / "report.zip") as packed:
         held = sorted(packed.read(name) for name in packed.namelist() if "/data/raw/" in name)
-        text = packed.read("report/report.html").decode("utf-8")
     assert held == sorted(page.read_bytes() for page in (small_study.folder / "reports").rglob("*.html"))
-    for robot in small_study.robots:
-        title = load_robot(robot).title
-        for stage in stages_of(robot):
-            assert f"{title}: {REGISTRY[stage].question}" in text
-        assert f"Move {title} by hand" in text
-    assert "Start with the index" in text
 
 
 def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_again(small_study, tmp_path):

@@ -384,6 +384,7 @@ def test_wrong_arguments_of_xacro_are_refused_in_one_line(xacro, tmp_path, words
     assert error.value.file == str(xacro)
 
 
+@pytest.mark.long
 def test_what_xacro_can_t_expand_and_what_the_expanded_file_lacks_name_the_file_given(xacro):
     text = xacro.read_text(encoding="utf-8")
     xacro.write_text(text.replace("find arm_shapes", "find arm_forms"), encoding="utf-8")

@@ -85,6 +85,7 @@ def three_segments(random):
     return [line(a, b, 1.0), arc(b, random.uniform(-1, 1, 3), c, 1.0), line(c, d, 1.0)]
 
 
+@pytest.mark.long
 def test_rounded_sequence_has_the_rates_that_differences_give_also_across_its_joins(random):
     for _ in range(5):
         segments = three_segments(random)

@@ -149,6 +149,7 @@ def test_conditioning_needs_no_length(arm):
     assert aligned.condition_number > 1e12 > found.condition_number
 
 
+@pytest.mark.long
 def test_plot_draws_the_arm_where_it_is(arm):
     figure = er3a.plot(arm, GOAL)
     corners = np.array(figure.axes[0].lines[0].get_data_3d()).T

@@ -135,6 +135,7 @@ def test_ends_that_can_not_be_are_named():
     assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == fact("nothing_measured")
 
 
+@pytest.mark.long
 def test_drawn_joints_keep_from_their_limits_by_their_own_unit(monkeypatch):
     """By 2 deg, a joint that slides by 2 mm, not by as many metres as 2 deg have radians; or by a quarter."""
     base = pytest.importorskip("ompl").base

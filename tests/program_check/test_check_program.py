@@ -72,7 +72,7 @@ def test_every_faulty_program_has_its_faults_here():
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in FOUND])
 def test_each_fault_is_found(name):
-    check = check_program(read_program(FAULTS / f"{name}.src"), ROBOT, CheckOptions(start=HOME, scene=TABLE))
+    check = check_program(FAULTS / f"{name}.src", ROBOT, CheckOptions(start=HOME, scene=TABLE))
     assert codes(check) >= FOUND[name]
     listed = load_programs(ROOT / "data/programs/er3a_c60.yaml").programs
     assert check.level == next(entry.expect for entry in listed if entry.name == name)

@@ -118,6 +118,7 @@ def test_each_motion_has_a_line_on_request():
     assert "(Main/mlin[23])" in done.stdout
 
 
+@pytest.mark.long
 def test_json_holds_verdicts_and_parameters():
     found = json.loads(check(f"{FAULTS}/zone_larger_than_segment.src", "--json").stdout)[0]
     assert found["level"] == "caution"
@@ -159,6 +160,7 @@ def test_no_motion_passes_by_numbers_that_look_like_another_unit(tmp_path):
         assert not any(each["code"] == "not_understood" for each in found["findings"])
 
 
+@pytest.mark.long
 def test_sarif_has_rules_places_and_fingerprints_that_stay(tmp_path):
     def log(file: Path) -> dict:
         output = tmp_path / "found.sarif"

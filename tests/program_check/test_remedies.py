@@ -195,6 +195,7 @@ def keys(check) -> set[str]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("code", MENDED)
 def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
     """Each way to mend it that the remedy names."""

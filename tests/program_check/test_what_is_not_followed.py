@@ -109,6 +109,7 @@ OTHERS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", OTHERS)
 def test_so_it_is_in_other_languages(case, tmp_path):
     name, text = OTHERS[case]

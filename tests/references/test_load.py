@@ -245,6 +245,7 @@ def test_without_uncertainty_half_the_last_digit_counts(tmp_path, name, text, un
     assert reference.uncertainty == pytest.approx(uncertainty)
 
 
+@pytest.mark.long
 def test_last_digits_of_joint_values_count_through_the_jacobian(tmp_path):
     robot, random, half = load_robot("er3_600").without_tool(), np.random.default_rng(20261127), np.radians(0.005)
     q = np.radians([*random.uniform(-60, 60, (20, 6)), (0, 0, -45, 22.5, 45, 0)])

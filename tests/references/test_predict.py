@@ -74,6 +74,7 @@ def test_committed_positions_follow_from_the_urdf():
         np.testing.assert_allclose(urdf_flange_mm(row.pose), row.xyz_mm, atol=0.006)
 
 
+@pytest.mark.long
 def test_published_modified_table_is_the_same_robot(random):
     standard, modified = load_robot("er3a_c60"), published_modified_table()
     q = random.uniform(-3, 3, (1000, 6))

@@ -340,7 +340,7 @@ def test_a_robot_can_t_be_a_missing_file(tmp_path):
 
 @pytest.mark.parametrize(("key", "value"), [("xyz_mm", [0, 0, 0.12]), ("rpy_deg", [1.5708, 0, 0])])
 def test_the_placement_of_a_links_mesh_is_doubted_as_any_other(key, value):
-    mesh = {"link": 1, "pieces": "link.json", key: value}
+    mesh = {"link": 1, "mesh": "link.stl", "unit": "mm", key: value}
     with pytest.warns(DoubtfulUnit, match=rf"meshes\[0\]\.{key}: "):
         parse(Envelopes, {"source": "x", "grade": "cad", "meshes": [mesh]}, None)
 

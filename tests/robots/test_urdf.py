@@ -16,6 +16,7 @@ from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
+from er3a.formats.urdf_tree import srdf_home
 from er3a.kinematics.forward import forward, frames
 from er3a.robots.masses import Masses
 from er3a.robots.robot import Robot
@@ -354,3 +355,30 @@ def test_what_a_follower_states_of_itself_holds_the_joint_that_it_follows(tmp_pa
         assert (again.robot.lower[0], again.robot.upper[0], again.robot.speed[0]) == pytest.approx(
             (lower, upper, speed)
         )
+
+
+STATE = """<robot name="r"><group name="arm"/><group_state name="folded" group="arm">{}</group_state>
+<group_state name="home" group="arm">{}</group_state><group_state name="open" group="hand"><joint name="f" value="1"/>
+</group_state></robot>"""
+
+
+def states(*poses: np.ndarray) -> str:
+    return STATE.format(*("".join(f'<joint name="j{k + 1}" value="{v}"/>' for k, v in enumerate(q)) for q in poses))
+
+
+def test_a_group_state_of_an_srdf_becomes_the_home_of_the_robot_file(tmp_path):
+    folded, home, out = np.linspace(-1, 1, 6), np.array([0.1, -0.5, 0.7, 0.2, -1.1, 1.5]), np.full(6, 2.5)
+    (tmp_path / "arm.urdf").write_text(urdf(), encoding="utf-8")
+    found = import_urdf(tmp_path / "arm.urdf")
+    for given, expected in ((states(folded, home), home), (states(folded, []), folded)):
+        (tmp_path / "arm.srdf").write_text(given, encoding="utf-8")
+        robot = found.robot.replace(name="arm", home=srdf_home(tmp_path / "arm.srdf", found.joints))
+        write_robot(robot, tmp_path / "arm.yaml")
+        np.testing.assert_allclose(load_robot(tmp_path / "arm.yaml").home, expected, atol=1e-9)
+    with pytest.raises(InputError) as caught:
+        write_robot(robot.replace(home=out), tmp_path / "arm.yaml")
+    assert caught.value.field == "home_deg"
+    (tmp_path / "arm.srdf").write_text(states([], []), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        srdf_home(tmp_path / "arm.srdf", found.joints)
+    assert caught.value.field == "group_state"

@@ -111,6 +111,7 @@ def one_path(folder: Path) -> str:
     return str(folder / "paths.yaml")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("grade", "names"), [("inferred", tuple(f"J{j}" for j in range(1, 7))), ("claim", None)])
 def test_joint_speeds_that_the_robots_file_guesses_are_named_as_assumed(study, tmp_path, grade, names):
     content = yaml.safe_load(Path(f"data/robots/{ROBOT}.yaml").read_text(encoding="utf-8"))
@@ -380,6 +381,7 @@ def test_a_program_that_no_path_can_be_made_of_leaves_the_others(study, tmp_path
     assert set(subjects(results)["not_followed"].names) == {f"{name}: {why}" for name, why in lost.items()}
 
 
+@pytest.mark.long
 def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
     """A pair of links that only the scene allows; a scene without obstacles; a tool longer than the arm's shapes."""
     robot, tool = study.robot(ROBOT), np.eye(4)
@@ -460,6 +462,7 @@ def in_doubt(kind: str, content: dict, confirmed: bool) -> dict:
     return content | ({"units_checked": True} if confirmed else {})
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
 @pytest.mark.parametrize("confirmed", [False, True])
 @pytest.mark.parametrize(
@@ -755,6 +758,7 @@ def test_a_link_without_shape_is_covered_by_its_neighbours_or_named(link, reache
     assert (link in arm_shapes(fewer).uncovered) == reaches_out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("link", "end", "share"),
     [

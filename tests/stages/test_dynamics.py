@@ -106,6 +106,7 @@ def full(tmp_path_factory) -> tuple[Study, Stored[DynamicsResults]]:
     return study, computed(folder, study)
 
 
+@pytest.mark.long
 def test_a_robot_without_masses_has_no_data(tmp_path):
     study = load_study("config/small.yaml")
     found = computed(tmp_path, study, "er3_600")
@@ -123,6 +124,7 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
         assert (tmp_path / name).stat().st_size > 1000
 
 
+@pytest.mark.long
 def test_an_arm_of_four_joints_without_masses_gets_page_and_recording(tmp_path):
     write_robot(scara().replace(name="arm"), tmp_path / "arm.yaml")
     move = {"name": "move", "kind": "joint", "title": "move", "duration_s": 5, "samples": 20}
@@ -452,6 +454,7 @@ def test_no_verdict_passes_by_a_gravity_that_is_not_earths(tmp_path, gravity, na
     assert found == ([gravity] if named else [])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rpy_deg", [None, [0, 0, 0], [90, 0, 0]])
 def test_a_mounting_that_nothing_states_is_named(tmp_path, rpy_deg):
     placed = {"base": {"xyz_mm": [0, 0, 0], "rpy_deg": rpy_deg}} if rpy_deg else {}

@@ -41,6 +41,7 @@ from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant
 from er3a.selection.select import RULES
 from testing.arms import scara
+from testing.on_demand import OnDemand
 
 ROOT = Path(__file__).parents[2]
 NAMES = ("er3a_c60", "er3a_c60_article", "er3_600")
@@ -80,14 +81,19 @@ def flange_by_hand(name: str, q_deg: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory) -> dict[str, Path]:
-    """The stage computed for each robot."""
+    """The stage computed for each robot that a test asks for."""
     root = tmp_path_factory.mktemp("inverse")
-    for name in NAMES:
+
+    def made(name: str) -> Path:
         run.compute("inverse", make_study(), name, root / name)
-    return {name: root / name for name in NAMES}
+        return root / name
+
+    return OnDemand(made)
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(
+    params=["er3_600", *(pytest.param(name, marks=pytest.mark.long) for name in NAMES if name != "er3_600")]
+)
 def computed(request, folders) -> tuple[str, InverseResults]:
     """Name and results, as they are read, of each robot in turn."""
     return request.param, read_results(folders[request.param], RESULTS).results

@@ -236,6 +236,7 @@ def test_accelerations_that_the_study_gives_bind_programs_too(study, tmp_path):
     assert (float(percent) / 100) ** 2 * np.degrees(4.0) <= 100.0
 
 
+@pytest.mark.long
 def test_a_file_without_programs_is_no_reference_and_has_a_page(study, tmp_path):
     listed = tmp_path / "programs.yaml"
     listed.write_text("kind: programs\n")
@@ -264,6 +265,7 @@ def test_program_files_are_refused_by_field(content, field, study, tmp_path):
     assert field in str(caught.value.field)
 
 
+@pytest.mark.long
 def test_a_program_is_paths_and_safe_paths_are_programs(study, tmp_path):
     entry = {
         "name": "weld",

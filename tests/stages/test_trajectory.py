@@ -600,6 +600,7 @@ def test_the_slower_pace_that_is_advised_keeps_the_limits(study, results, tmp_pa
     assert hardly.too_fast
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("times_in", ["table", "program"])
 def test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limits(study, tmp_path, times_in):
     """The times of the table multiplied, and those of the program's motions as an override stretches them."""

@@ -233,6 +233,7 @@ def test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe(tmp_pa
     assert ((slowed >= lower + 1) & (slowed <= upper - 1)).all()
 
 
+@pytest.mark.long
 def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_path):
     both = {"line_limits": ["leaves limits", "collides"]}
     results = compute(study_of(tmp_path, "line_limits", expect=both), ROBOT)
@@ -308,6 +309,7 @@ def test_where_a_line_leaves_the_reach_joint_speeds_have_no_bound():
     assert found.max_rates is None
 
 
+@pytest.mark.long
 def test_a_path_that_keeps_the_margin_nowhere_gets_no_point_to_end_at(tmp_path):
     results = compute(study_of(tmp_path, "line_collides", settings={"assumed_margin_mm": 400.0}), ROBOT)
     (path,), (fault,) = results.summary.paths, faults(results)
@@ -323,6 +325,7 @@ def test_a_path_that_collides_by_more_than_assumed_shapes_may_be_wrong_fails(tmp
     assert (path.fails, deepest > 1000 * ASSUMED_MARGIN) == (True, True)
 
 
+@pytest.mark.long
 def test_what_is_wrong_before_a_contact_ends_the_sound_part_of_a_path(tmp_path):
     results = compute(study_of(tmp_path, "line_collides"), ROBOT)
     (path,), rows, limits = results.summary.paths, results.checks, results.summary.joint_limits
@@ -376,6 +379,7 @@ def test_where_limits_are_left_before_a_contact_the_path_may_end_before_them_and
     assert back.clear_until is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
 def test_a_fault_has_its_place_along_the_path(tmp_path, name):
     """By the path's own file, whose lines are driven from standstill to standstill along one straight line."""

@@ -188,6 +188,7 @@ def test_images_come_with_their_reprojected_corners(study, tmp_path):
     assert "magnified" in page
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turning", [False, True])
 def test_samples_without_a_calibration_leave_every_object_unexamined(study, tmp_path, turning):
     """All samples at one pose determine nothing; with some, but a wrong one, no grasp rests on it either."""

@@ -149,6 +149,7 @@ def test_cells_whose_middles_all_lie_out_of_reach_are_no_error():
     assert len(done.cells) == 0
 
 
+@pytest.mark.long
 def test_no_place_is_no_error():
     done = tool_capability(load_robot("er3_600"), settings(placement={"box_mm": [2000.0, 2000.0, 100.0]}), 0.15)
     assert done.placement.places == ()

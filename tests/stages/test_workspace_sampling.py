@@ -115,6 +115,7 @@ lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)
 angles = st.lists(st.floats(-3.2, 3.2), min_size=6, max_size=6)
 
 
+@pytest.mark.long
 @given(a=lengths, d=lengths, alpha=angles, q=angles, tool=st.tuples(lengths, angles), modified=st.booleans())
 def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
     robot = load_robot("er3_600").replace(

@@ -117,6 +117,7 @@ def _foundation(found: LeftOpen, folder: Path) -> str:
     return read_foundation(folder)
 
 
+@pytest.mark.long
 def test_a_point_enters_a_box_when_a_dense_walk_along_its_polyline_does(random):
     """Also if no vertex lies in the box; a vertex that is not known hides only the pieces that it ends."""
     low, high = np.array([-0.3, -0.2, -0.1]), np.array([0.2, 0.3, 0.25])

@@ -82,6 +82,7 @@ def test_nothing_else_is_served(root, path):
         fetched(root, path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("request_to_end", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_without_a_desktop_view_serves_on_the_loopback_address_until_it_is_told_to_end(reports, request_to_end):
     quiet = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}

@@ -99,6 +99,7 @@ def test_errors_of_a_seen_pose_are_those_of_drawn_calibrations_and_readings(cell
     assert error_sizes(parts.whole)[0] == pytest.approx(distance, rel=0.06)
 
 
+@pytest.mark.long
 def test_repeatability_after_iso_9283_comes_back_from_its_deviation():
     """RP = mean distance from the mean + three standard deviations of it, from a million drawn positions."""
     accuracy = ArmAccuracy(repeatability=1e-4)

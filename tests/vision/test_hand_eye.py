@@ -183,6 +183,7 @@ def test_a_board_turned_by_half_is_named_and_left_out(setup):
     assert found.without_suspects[0] > 5e-4
 
 
+@pytest.mark.long
 def test_a_mirrored_tilt_is_told_from_other_turns():
     samples = a_set("eye_to_hand", 4)
     T = samples.target[6]
@@ -193,6 +194,7 @@ def test_a_mirrored_tilt_is_told_from_other_turns():
     assert (found.sample, found.kind) == ("7", "mirrored_tilt")
 
 
+@pytest.mark.long
 def test_a_shifted_board_is_named_though_no_angle_tells_it():
     samples = a_set("eye_in_hand", 9)
     samples.target[2, :3, 3] += [0.01, 0, 0]
@@ -208,6 +210,7 @@ def test_sound_sets_name_hardly_any_sample():
     assert sum(named) <= 2  # 0.25 to be expected at one false alarm in a hundred sets
 
 
+@pytest.mark.long
 def test_copies_of_samples_narrow_no_interval():
     once = a_set("eye_to_hand", 3, 6)
     copied = CalibrationSet("eye_to_hand", np.tile(once.flange, (3, 1, 1)), np.tile(once.target, (3, 1, 1)))
@@ -224,6 +227,7 @@ def test_a_fit_that_does_not_converge_can_not_be_used():
         assert ("not_converged" in {each.code for each in grave_warnings(found.warnings)}) == (not converged)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_poses_without_errors_are_no_reason_to_warn(setup):
     flange = flange_poses(np.random.default_rng(1), 20)
@@ -368,6 +372,7 @@ def test_recorded_poses_are_doubted_where_nothing_is_compared_with_them(setup):
         assert _open_frames(samples, head) == tuple(Open(each) for each in frames if each == own)
 
 
+@pytest.mark.long
 def test_residuals_that_nothing_explains_are_an_error():
     samples = a_set("eye_in_hand", 14)
     samples.target[:, :3, 3] += np.random.default_rng(3).normal(0, 0.1, (15, 3))
@@ -395,6 +400,7 @@ def test_the_other_setup_is_named(setup):
     assert not any(is_one(each, "other_convention") for each in calibrate_hand_eye(samples).warnings)
 
 
+@pytest.mark.long
 def test_residuals_beyond_what_is_stated_are_said():
     good = a_set("eye_in_hand", 15, camera_covariance=covariance(15))
     assert calibrate_hand_eye(good).warnings == ()
@@ -404,6 +410,7 @@ def test_residuals_beyond_what_is_stated_are_said():
     assert found.scatter == pytest.approx(3, abs=0.6)
 
 
+@pytest.mark.long
 def test_samples_too_few_to_be_judged_by_one_another_are_said():
     for count in (4, 6, 7):
         found = calibrate_hand_eye(a_set("eye_in_hand", count=count))
@@ -445,6 +452,7 @@ def test_sets_that_determine_nothing_say_why():
     assert abs(found.axis[2]) == pytest.approx(1)
 
 
+@pytest.mark.long
 def test_touched_points_do_not_tell_a_tools_poses_from_the_flanges():
     """What a carried camera saw of the base is where it was, but the camera is off the flange by the tool."""
     flange = a_set("eye_in_hand", 21)
@@ -460,6 +468,7 @@ def test_touched_points_do_not_tell_a_tools_poses_from_the_flanges():
         assert np.linalg.norm(found.X[:3, 3] - X_TRUE[:3, 3]) == pytest.approx(off_m, abs=0.1 * off_m + 2e-3)
 
 
+@pytest.mark.long
 def test_touched_points_judge_the_calibration():
     random = np.random.default_rng(21)
     points = random.uniform([-0.2, -0.2, 0.6], [0.2, 0.2, 1.0], (6, 3))

@@ -43,6 +43,7 @@ def test_a_joint_zero_below_the_size_that_is_stated_goes_unnamed():
         assert ("joint_zero" in {each.code for each in found.warnings}) == named
 
 
+@pytest.mark.long
 def test_a_moved_camera_is_no_joint_zero():
     samples = a_set("eye_to_hand", 6, {}, 14, stated=False)
     samples.target[7:, :3, 3] += [0.02, 0, 0]

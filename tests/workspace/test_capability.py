@@ -29,6 +29,7 @@ def joint_1_free(robot: Robot) -> Robot:
     return robot.replace(lower=np.r_[-np.pi, robot.lower[1:]], upper=np.r_[np.pi, robot.upper[1:]])
 
 
+@pytest.mark.long
 @settings(derandomize=True)
 @given(st.data())
 def test_manipulability_is_the_jacobians_determinant(data):

@@ -240,6 +240,7 @@ def test_a_box_too_large_stands_nowhere():
     assert choose_places(robot, task, places, 5) == []
 
 
+@pytest.mark.long
 def test_what_is_level_is_a_support_and_a_box_fits_on_it_where_all_of_it_lies_over_it(random):
     on_its_side = transform(np.array([0.5, 0.1, 0.3]), np.array([np.pi / 2, 0.0, 0.4]))
     tilted = transform(np.array([0.0, 1.0, 0.0]), np.array([0.1, 0.0, 0.0]))

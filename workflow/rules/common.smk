@@ -11,8 +11,7 @@ from er3a.files.kept_files import from_here, view_command
 from er3a.files.units import noted_doubts
 from er3a.pipeline.commands.options import print_warning
 from er3a.pipeline import language
-from er3a.pipeline.language import catalogue_file, tr
-from er3a.pipeline.messages import pages
+from er3a.pipeline.language import catalogue_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
 
@@ -51,15 +50,6 @@ def catalogues(code):
 
 
 CATALOGUES = catalogues(LANGUAGE)
-
-
-# Snakemake's own report: its text, and what it calls pages and robots. The text of its first page has no params.
-config["description"] = pages.of_study()
-
-
-def titled(robot):
-    """A robot's title in the language of the pages."""
-    return language.own_title(STUDY.robot(robot).title)
 
 
 wildcard_constraints:

@@ -15,9 +15,8 @@ for robot in ROBOTS:
             *[
                 report(
                     f"reports/{robot}/{page}.html",
-                    caption="../report/stage.rst",
                     category=robot,
-                    labels={tr(pages.PAGE): tr(pages.TEACH_PANEL if page == "teach" else STAGES[page].title)},
+                    labels={"page": page},
                 )
                 for page in asked_pages(robot)
             ],
@@ -30,14 +29,6 @@ for robot in ROBOTS:
             robot=robot,
             pages=asked_pages(robot),
             language=LANGUAGE,
-            caption="\n\n".join(
-                (
-                    pages.of_teach_panel(titled(robot))
-                    if page == "teach"
-                    else pages.of_stage(titled(robot), STAGES[page].question)
-                )
-                for page in asked_pages(robot)
-            ),
             settings=STUDY.settings(robot, "trajectory"),
             contents=STUDY.inputs_digest(robot, "teach"),
             code=code_digest(),
@@ -55,9 +46,7 @@ rule index:
     output:
         report(
             "reports/index.html",
-            caption="../report/index.rst",
-            category=tr(pages.ALL_ROBOTS),
-            labels={tr(pages.PAGE): tr(pages.INDEX)},
+            labels={"page": "index"},
         ),
         "reports/junit.xml",
     log:
@@ -66,7 +55,6 @@ rule index:
         "../envs/er3a.yaml"
     params:
         language=LANGUAGE,
-        caption=pages.of_index(),
         expected={name: STUDY.entry(name).expect for name in STUDY.robots},
         rested_on=rested_on(),
         code=code_digest(),
@@ -92,9 +80,7 @@ if STUDY.article:
             "results/article.json",
             report(
                 [f"reports/{page}" for page in STUDY.article_pages().values()],
-                caption="../report/article.rst",
-                category=tr(pages.ALL_ROBOTS),
-                labels={tr(pages.PAGE): tr(pages.ARTICLE)},
+                labels={"page": "article"},
             ),
         log:
             "logs/article.log",
@@ -103,7 +89,6 @@ if STUDY.article:
         params:
             tables=STUDY.article.model_dump(),
             language=LANGUAGE,
-            caption=pages.of_article(),
             code=code_digest(),
         message:
             "write the page on the article"

@@ -13,12 +13,10 @@ from babel import Locale
 
 from er3a.files.kept_files import write_text
 from er3a.geometry.transforms import translation
-from er3a.kinematics.forward import skeleton
 from er3a.pipeline import language
 from er3a.pipeline.article.article_numbers import (
     LINE,
     MOVE,
-    WINDOW_Z_MM,
     ArticleNumbers,
     TableNumbers,
     agreements,
@@ -38,14 +36,10 @@ from er3a.pipeline.results import Provenance, checksum_file, input_records, resu
 from er3a.pipeline.study import ArticleTables, Study
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark
-from er3a.pipeline.viewing.figures import house_style, new_figure
-from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import MODEL, MUTED, REFERENCE
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 ROLES = (N_("the article's table"), N_("the same with offset 2 = −90°"), N_("the real ER3A-C60"))
-COLOURS = (REFERENCE, MODEL, MUTED)  # printed, corrected, real
 APART_M = 1.8  # between two arms that stand side by side
 PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
 """The page of the printed table that shows more, by section of the article; for all others its validation page."""
@@ -71,8 +65,7 @@ def write_article(study: Study, tables: ArticleTables, results: Path, folder: Pa
     for code, name in pages.items():
         own = study.model_copy(update={"report": study.report.model_copy(update={"language": code})})
         language.use(code, own.own_titles())
-        with house_style():
-            _write(study, tables, results, found, folder / name)
+        _write(study, tables, results, found, folder / name)
 
 
 def _write(study: Study, tables: ArticleTables, results: Path, found: ArticleNumbers, output: Path) -> None:
@@ -94,7 +87,6 @@ def _write(study: Study, tables: ArticleTables, results: Path, found: ArticleNum
         compared=_compared(found),
         roles=[tr(word) for word in ROLES],
         robots=[(name, study.pages(name)) for name in tables.names],
-        zero=_zero_pose(robots, found),
         player=_player(robots, results, tables),
         drawing_head=drawing_head(),
     )
@@ -186,26 +178,6 @@ def _compared(found: ArticleNumbers) -> list[list[str]]:
         known = vars(table) | _worded(table) | points
         parts.append({key: "–" if value is None else value for key, value in known.items()})
     return [[label, *(language.filled(text, text, part) for part in parts)] for label, text in cells.items()]
-
-
-def _zero_pose(robots: list[Robot], found: ArticleNumbers) -> Picture:
-    figure, axes = new_figure(width=7.0, height=5.2)
-    axes.axhspan(*WINDOW_Z_MM, color=MUTED, alpha=0.12, linewidth=0, label=tr("window of the article's plot"))
-    for robot, role, colour in zip(robots, ROLES, COLOURS):
-        corners = 1000 * skeleton(robot, np.zeros(robot.joints))
-        axes.plot(corners[:, 0], corners[:, 2], "o-", color=colour, linewidth=2.5, markersize=4, label=tr(role))
-    axes.set(xlabel="x (mm)", ylabel="z (mm)", aspect="equal")
-    axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
-    return Picture(
-        figure,
-        tr("Side view of three arms with all joints at 0, and the band of heights that the article's plot shows"),
-        tr(
-            "All joints at 0, from the side. As printed the tool is at z = {printed} mm, with offset 2 = −90° at "
-            "{corrected} mm.",
-            printed=fixed(found.printed.tool_mm[2], 2),
-            corrected=fixed(found.corrected.tool_mm[2], 2),
-        ),
-    )
 
 
 def _player(robots: list[Robot], results: Path, tables: ArticleTables) -> Any:

@@ -43,19 +43,24 @@ def import_urdf(
     tip: options.Tip = None,
     snap: Annotated[bool, typer.Option(help="take rounded angles (1.571) as the multiples of 45 deg meant")] = True,
     xacro: options.Xacro = None,
+    srdf: Annotated[Path | None, typer.Option(help="whose state home, else the first of all joints, is home")] = None,
     as_json: options.AsJson = False,
 ):
     """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.urdf_tree import plain_urdf
+    from er3a.formats.urdf_tree import plain_urdf, srdf_home
     from er3a.robots.robot import robot_name
 
     with shown_work(f"{file}: reading the arm"), plain_urdf(file, xacro or ()) as plain:
         imported = read_urdf(plain, base=base, tip=tip, snap=snap)
+    robot = imported.robot
+    if srdf is not None:
+        with plain_urdf(srdf) as plain:
+            robot = robot.replace(home=srdf_home(plain, imported.joints))
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
-    write_robot(imported.robot.replace(name=output.stem), output)
+    write_robot(robot.replace(name=output.stem), output)
     for note in imported.notes:
         options.print_note(note)
     if as_json:
@@ -197,7 +202,7 @@ def calibrate(
     from er3a.calibration.outcomes import CalibrationError
     from er3a.files.by_name import calibrate as calibrate_robot
     from er3a.files.robot_library import load_robot
-    from er3a.pipeline.messages.calibration import calibration_record, held_back_lines, kept_lines, lines_of
+    from er3a.pipeline.messages.calibration import calibration_record, held_back_line, kept_lines, lines_of
     from er3a.pipeline.messages.say import say
 
     _check_options(output, words)
@@ -224,7 +229,7 @@ def calibrate(
     if as_json:
         options.print_json(record)
     else:
-        lines = [lines_of(found, rows, others), *(held_back_lines(found, rows, others) if others else [])]
+        lines = [lines_of(found, rows, others), *([held_back_line(found, others)] if others else [])]
         print("\n".join([*lines, *([f"{html}: written"] if html else [])]))
     if output and not settled:
         raise Er3aError(

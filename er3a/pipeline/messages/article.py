@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from er3a.pipeline.language import N_
+from er3a.pipeline.language import N_, words
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,11 @@ ITEMS = (
     ),
 )
 
-AGREEMENT = {
-    "agrees": N_("agrees"),
-    "differs": N_("differs"),
-    "in_part": N_("in part"),
-    "not_examined": N_("not examined"),
-}
+AGREEMENT = words(
+    {
+        "agrees": "agrees",
+        "differs": "differs",
+        "in_part": "in part",
+        "not_examined": "not examined",
+    }
+)

@@ -8,85 +8,71 @@ from pathlib import Path
 
 import numpy as np
 
+import er3a.pipeline.messages.diagnosis  # noqa: F401
 from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstimate
-from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
+from er3a.calibration.cross_validation import TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
-from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, as_text, tr
-from er3a.pipeline.messages.diagnosis import level
+from er3a.pipeline.language import as_text, tr, words
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
 MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
 CONTRADICTING = 3.0
 """Times the error at poses left out: positions held back that are farther off are not where the model puts them."""
-TERMS = {
-    "ratio": N_("ratio"),
-    "once": N_("once a turn"),
-    "twice": N_("twice a turn"),
-    "sag": N_("sag under a load"),
-    "weight": N_("sag under its own weight"),
-    "ripple": N_("{turns} times a turn"),
-    "coupling": N_("coupled to J{by}"),
-}
-KINDS = {"place": N_("place"), "plane": N_("plane")}
-VERDICTS = {
-    "taken": N_("taken"),
-    "not_lower": N_("left: poses left out are not met better"),
-    "noise": N_("left: noise may have made it"),
-    "wrong_way": N_("left: a load would have to lift the arm"),
-}
+TERMS = words(
+    {
+        "ratio": "ratio",
+        "once": "once a turn",
+        "twice": "twice a turn",
+        "sag": "sag under a load",
+        "weight": "sag under its own weight",
+        "ripple": "{turns} times a turn",
+        "coupling": "coupled to J{by}",
+    }
+)
+KINDS = words({"place": "place", "plane": "plane"})
+VERDICTS = words(
+    {
+        "taken": "taken",
+        "not_lower": "left: poses left out are not met better",
+        "noise": "left: noise may have made it",
+        "wrong_way": "left: a load would have to lift the arm",
+    }
+)
 
 
 def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Sequence[Measurement] = ()) -> str:
-    """A calibration as lines of text for a terminal; ``others``: positions held back."""
-    scatter = (
-        f"scatter {found.scatter:.2f} standard deviations"
-        if found.deviation_mm is None
-        else f"standard deviation of a coordinate, estimated: {_deviations(found)}"
-    )
+    """The answer of a calibration as lines of text for a terminal: pages and JSON hold the rest.
+
+    Parameters
+    ----------
+    fitted, others : measured positions that it rests on, and those held back
+    """
+    settled, numbers = len(found.estimates) - len(found.open), len(found.estimates) + len(found.held)
+    not_settled = f"; not settled: {', '.join(found.open)}" if found.open else ""
     lines = [
         *([] if found.fits else [say(found.conclusion)]),
         *held_back_warning(found, fitted, others),
         *_summary(found),
         *warning_texts(found),
-        f"{found.coordinates} coordinates at {found.poses} poses; estimated: {level(found.level)}",
-        f"these measurements settle {len(found.estimates) - len(found.open)} of "
-        f"{len(found.estimates) + len(found.held)} numbers",
-        *(
-            [
-                "not settled, by too wide intervals, or because quite another arm meets the positions as well: "
-                f"{', '.join(found.open)}"
-            ]
-            * bool(found.open)
-        ),
-        f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after; "
-        + scatter,
+        f"{found.coordinates} coordinates at {found.poses} poses settle {settled} of {numbers} numbers{not_settled}",
+        f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after",
         *_turned_line(found),
         *_entry_lines(found.estimates),
         *(f"not estimated: {say(reason)}" for reason in found.held),
-        *(
-            f"strongly correlated: {pair.first} and {pair.second} ({as_text(pair.correlation, '.2f')})"
-            for pair in found.close
-        ),
-        *(
-            f"set aside: row {each.row}, {each.distance_mm:.3g} mm from where the others put it"
-            for each in found.outliers
-        ),
+        *(f"set aside: row {each.row}, {each.distance_mm:.3g} mm off" for each in found.outliers),
+        *(f"says nothing: {text}" for text in idle_texts(found)),
     ]
-    lines += [f"{term_name(each)}: {_coefficients(each)}, in the robot file as its coupling" for each in found.ratios]
-    lines += [f"says nothing: {text}" for text in idle_texts(found)]
+    terms = found.beyond.terms if found.beyond else found.ratios
+    if terms:
+        lines.append(
+            f"errors of joints beyond the table: {', '.join(map(term_name, terms))}; --html and --json list all"
+        )
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: residuals exceed the stated standard deviations; errors may exceed the intervals")
     if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
         lines.append("warning: residuals are far below the stated standard deviations, on which the intervals rest")
-    if found.left_out:
-        lines.append(f"as in a robot file, {_left_out_line(found.left_out)}")
-    lines += _tried_lines("tried", found.tried)
-    lines += _tried_lines("tried for the robot file", found.tried_for_file)
-    if found.beyond:
-        lines += _beyond_lines(found.beyond)
     if found.more:
         lines.append(f"to estimate more: {say(found.more)}")
     lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
@@ -128,12 +114,6 @@ def warning_texts(found: Calibration) -> list[str]:
     return texts
 
 
-def _deviations(found: Calibration) -> str:
-    """Those that the models leave."""
-    model, file = found.beyond.deviation_mm if found.beyond else None, found.deviation_mm
-    return f"{file:.3g} mm" if model is None else f"{model:.3g} mm by the whole model, {file:.3g} mm by the robot file"
-
-
 def _summary(found: Calibration) -> list[str]:
     """How well the corrected arm does at poses that its fit has not seen."""
     forms = {"the corrected robot file": found.left_out}
@@ -171,18 +151,6 @@ def kept_lines(
             f"{output}: its coupling counts; for a program that reads a table alone, calibrate with --fixed ratios"
         )
     return lines
-
-
-def held_back_line(fitted: Sequence[Measurement], others: Sequence[Measurement], distances: Reals) -> str:
-    """How far the model is from positions that the fit has not seen, mm, and where that is no place to rely on it."""
-    worst = others[int(distances.argmax())]
-    ranges = zip(worst.pose, zip(*(each.pose for each in fitted)))
-    beyond = [f"J{k}" for k, (own, seen) in enumerate(ranges, 1) if not min(seen) <= own <= max(seen)]
-    where = f"row {worst.row}" + (f", beyond all fitted poses in {', '.join(beyond)}" if beyond else "")
-    return (
-        f"held back: {len(distances)} positions, {distances.mean():.4g} mm off on average, {distances.max():.4g} mm at "
-        f"worst ({where})"
-    )
 
 
 def held_back_warning(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
@@ -242,13 +210,11 @@ def _held_back_contradicts(
     return []
 
 
-def held_back_lines(found: Calibration, fitted: Sequence[Measurement], others: Sequence[Measurement]) -> list[str]:
-    """Those by the model, and by what a robot file holds if the model has more terms."""
-    lines = [held_back_line(fitted, others, found.distances_mm(others))]
-    if found.beyond:
-        alone = held_back_line(fitted, others, found.without_terms().distances_mm(others))
-        lines.append(f"as in a robot file, {alone}")
-    return lines
+def held_back_line(found: Calibration, others: Sequence[Measurement]) -> str:
+    """How far the model is from positions that the fit has not seen, mm."""
+    off = found.distances_mm(others)
+    worst = f"{off.max():.4g} mm at worst (row {others[int(off.argmax())].row})"
+    return f"held back: {len(off)} positions, {off.mean():.4g} mm off on average, {worst}"
 
 
 def idle_texts(found: Calibration) -> list[str]:
@@ -293,38 +259,6 @@ def _entry_lines(estimates: Sequence[Estimate]) -> list[str]:
         values = as_text(each.nominal, ">12.4f") + as_text(each.correction, ">+14.4f") + f"{each.half_width:>12.4f}"
         lines.append(f"{each.name:<9}{values} {each.unit}")
     return lines
-
-
-def _left_out_line(found: HeldOutErrors) -> str:
-    return (
-        f"at poses left out: {found.mean_mm:.4g} mm on average, {found.worst_mm:.4g} mm at worst; far from all others "
-        f"{found.far_mean_mm:.4g} mm, {found.far_worst_mm:.4g} mm"
-    )
-
-
-def _tried_lines(title: str, tried: Sequence[TriedTerm]) -> list[str]:
-    shown = [each for each in tried if each.verdict != "noise"]
-    lines = []
-    for each in shown:
-        changes = f"{as_text(each.change, '+.1%')}, far from all others {as_text(each.far_change, '+.1%')}"
-        what = f"squared error left out {changes}, p {each.probability:.1e}: {tr(VERDICTS[each.verdict])}"
-        lines.append(f"{title}: {term_name(each):<20} {what}")
-    if more := len(tried) - len(shown):
-        lines.append(f"{title}: {more} more terms, left because noise may have made them; --html and --json list them")
-    return lines
-
-
-def _beyond_lines(found: Beyond) -> list[str]:
-    lines = [f"with terms beyond the table: {found.rms_mm:.4g} mm root mean square"]
-    lines += [f"  {term_name(each)}: {_coefficients(each)}" for each in found.terms]
-    if found.left_out:
-        lines.append(f"with terms, {_left_out_line(found.left_out)}")
-    return lines
-
-
-def _coefficients(term: TermEstimate) -> str:
-    pairs = zip(term.coefficients, term.standard_errors)
-    return ", ".join(f"{as_text(value, '+.3f')} +- {1.96 * error:.3f}" for value, error in pairs) + " (1/1000)"
 
 
 def calibration_record(

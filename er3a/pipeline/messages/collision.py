@@ -8,31 +8,35 @@ from typing import Any
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import BASE, TRIED, bodies_of
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, own_title
+from er3a.pipeline.language import own_title, words
 from er3a.pipeline.messages import expectations, scope  # noqa: F401
 from er3a.pipeline.messages.say import FORMATS, WORDS, same_text, say_as, says, sentence, texts, word
 
-KEY_FIGURES = {
-    "free_of_collisions": N_("Collision-free joint space"),
-    "free_of_itself": N_("Free of self-collision"),
-    "free_of_scene": N_("Free of collisions with the scene"),
-    "clear_places": N_("Cells reached without collision"),
-    "joined_places": N_("Of these, connected to home"),
-    "lost_volume": N_("Volume lost to collisions, estimate"),
-    "watched_pairs": N_("Pairs of links that can collide, and are checked"),
-    "undecided_pairs": N_("Pairs undecided"),
-}
-HOMES = {"study": N_("as the study has it"), "zero": N_("joints at 0"), "chosen": N_("chosen away from singular poses")}
-STATES: dict[PairState, str] = {
-    "never": N_("never collide"),
-    "joined": N_("adjacent"),
-    "overlaps": N_("shapes in error"),
-    "guessed": N_("guess in error"),
-    "meets": N_("can collide"),
-    "undecided": N_("undecided"),
-    "allowed": N_("allowed"),
-    "watched": N_("checked on request"),
-}
+KEY_FIGURES = words(
+    {
+        "free_of_collisions": "Collision-free joint space",
+        "free_of_itself": "Free of self-collision",
+        "free_of_scene": "Free of collisions with the scene",
+        "clear_places": "Cells reached without collision",
+        "joined_places": "Of these, connected to home",
+        "lost_volume": "Volume lost to collisions, estimate",
+        "watched_pairs": "Pairs of links that can collide, and are checked",
+        "undecided_pairs": "Pairs undecided",
+    }
+)
+HOMES = words({"study": "as given", "zero": "joints at 0", "chosen": "chosen away from singular poses"})
+STATES: dict[PairState, str] = words(
+    {
+        "never": "never collide",
+        "joined": "adjacent",
+        "overlaps": "shapes in error",
+        "guessed": "guess in error",
+        "meets": "can collide",
+        "undecided": "undecided",
+        "allowed": "allowed",
+        "watched": "checked on request",
+    }
+)
 
 
 TEXTS = texts(
@@ -79,10 +83,12 @@ TEXTS = texts(
         "colliding": "{name} ({pair}[; as expected{expected:?}])",
     }
 )
-WORDS["shapes_missing"] = {
-    False: N_("Link shapes are assumed"),
-    True: N_("Shapes are missing for parts of links"),
-}
+WORDS["shapes_missing"] = words(
+    {
+        False: "Link shapes are assumed",
+        True: "Shapes are missing for parts of links",
+    }
+)
 
 
 def _body(body: int | str) -> str:

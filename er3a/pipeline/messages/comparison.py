@@ -14,43 +14,49 @@ from er3a.comparison.compare import (
     Uncompared,
 )
 from er3a.comparison.slips import Cause
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import tr, with_unit, words
 from er3a.pipeline.messages.pages import GROUP_NAMES
 from er3a.pipeline.messages.say import joined, say, word
 
-LAYERS = {
-    "units": N_("units"),
-    "geometry": N_("geometry"),
-    "zero": N_("zero"),
-    "directions": N_("directions"),
-    "base": N_("base"),
-    "flange": N_("flange"),
-    "coupling": N_("coupling"),
-    "limits": N_("limits"),
-    "speeds": N_("speeds"),
-}
-HEADLINES = {
-    "equal": N_("equal: the same arm, usable as printed"),
-    "in_doubt": N_("equal numbers, in units that are in doubt"),
-    "same_arm": N_("same arm, defined otherwise"),
-    "other_arm": N_("another arm"),
-    "other_joint_count": N_("another number of joints"),
-}
-CAUSES = {
-    "a_and_d_swapped": N_("a and d are swapped"),
-    "other_convention": N_("the table is of the other D-H convention: a and alpha stand a row off"),
-    "all_alphas_negated": N_("every alpha has the other sign"),
-    "one_alpha_negated": N_("it has the other sign"),
-    "one_length_negated": N_("it has the other sign"),
-    "offsets_negated": N_("every offset has the other sign"),
-    "unit": N_("the lengths are in another unit"),
-    "angle_unit": N_("the angles are in another unit"),
-    "scale": N_("all lengths are scaled"),
-    "rows_shifted": N_("values stand a row too high or too low"),
-    "rows_exchanged": N_("two rows are exchanged"),
-}
-BESIDE = {"pair_rules": N_("rules for pairs of links"), "limits_on_sums": N_("limits on sums of joints")}
-STATES = {True: N_("agrees"), False: N_("differs"), None: N_("not given")}
+LAYERS = words(
+    {
+        "units": "units",
+        "geometry": "geometry",
+        "zero": "zero",
+        "directions": "directions",
+        "base": "base",
+        "flange": "flange",
+        "coupling": "coupling",
+        "limits": "limits",
+        "speeds": "speeds",
+    }
+)
+HEADLINES = words(
+    {
+        "equal": "equal: the same arm, usable as printed",
+        "in_doubt": "equal numbers, in units that are in doubt",
+        "same_arm": "same arm, defined otherwise",
+        "other_arm": "another arm",
+        "other_joint_count": "another number of joints",
+    }
+)
+CAUSES = words(
+    {
+        "a_and_d_swapped": "a and d are swapped",
+        "other_convention": "the table is of the other D-H convention: a and alpha stand a row off",
+        "all_alphas_negated": "every alpha has the other sign",
+        "one_alpha_negated": "it has the other sign",
+        "one_length_negated": "it has the other sign",
+        "offsets_negated": "every offset has the other sign",
+        "unit": "the lengths are in another unit",
+        "angle_unit": "the angles are in another unit",
+        "scale": "all lengths are scaled",
+        "rows_shifted": "values stand a row too high or too low",
+        "rows_exchanged": "two rows are exchanged",
+    }
+)
+BESIDE = words({"pair_rules": "rules for pairs of links", "limits_on_sums": "limits on sums of joints"})
+STATES = words({True: "agrees", False: "differs", None: "not given"})
 
 
 def headline(found: Comparison, doubts: Iterable[str] = ()) -> str:

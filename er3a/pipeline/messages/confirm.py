@@ -13,7 +13,6 @@ from er3a.geometry.transforms import rpy_of
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.numbers import number
-from er3a.pipeline.messages.say import joined, say, say_as, says, sentence, texts
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -32,74 +31,33 @@ FORMS = {
 }
 UNITS_BY_FACTOR = {25.4: "in", 1e3: "m", 1e-3: "mm", 10.0: "cm", 304.8: "ft"}
 
-TEXTS = texts(
-    {
-        "confirmed#agrees": "AGREES: the model is the controller's; at most {off} off",
-        "confirmed#reading": "READING: the model agrees once the file is read otherwise; at most {off} off",
-        "confirmed#frames": "FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
-        "confirmed#joints": "JOINTS: the arm agrees once joints are counted as the controller does; at most {off} off",
-        "confirmed#small": "SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
-        "confirmed#another": "ANOTHER ARM: entries of the table differ; with these, at most {off} off",
-        "confirmed#open": "OPEN: nothing explains the difference; at least {off} are left",
-        "confirm.off": "{mm} mm and {deg} deg",
-        "confirm.off_mm": "{mm} mm",
-        "confirm.read": "{poses} poses; orientations read as {form}; rounding explains {off}",
-        "confirm.read_positions": "{poses} poses without orientations; rounding explains {off}",
-        "confirm.before": "as it is, the model is up to {off} off",
-        "confirm.noted#joints_taken_in": "joint values without a unit were taken in {value}",
-        "confirm.noted#positions_taken_in": "positions without a unit were taken in {value}",
-        "confirm.noted#blank_rows": "rows without joints or pose, or of another point, left out: {value}",
-        "confirm.noted#rows_at_rest": "rows at rest, one for each stop: {value}",
-        "confirm.noted#rows_once": "rows, each pose once: {value}",
-        "confirm.form": "orientations are {form}, not what the columns' names say; rename them, or --angles {key}",
-        "confirm.unit": "positions are in {unit}; --units {unit}",
-        "confirm.factor": "positions are {factor:.4g} times as large as the model's; check their unit",
-        "joints_in": "joint values are in {unit}; name the columns q1_{unit} ...",
-        "confirm.rows": "lines that do not fit: {lines}; up to {mm:.3g} mm off. Check what was typed there",
-        "confirm.tool": "tool of the controller: {place}; or select the flange and read again",
-        "confirm.base": "base of the controller: {place}; or select base 0 and read again",
-        "confirm.place": "{{xyz_mm: {xyz}, rpy_deg: {rpy}}} (+-{mm:.2g} mm, {deg:.2g} deg)",
-        "confirm.point": "{{xyz_mm: {xyz}}} (+-{mm:.2g} mm)",
-        "confirm.zero": (
-            "zero of J{joint} is {change:+.3f} deg off (+-{half_width:.2g}); offset_deg of row {joint}: {given:.3f} -> "
-            "{value:.3f}. Zero is defined otherwise, or the joint was mastered wrong: compare its marks"
-        ),
-        "turns_other_way": "J{joint} turns the other way at the controller; direction of row {joint} changes its sign",
-        "counted_from": "J{joint} of the pendant is counted with J{by}; coupling: rows: {rows}",
-        "columns_swapped": "the columns of J{first} and J{second} are swapped",
-        "zero_elsewhere": "zero of J{joint} is {deg:.0f} deg elsewhere; add this to offset_deg of row {joint}",
-        "confirm.entry": "{name}: {given:.3f} -> {value:.3f} {unit} (+-{half_width:.2g})",
-        "confirm.family": "another arm, maybe of the same family: compare names and drawings; --output corrected.yaml",
-        "confirm.nearest": "the corrected table is that of {name}",
-        "confirm.small": (
-            "{count} small corrections, as of a factory; the largest: {largest:, }; --output mine.yaml; "
-            "UR: er3a import-calibration; intervals: er3a calibrate"
-        ),
-        "confirm.held_out": "at poses left out of the fit: {mm:.2g} mm root mean square",
-        "confirm.open": "nearest: {nearest:; }",
-        "confirm.nothing": "the model as it is",
-        "confirm.worst": "lines that are farthest off: {lines}",
-        "confirm.noise": "{times:.0f} times what rounding explains is left: did the arm still move?",
-        "explains_too": "alike: {what:, }",
-        "confirm.zero_alike": "zero of J{joint}",
-        "confirm.place_alike#base": "another base",
-        "confirm.place_alike#tool": "another tool",
-        "confirm.not_settled": "not settled by these poses: {entries}; er3a confirm ROBOT --plan gives poses that do",
-        "confirm.taken_up": "not separated from base and tool: {entries}",
-        "confirm.all_settled": "not settled by these poses: nothing",
-        "confirm.no_orientations": "not examined: orientations, and what turns the tool alone",
-        "confirm.plan": (
-            "{poses} poses: move there slowly, with the flange as tool and the robot's own base. Write down what the "
-            "pendant shows. Below each pose is what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
-        ),
-        "confirm.shown": "the pendant shows: {blanks}",
-        "confirm.plan_safe#shapes": "within limits, clear of arm and base, away from singular poses; cell unknown",
-        "confirm.plan_safe#none": "within limits, above the base, away from singular poses; shapes and cell unknown",
-        "confirm.accuracy": (
-            "A controller repeats its own model, so agreement says nothing about the arm's accuracy; that takes a "
-            "tracker and er3a calibrate."
-        ),
-    }
+HEADLINES = {
+    "agrees": "AGREES: the model is the controller's; at most {off} off",
+    "reading": "READING: the model agrees once the file is read otherwise; at most {off} off",
+    "frames": "FRAMES: the arm agrees; controller and model have another base or tool; at most {off} off",
+    "joints": "JOINTS: the arm agrees once joints are counted as the controller does; at most {off} off",
+    "small": "SMALL: the arm is of this type, but not nominal; small corrections leave at most {off}",
+    "another": "ANOTHER ARM: entries of the table differ; with these, at most {off} off",
+    "open": "OPEN: nothing explains the difference; at least {off} are left",
+}
+NOTES = {
+    "joints_taken_in": "joint values without a unit were taken in",
+    "positions_taken_in": "positions without a unit were taken in",
+    "blank_rows": "rows without joints or pose, or of another point, left out:",
+    "rows_at_rest": "rows at rest, one for each stop:",
+    "rows_once": "rows, each pose once:",
+}
+JOINTS = {
+    "joints_in": "joint values are in {unit}; name the columns q1_{unit} ...",
+    "turns_other_way": "J{joint} turns the other way at the controller; direction of row {joint} changes its sign",
+    "counted_from": "J{joint} of the pendant is counted with J{by}; coupling: rows: {rows}",
+    "columns_swapped": "the columns of J{first} and J{second} are swapped",
+    "zero_elsewhere": "zero of J{joint} is {deg} deg elsewhere; add this to offset_deg of row {joint}",
+}
+NOTHING = "the model as it is"
+ACCURACY = (
+    "A controller repeats its own model, so agreement says nothing about the arm's accuracy; that takes a tracker and "
+    "er3a calibrate."
 )
 
 
@@ -113,78 +71,111 @@ def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: boo
     """
     fits = found.fits
     off = _off(found, float(found.left_mm[fits].max()), float(found.left_deg[fits].max()))
-    lines = [_read_line(found), sentence(f"confirmed#{found.verdict}", off=off)]
-    lines += [f"  {line}" for line in _found_lines(found, nearest)]
+    lines = [_read_line(found), HEADLINES[found.verdict].format(off=off), *_found_lines(found, nearest)]
     if found.verdict != "agrees":
         before = _off(found, float(found.before_mm.max()), float(found.before_deg.max()))
-        lines.append("  " + sentence("confirm.before", off=before))
+        lines.append(f"  as it is, the model is up to {before} off")
     if found.noise > 1:
-        lines.append("  " + sentence("confirm.noise", times=found.noise))
-    lines += [f"  {say(each)}" for each in found.alike]
-    lines += [f"  {line}" for line in _open_lines(found)]
-    if every:
-        lines += _table(found)
-    lines += [sentence(f"confirm.noted#{note}", value=value) for note, value in found.notes]
-    return [*lines, sentence("confirm.accuracy")]
+        lines.append(f"  {found.noise:.0f} times what rounding explains is left: did the arm still move?")
+    lines += [f"  alike: {', '.join(_alike(each))}" for each in found.alike]
+    if found.verdict != "open":
+        more = "; er3a confirm ROBOT --plan gives poses that do" if found.not_settled else ""
+        lines.append(f"  not settled by these poses: {', '.join(found.not_settled) or 'nothing'}{more}")
+    if found.taken_up:
+        lines.append(f"  not separated from base and tool: {', '.join(found.taken_up)}")
+    if not found.oriented:
+        lines.append("  not examined: orientations, and what turns the tool alone")
+    lines += _table(found) if every else []
+    return [*lines, *(f"{NOTES[note]} {value}" for note, value in found.notes), ACCURACY]
 
 
 def _off(found: Confirmation, mm: float, deg: float) -> str:
-    parts = {"mm": number(mm, 3), "deg": number(deg, 3)}
-    return sentence("confirm.off" if found.oriented else "confirm.off_mm", **parts)
+    return f"{number(mm, 3)} mm" + (f" and {number(deg, 3)} deg" if found.oriented else "")
 
 
 def _read_line(found: Confirmation) -> str:
-    off = _off(found, found.digits_mm, found.digits_deg)
-    if not found.oriented:
-        return sentence("confirm.read_positions", poses=len(found.lines), off=off)
-    return sentence("confirm.read", poses=len(found.lines), form=FORMS[found.form], off=off)
+    form = f"; orientations read as {FORMS[found.form]}" if found.oriented else " without orientations"
+    return f"{len(found.lines)} poses{form}; rounding explains {_off(found, found.digits_mm, found.digits_deg)}"
 
 
 def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
     """What is between model and controller, and what to write where."""
+    parts = list(_parts(found))
     if found.verdict == "open":
         far = np.argsort(-found.left_mm, kind="stable")[:SHOWN_LINES]
-        yield sentence("confirm.open", nearest=tuple(_parts(found)) or (sentence("confirm.nothing"),))
-        yield sentence("confirm.worst", lines=_listed(found.lines[far]))
+        yield f"  nearest: {'; '.join(parts) or NOTHING}"
+        yield f"  lines that are farthest off: {_listed(found.lines[far])}"
         return
     if found.renamed:
-        yield sentence("confirm.form", form=FORMS[found.form], key=found.form)
-    if found.factor != 1:
-        unit = UNITS_BY_FACTOR.get(found.factor)
-        yield sentence("confirm.unit", unit=unit) if unit else sentence("confirm.factor", factor=1 / found.factor)
+        form = FORMS[found.form]
+        yield f"  orientations are {form}, not what the columns' names say; rename them, or --angles {found.form}"
+    if unit := UNITS_BY_FACTOR.get(found.factor):
+        yield f"  positions are in {unit}; --units {unit}"
+    elif found.factor != 1:
+        yield f"  positions are {1 / found.factor:.4g} times as large as the model's; check their unit"
     if not found.fits.all():
         out = ~found.fits
-        yield sentence("confirm.rows", lines=_listed(found.lines[out]), mm=float(found.left_mm[out].max()))
-    yield from _parts(found)
+        lines, off = _listed(found.lines[out]), float(found.left_mm[out].max())
+        yield f"  lines that do not fit: {lines}; up to {off:.3g} mm off. Check what was typed there"
+    yield from (f"  {part}" for part in parts)
     if any(each.entry.column != "offset" for each in found.entries):
-        yield sentence("confirm.nearest", name=nearest) if nearest else sentence("confirm.family")
+        yield (
+            f"  the corrected table is that of {nearest}"
+            if nearest
+            else "  another arm, maybe of the same family: compare names and drawings; --output corrected.yaml"
+        )
     if found.small:
-        largest = tuple(_change(each) for each in found.small[:SHOWN_ENTRIES])
-        yield sentence("confirm.small", count=len(found.small), largest=largest)
+        largest = ", ".join(_change(each) for each in found.small[:SHOWN_ENTRIES])
+        yield (
+            f"  {len(found.small)} small corrections, as of a factory; the largest: {largest}; --output mine.yaml; UR: "
+            "er3a import-calibration; intervals: er3a calibrate"
+        )
     if found.held_out_mm is not None:
-        yield sentence("confirm.held_out", mm=found.held_out_mm)
+        yield f"  at poses left out of the fit: {found.held_out_mm:.2g} mm root mean square"
 
 
 def _parts(found: Confirmation) -> Iterator[str]:
     """Tool, base, joints and entries that are other."""
-    for name, place in (("tool", found.tool), ("base", found.base)):
-        if place is not None:
-            yield sentence(f"confirm.{name}", place=_place(place, turned=found.oriented or name == "base"))
-    yield from (say(each) for each in found.joints)
+    if found.tool is not None:
+        yield f"tool of the controller: {_place(found.tool, found.oriented)}; or select the flange and read again"
+    if found.base is not None:
+        yield f"base of the controller: {_place(found.base, True)}; or select base 0 and read again"
+    yield from map(_joint, found.joints)
     for each in found.entries:
-        values = {"given": each.given, "value": each.found, "half_width": each.half_width}
+        given, value = as_text(each.given, ".3f"), as_text(each.found, ".3f")
+        width, joint = f"(+-{each.half_width:.2g})", each.entry.joint
         if each.entry.column == "offset":
-            yield sentence("confirm.zero", joint=each.entry.joint, change=each.found - each.given, **values)
+            yield (
+                f"zero of J{joint} is {as_text(each.found - each.given, '+.3f')} deg off {width}; offset_deg of row "
+                f"{joint}: {given} -> {value}. Zero is defined otherwise, or the joint was mastered wrong: compare its "
+                "marks"
+            )
         else:
-            yield sentence("confirm.entry", name=each.entry.name, unit=each.entry.unit, **values)
+            yield f"{each.entry.name}: {given} -> {value} {each.entry.unit} {width}"
 
 
-def _place(place: Placed, *, turned: bool) -> str:
-    xyz = _for_a_file(place.xyz_mm, 2)
+def _place(place: Placed, turned: bool) -> str:
+    xyz, mm = _for_a_file(place.xyz_mm, 2), f"+-{place.half_width_mm:.2g} mm"
     if not turned:
-        return sentence("confirm.point", xyz=xyz, mm=place.half_width_mm)
-    rpy = _for_a_file(place.rpy_deg, 3)
-    return sentence("confirm.place", xyz=xyz, rpy=rpy, mm=place.half_width_mm, deg=place.half_width_deg)
+        return f"{{xyz_mm: {xyz}}} ({mm})"
+    return f"{{xyz_mm: {xyz}, rpy_deg: {_for_a_file(place.rpy_deg, 3)}}} ({mm}, {place.half_width_deg:.2g} deg)"
+
+
+def _joint(found: Finding) -> str:
+    params = dict(found.params)
+    if found.code == "counted_from":
+        params["rows"] = (
+            f"[{{row: {found.joint}, joints: [{found.by}, {found.joint}], factors: [{found.factor:.0f}, 1]}}]"
+        )
+    if found.code == "zero_elsewhere":
+        params["deg"] = as_text(found.deg, ".0f")
+    return JOINTS[found.code].format(**params)
+
+
+def _alike(found: Finding) -> list[str]:
+    """What else explains the poses as well."""
+    places, zeros = (f"another {place}" for place in found.places), (f"zero of J{joint}" for joint in found.zeros)
+    return [*map(_joint, found.joints), *places, *zeros, *found.entries] or [NOTHING]
 
 
 def _for_a_file(values: Reals, decimals: int) -> str:
@@ -199,30 +190,6 @@ def _change(each: FoundEntry) -> str:
 def _listed(lines: Integers) -> str:
     shown = ", ".join(str(line) for line in sorted(lines.tolist())[:SHOWN_LINES])
     return shown + (" ..." if len(lines) > SHOWN_LINES else "")
-
-
-@says("counted_from")
-def _(found: Finding) -> str:
-    factors = f"joints: [{found.by}, {found.joint}], factors: [{found.factor:.0f}, 1]"
-    return say_as(found, rows=f"[{{row: {found.joint}, {factors}}}]")
-
-
-@says("explains_too")
-def _(found: Finding) -> str:
-    what = [say(each) for each in found.joints]
-    what += [sentence(f"confirm.place_alike#{place}") for place in found.places]
-    what += [*(sentence("confirm.zero_alike", joint=joint) for joint in found.zeros), *found.entries]
-    return sentence("explains_too", what=tuple(what or [sentence("confirm.nothing")]))
-
-
-def _open_lines(found: Confirmation) -> Iterator[str]:
-    if found.verdict != "open":
-        names = joined(found.not_settled, ", ")
-        yield sentence("confirm.not_settled", entries=names) if names else sentence("confirm.all_settled")
-    if found.taken_up:
-        yield sentence("confirm.taken_up", entries=joined(found.taken_up, ", "))
-    if not found.oriented:
-        yield sentence("confirm.no_orientations")
 
 
 def _table(found: Confirmation) -> list[str]:
@@ -286,15 +253,25 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+PLAN = (
+    "{poses} poses: move there slowly, with the flange as tool and the robot's own base. Write down what the pendant "
+    "shows. Below each pose is what the model says, X Y Z in mm, A B C in deg (Rz Ry Rx)"
+)
+PLAN_SAFE = {
+    True: "within limits, clear of arm and base, away from singular poses; cell unknown",
+    False: "within limits, above the base, away from singular poses; shapes and cell unknown",
+}
+
+
 def plan_lines(found: Plan, robot: Robot) -> list[str]:
     """A plan as a sheet to print and fill in: joint values, and what the pendant should show."""
     names = [f"J{k + 1}" for k in range(robot.joints)]
     pose = ("X", "Y", "Z", "A", "B", "C")
-    lines = [sentence("confirm.plan", poses=len(found.q)), "  ".join(f"{name:>8}" for name in (*names, *pose))]
+    lines = [PLAN.format(poses=len(found.q)), "  ".join(f"{name:>8}" for name in (*names, *pose))]
     for q, T in zip(shown(robot, found.q), found.T):
         values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in (*(1000 * T[:3, 3]), *_abc(T)))]
-        lines += ["  ".join(values), sentence("confirm.shown", blanks="  ".join(["________"] * len(pose)))]
-    return [*lines, sentence("confirm.plan_safe#shapes" if found.shapes else "confirm.plan_safe#none")]
+        lines += ["  ".join(values), f"the pendant shows: {'  '.join(['________'] * len(pose))}"]
+    return [*lines, PLAN_SAFE[bool(found.shapes)]]
 
 
 def table_to_fill(found: Plan, robot: Robot) -> str:

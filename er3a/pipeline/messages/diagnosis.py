@@ -4,47 +4,57 @@ from __future__ import annotations
 
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_, as_text, with_unit
+from er3a.pipeline.language import as_text, with_unit, words
 from er3a.pipeline.messages.kinematics import sum_of_joints
 from er3a.pipeline.messages.pages import SIDES
 from er3a.pipeline.messages.say import FORMATS, WORDS, joined, listed, say_as, says, sentence, texts, word
 
-ENTRIES = {
-    "rows": N_("all rows"),
-    "a": N_("column a"),
-    "d": N_("column d"),
-    "lengths": N_("all lengths"),
-    "alpha": N_("column alpha"),
-    "offset": N_("column offset"),
-    "limits": N_("joint limits"),
-    "angles": N_("all angles"),
-}
-MISREAD = {
-    "metres_as_millimetres": N_("metres read as millimetres"),
-    "millimetres_as_metres": N_("millimetres read as metres"),
-    "radians_as_degrees": N_("radians read as degrees"),
-    "degrees_as_radians": N_("degrees read as radians"),
-}
-TOWARD = {"up": N_("up"), "down": N_("down")}
-CONVENTIONS = {"standard": N_("standard"), "modified": N_("modified")}
-LIMIT_FAULTS = {
-    "crossed": N_("lower limit above the upper one"),
-    "signs_swapped": N_("both limits have the wrong sign"),
-    "lower_sign": N_("lower limit has the wrong sign"),
-    "upper_sign": N_("upper limit has the wrong sign"),
-}
-TOUCHED = {
-    "place": N_("poses at each place"),
-    "plane": N_("poses in each plane"),
-    "bar": N_("poses with each bar"),
-    "pair": N_("pairs"),
-}
+ENTRIES = words(
+    {
+        "rows": "all rows",
+        "a": "column a",
+        "d": "column d",
+        "lengths": "all lengths",
+        "alpha": "column alpha",
+        "offset": "column offset",
+        "limits": "joint limits",
+        "angles": "all angles",
+    }
+)
+MISREAD = words(
+    {
+        "metres_as_millimetres": "metres read as millimetres",
+        "millimetres_as_metres": "millimetres read as metres",
+        "radians_as_degrees": "radians read as degrees",
+        "degrees_as_radians": "degrees read as radians",
+    }
+)
+TOWARD = words({"up": "up", "down": "down"})
+CONVENTIONS = words({"standard": "standard", "modified": "modified"})
+LIMIT_FAULTS = words(
+    {
+        "crossed": "lower limit above the upper one",
+        "signs_swapped": "both limits have the wrong sign",
+        "lower_sign": "lower limit has the wrong sign",
+        "upper_sign": "upper limit has the wrong sign",
+    }
+)
+TOUCHED = words(
+    {
+        "place": "poses at each place",
+        "plane": "poses in each plane",
+        "bar": "poses with each bar",
+        "pair": "pairs",
+    }
+)
 MIN_SHOWN, MIN_FITTED = 0.005, 5e-5
-LEVELS = {
-    "lengths": N_("lengths"),
-    "lengths_and_offsets": N_("lengths and joint offsets"),
-    "all_entries": N_("all entries"),
-}
+LEVELS = words(
+    {
+        "lengths": "lengths",
+        "lengths_and_offsets": "lengths and joint offsets",
+        "all_entries": "all entries",
+    }
+)
 
 
 TEXTS = texts(

@@ -10,7 +10,7 @@ import numpy as np
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import own_title, tr, words
 from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import body_word, names_in_words
@@ -19,55 +19,65 @@ from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
 from er3a.robots.robot import Grade, Robot
 
-QUANTITIES: dict[model.Quantity, str] = {
-    "peak": N_("peak torque"),
-    "rms": N_("RMS torque"),
-    "holding": N_("holding torque"),
-    "payload": N_("payload"),
-    "moment": N_("wrist moment"),
-    "inertia": N_("wrist inertia"),
-}
-NEEDS: dict[model.Need, str] = {
-    "masses": N_("mass, centre of mass and inertia of the links"),
-    "peak": N_("peak torques of the drives"),
-    "rated": N_("rated torques of the drives"),
-    "armature": N_("rotor inertias and gear ratios"),
-    "friction": N_("friction of the joints"),
-    "wrist_moment": N_("allowed moments at the wrist"),
-    "wrist_inertia": N_("allowed inertias at the wrist"),
-    "payload": N_("rated payload"),
-    "load": N_("mass, centre and inertia of tool and payload"),
-    "tool": N_("mass of the tool"),
-    "carried": N_("mass of what the tool carries"),
-    "load_centre": N_("centre of mass of tool or payload"),
-    "load_inertia": N_("inertia of tool or payload"),
-    "drives_guess": N_("the drives' limits, which the robot's file guesses"),
-    "wrist_guess": N_("the wrist's limits, which the robot's file guesses"),
-    "load_guess": N_("the mass of tool or payload, which the study guesses"),
-}
+QUANTITIES: dict[model.Quantity, str] = words(
+    {
+        "peak": "peak torque",
+        "rms": "RMS torque",
+        "holding": "holding torque",
+        "payload": "payload",
+        "moment": "wrist moment",
+        "inertia": "wrist inertia",
+    }
+)
+NEEDS: dict[model.Need, str] = words(
+    {
+        "masses": "mass, centre of mass and inertia of the links",
+        "peak": "peak torques of the drives",
+        "rated": "rated torques of the drives",
+        "armature": "rotor inertias and gear ratios",
+        "friction": "friction of the joints",
+        "wrist_moment": "allowed moments at the wrist",
+        "wrist_inertia": "allowed inertias at the wrist",
+        "payload": "rated payload",
+        "load": "mass, centre and inertia of tool and payload",
+        "tool": "mass of the tool",
+        "carried": "mass of what the tool carries",
+        "load_centre": "centre of mass of tool or payload",
+        "load_inertia": "inertia of tool or payload",
+        "drives_guess": "the drives' limits, which the robot's file guesses",
+        "wrist_guess": "the wrist's limits, which the robot's file guesses",
+        "load_guess": "the mass of tool or payload, which the study guesses",
+    }
+)
 names_in_words("load", "dynamics.need", NEEDS)
-KEY_FIGURES = {
-    "paths": N_("Paths that count"),
-    "mass": N_("Mass of the links"),
-    "peak_torque": N_("Greatest torque on a path that the model does not rule out"),
-    "holding_torque": N_("Greatest holding torque found"),
-    "energy": N_("Greatest energy of a path that the model does not rule out"),
-    "utilisation": N_("Highest utilisation of a limit"),
-    "power_balance": N_("Power balance, greatest error"),
-}
-GRADED: dict[Grade, str] = {
-    "cad": N_("taken from a CAD model"),
-    "export": N_("exported from a CAD model"),
-    "claim": N_("claimed by others"),
-    "inferred": N_("inferred (orders of magnitude only)"),
-}
-BINDING: dict[Binding, str] = {"peak": N_("peak"), "rms": N_("RMS"), "speed": N_("speed")}
-WHY: dict[NoBody, str] = {
-    "not_finite": N_("contains something that is not a number"),
-    "negative_mass": N_("its mass is below 0"),
-    "negative_moment": N_("a principal moment is below 0"),
-    "triangle": N_("a principal moment exceeds the sum of the other two"),
-}
+KEY_FIGURES = words(
+    {
+        "paths": "Paths that count",
+        "mass": "Mass of the links",
+        "peak_torque": "Greatest torque on a path that the model does not rule out",
+        "holding_torque": "Greatest holding torque found",
+        "energy": "Greatest energy of a path that the model does not rule out",
+        "utilisation": "Highest utilisation of a limit",
+        "power_balance": "Power balance, greatest error",
+    }
+)
+GRADED: dict[Grade, str] = words(
+    {
+        "cad": "taken from a CAD model",
+        "export": "exported from a CAD model",
+        "claim": "claimed by others",
+        "inferred": "inferred (orders of magnitude only)",
+    }
+)
+BINDING: dict[Binding, str] = words({"peak": "peak", "rms": "RMS", "speed": "speed"})
+WHY: dict[NoBody, str] = words(
+    {
+        "not_finite": "contains something that is not a number",
+        "negative_mass": "its mass is below 0",
+        "negative_moment": "a principal moment is below 0",
+        "triangle": "a principal moment exceeds the sum of the other two",
+    }
+)
 
 
 TEXTS = texts(
@@ -112,23 +122,25 @@ TEXTS = texts(
     }
 )
 WORDS.update(
-    {
-        "dynamics.need": NEEDS,
-        "dynamics.graded_as": GRADED,
-        "dynamics.why": WHY,
-        "dynamics.path": {None: N_("holding still")},
-        "dynamics.masses": {True: N_("masses are uncertain"), False: N_("not everything was examined")},
-        "dynamics.massless": {
-            False: N_("it counts as massless"),
-            True: N_("its joint's torque counts as 0, and forward dynamics has no value"),
-        },
-        "payload.source": {"": N_("the robot's file")},
-        "payload.doubt": {
-            "official": N_("don't rely on it alone"),
-            "official_alone": N_("wrist moments and inertias unknown: don't rely on it alone"),
-            "claim": N_("nothing confirms it: don't rely on it"),
-        },
-    }
+    words(
+        {
+            "dynamics.need": NEEDS,
+            "dynamics.graded_as": GRADED,
+            "dynamics.why": WHY,
+            "dynamics.path": {None: "holding still"},
+            "dynamics.masses": {True: "masses are uncertain", False: "not everything was examined"},
+            "dynamics.massless": {
+                False: "it counts as massless",
+                True: "its joint's torque counts as 0, and forward dynamics has no value",
+            },
+            "payload.source": {"": "the robot's file"},
+            "payload.doubt": {
+                "official": "don't rely on it alone",
+                "official_alone": "wrist moments and inertias unknown: don't rely on it alone",
+                "claim": "nothing confirms it: don't rely on it",
+            },
+        }
+    )
 )
 
 

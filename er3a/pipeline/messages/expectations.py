@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.language import N_
+from er3a.pipeline.language import words
 from er3a.pipeline.messages.say import WORDS, sentence, texts, word
 from er3a.pipeline.stages.expectations import Judged, Outcome, came_to, expected_of, is_met
 
-OUTCOMES: dict[Outcome, str] = {
-    "unreachable": N_("unreachable"),
-    "none found": N_("none found"),
-    "leaves limits": N_("leaves limits"),
-    "collides": N_("collides"),
-    "too fast": N_("too fast"),
-    "singular": N_("singular"),
-    "too fast for the assumed limits": N_("too fast for the assumed limits"),
-    "undecided": N_("undecided"),
-    "near-singular": N_("near-singular"),
-    "safe": N_("safe in the model"),
-    "reached": N_("reached"),
-    "pass": N_("pass"),
-    "caution": N_("caution"),
-    "fail": N_("fail"),
-    "grasped": N_("grasped"),
-    "not graspable": N_("not graspable"),
-}
+OUTCOMES: dict[Outcome, str] = words(
+    {
+        "unreachable": "unreachable",
+        "none found": "none found",
+        "leaves limits": "leaves limits",
+        "collides": "collides",
+        "too fast": "too fast",
+        "singular": "singular",
+        "too fast for the assumed limits": "too fast for the assumed limits",
+        "undecided": "undecided",
+        "near-singular": "near-singular",
+        "safe": "safe in the model",
+        "reached": "reached",
+        "pass": "pass",
+        "caution": "caution",
+        "fail": "fail",
+        "grasped": "grasped",
+        "not graspable": "not graspable",
+    }
+)
 
 
 TEXTS = texts(

@@ -4,38 +4,44 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, as_text, with_unit
+from er3a.pipeline.language import N_, as_text, with_unit, words
 from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
 
-KEY_FIGURES = {
-    "targets_solved": N_("targets solved"),
-    "solutions_of_random_pose": N_("solutions of a random reachable pose, mean"),
-    "random_poses_solved_back": N_("random poses solved back to their joints"),
-    "worst_position_residual": N_("worst position residual"),
-    "worst_orientation_residual": N_("worst orientation residual"),
-}
+KEY_FIGURES = words(
+    {
+        "targets_solved": "targets solved",
+        "solutions_of_random_pose": "solutions of a random reachable pose, mean",
+        "random_poses_solved_back": "random poses solved back to their joints",
+        "worst_position_residual": "worst position residual",
+        "worst_orientation_residual": "worst orientation residual",
+    }
+)
 NEAREST_RULE = N_(
     "Of the solutions within the limits, take the one with the smallest maximum joint motion from the reference: where "
     "all joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
     "smaller root of the summed squares of all joint motions decides, then the lower branch number."
 )
-FREE_AT = {
-    "wrist": N_("axes 4 and 6 collinear"),
-    "shoulder": N_("wrist centre on axis 1"),
-    "elbow": N_("arm folded onto itself"),
-    "curve": N_("self-motion"),
-}
-SHAPES = {
-    "front_elbow_up_no_flip": N_("front, elbow up"),
-    "front_elbow_up_flip": N_("front, elbow up"),
-    "front_elbow_down_no_flip": N_("front, elbow down"),
-    "front_elbow_down_flip": N_("front, elbow down"),
-    "back_elbow_up_no_flip": N_("back, elbow up"),
-    "back_elbow_up_flip": N_("back, elbow up"),
-    "back_elbow_down_no_flip": N_("back, elbow down"),
-    "back_elbow_down_flip": N_("back, elbow down"),
-}
+FREE_AT = words(
+    {
+        "wrist": "axes 4 and 6 collinear",
+        "shoulder": "wrist centre on axis 1",
+        "elbow": "arm folded onto itself",
+        "curve": "self-motion",
+    }
+)
+SHAPES = words(
+    {
+        "front_elbow_up_no_flip": "front, elbow up",
+        "front_elbow_up_flip": "front, elbow up",
+        "front_elbow_down_no_flip": "front, elbow down",
+        "front_elbow_down_flip": "front, elbow down",
+        "back_elbow_up_no_flip": "back, elbow up",
+        "back_elbow_up_flip": "back, elbow up",
+        "back_elbow_down_no_flip": "back, elbow down",
+        "back_elbow_down_flip": "back, elbow down",
+    }
+)
 
 
 TEXTS = texts(
@@ -71,7 +77,7 @@ TEXTS = texts(
         ),
     }
 )
-WORDS["inverse.collisions"] = {True: N_("collisions"), False: N_("self-collision")}
+WORDS["inverse.collisions"] = words({True: "collisions", False: "self-collision"})
 
 
 same_text("inverse.targets", "inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")

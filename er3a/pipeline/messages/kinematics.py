@@ -7,78 +7,90 @@ from collections.abc import Sequence
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding, is_one
 from er3a.kinematics.solutions import Label
-from er3a.pipeline.language import N_
+from er3a.pipeline.language import words
 from er3a.pipeline.messages.say import FORMATS, WORDS, say, say_as, says, sentence, texts, word
 
-BRANCHES = {
-    "front_elbow_up_no_flip": N_("front, elbow up, no flip"),
-    "front_elbow_up_flip": N_("front, elbow up, flip"),
-    "front_elbow_down_no_flip": N_("front, elbow down, no flip"),
-    "front_elbow_down_flip": N_("front, elbow down, flip"),
-    "back_elbow_up_no_flip": N_("back, elbow up, no flip"),
-    "back_elbow_up_flip": N_("back, elbow up, flip"),
-    "back_elbow_down_no_flip": N_("back, elbow down, no flip"),
-    "back_elbow_down_flip": N_("back, elbow down, flip"),
-    "shoulder_plus_elbow_plus_wrist_plus": N_("shoulder +, elbow +, wrist +"),
-    "shoulder_plus_elbow_plus_wrist_minus": N_("shoulder +, elbow +, wrist -"),
-    "shoulder_plus_elbow_minus_wrist_plus": N_("shoulder +, elbow -, wrist +"),
-    "shoulder_plus_elbow_minus_wrist_minus": N_("shoulder +, elbow -, wrist -"),
-    "shoulder_minus_elbow_plus_wrist_plus": N_("shoulder -, elbow +, wrist +"),
-    "shoulder_minus_elbow_plus_wrist_minus": N_("shoulder -, elbow +, wrist -"),
-    "shoulder_minus_elbow_minus_wrist_plus": N_("shoulder -, elbow -, wrist +"),
-    "shoulder_minus_elbow_minus_wrist_minus": N_("shoulder -, elbow -, wrist -"),
-    "elbow_plus": N_("elbow +"),
-    "elbow_minus": N_("elbow -"),
-    "wrist_plus": N_("wrist +"),
-    "wrist_minus": N_("wrist -"),
-}
-ARM_CLASSES = {
-    "spherical_wrist": N_("spherical wrist, axes 2 and 3 parallel: up to 8 solutions in closed form"),
-    "three_parallel": N_("axes 2, 3 and 4 parallel: up to 8 solutions in closed form"),
-    "general_six": N_("six revolute joints without special geometry: up to 16 solutions by elimination"),
-    "six_one_prismatic": N_("six joints, one of them sliding: up to 16 solutions by elimination"),
-    "six_two_prismatic": N_("six joints, two of them sliding: up to 8 solutions by elimination"),
-    "gantry": N_("three sliding joints and three that turn: two solutions in closed form"),
-    "arm_angle": N_("spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle"),
-    "redundant": N_("more than six joints: solutions at given values of the redundant ones, and self-motions"),
-    "scara": N_("SCARA: two solutions for x, y, z and yaw in closed form"),
-    "free_roll": N_(
-        "five joints: the roll about the tool's axis is free (z of a tool turned from the flange, else axis 5)"
-    ),
-    "planar_wrist": N_("fewer than six joints: solutions of poses that they can reach exactly"),
-    "position": N_("three joints: solutions for the tool point"),
-    "dependent": N_("joints that move the tool in fewer ways than there are joints: by iteration"),
-    "unsolved": N_("no class"),
-}
-SIDES = {"front": N_("front"), "back": N_("back")}
-SINGULARITIES = {
-    "wrist": N_("wrist"),
-    "elbow": N_("elbow"),
-    "shoulder": N_("shoulder"),
-    "dependent_axes": N_("rank loss"),
-}
-SINGULAR_POSES = {
-    "wrist": N_("J4 and J6 in line"),
-    "elbow": N_("the arm stretched or folded"),
-    "shoulder": N_("the wrist centre on axis 1"),
-}
-RULE_NAMES = {
-    "nearest": N_("nearest"),
-    "weighted": N_("weighted"),
-    "time": N_("time"),
-    "manipulability": N_("manipulability"),
-    "limits": N_("limits"),
-    "clearance": N_("clearance"),
-    "mix": N_("mix"),
-}
-RULE_TITLES = {
-    "nearest": N_("smallest maximum joint motion"),
-    "weighted": N_("least joint moves, weighted by how far each joint swings the tool"),
-    "time": N_("least time at the joint speeds"),
-    "manipulability": N_("farthest from singularities (manipulability)"),
-    "limits": N_("farthest from the joint limits"),
-    "clearance": N_("farthest from obstacles and from itself"),
-}
+BRANCHES = words(
+    {
+        "front_elbow_up_no_flip": "front, elbow up, no flip",
+        "front_elbow_up_flip": "front, elbow up, flip",
+        "front_elbow_down_no_flip": "front, elbow down, no flip",
+        "front_elbow_down_flip": "front, elbow down, flip",
+        "back_elbow_up_no_flip": "back, elbow up, no flip",
+        "back_elbow_up_flip": "back, elbow up, flip",
+        "back_elbow_down_no_flip": "back, elbow down, no flip",
+        "back_elbow_down_flip": "back, elbow down, flip",
+        "shoulder_plus_elbow_plus_wrist_plus": "shoulder +, elbow +, wrist +",
+        "shoulder_plus_elbow_plus_wrist_minus": "shoulder +, elbow +, wrist -",
+        "shoulder_plus_elbow_minus_wrist_plus": "shoulder +, elbow -, wrist +",
+        "shoulder_plus_elbow_minus_wrist_minus": "shoulder +, elbow -, wrist -",
+        "shoulder_minus_elbow_plus_wrist_plus": "shoulder -, elbow +, wrist +",
+        "shoulder_minus_elbow_plus_wrist_minus": "shoulder -, elbow +, wrist -",
+        "shoulder_minus_elbow_minus_wrist_plus": "shoulder -, elbow -, wrist +",
+        "shoulder_minus_elbow_minus_wrist_minus": "shoulder -, elbow -, wrist -",
+        "elbow_plus": "elbow +",
+        "elbow_minus": "elbow -",
+        "wrist_plus": "wrist +",
+        "wrist_minus": "wrist -",
+    }
+)
+ARM_CLASSES = words(
+    {
+        "spherical_wrist": "spherical wrist, axes 2 and 3 parallel: up to 8 solutions in closed form",
+        "three_parallel": "axes 2, 3 and 4 parallel: up to 8 solutions in closed form",
+        "general_six": "six revolute joints without special geometry: up to 16 solutions by elimination",
+        "six_one_prismatic": "six joints, one of them sliding: up to 16 solutions by elimination",
+        "six_two_prismatic": "six joints, two of them sliding: up to 8 solutions by elimination",
+        "gantry": "three sliding joints and three that turn: two solutions in closed form",
+        "arm_angle": "spherical shoulder and wrist: up to 8 solutions in closed form at each arm angle",
+        "redundant": "more than six joints: solutions at given values of the redundant ones, and self-motions",
+        "scara": "SCARA: two solutions for x, y, z and yaw in closed form",
+        "free_roll": (
+            "five joints: the roll about the tool's axis is free (z of a tool turned from the flange, else axis 5)"
+        ),
+        "planar_wrist": "fewer than six joints: solutions of poses that they can reach exactly",
+        "position": "three joints: solutions for the tool point",
+        "dependent": "joints that move the tool in fewer ways than there are joints: by iteration",
+        "unsolved": "no class",
+    }
+)
+SIDES = words({"front": "front", "back": "back"})
+SINGULARITIES = words(
+    {
+        "wrist": "wrist",
+        "elbow": "elbow",
+        "shoulder": "shoulder",
+        "dependent_axes": "rank loss",
+    }
+)
+SINGULAR_POSES = words(
+    {
+        "wrist": "J4 and J6 in line",
+        "elbow": "the arm stretched or folded",
+        "shoulder": "the wrist centre on axis 1",
+    }
+)
+RULE_NAMES = words(
+    {
+        "nearest": "nearest",
+        "weighted": "weighted",
+        "time": "time",
+        "manipulability": "manipulability",
+        "limits": "limits",
+        "clearance": "clearance",
+        "mix": "mix",
+    }
+)
+RULE_TITLES = words(
+    {
+        "nearest": "smallest maximum joint motion",
+        "weighted": "least joint moves, weighted by how far each joint swings the tool",
+        "time": "least time at the joint speeds",
+        "manipulability": "farthest from singularities (manipulability)",
+        "limits": "farthest from the joint limits",
+        "clearance": "farthest from obstacles and from itself",
+    }
+)
 
 
 TEXTS = texts(
@@ -127,17 +139,19 @@ TEXTS = texts(
     }
 )
 WORDS.update(
-    {
-        "solved_by": {
-            "other_starts": N_("from the start given; allow restarts"),
-            "without_limits": N_("search without limits (respect_limits=False)"),
-        },
-        "arm_class": ARM_CLASSES,
-        "arm_side": SIDES,
-        "singularity": SINGULARITIES,
-        "singular_pose": SINGULARITIES | SINGULAR_POSES,
-        "rule": RULE_NAMES,
-    }
+    words(
+        {
+            "solved_by": {
+                "other_starts": "from the start given; allow restarts",
+                "without_limits": "search without limits (respect_limits=False)",
+            },
+            "arm_class": ARM_CLASSES,
+            "arm_side": SIDES,
+            "singularity": SINGULARITIES,
+            "singular_pose": SINGULARITIES | SINGULAR_POSES,
+            "rule": RULE_NAMES,
+        }
+    )
 )
 
 

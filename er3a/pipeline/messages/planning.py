@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.kinematics  # noqa: F401
 from er3a.finding import Amount
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, tr, words
 from er3a.pipeline.messages.say import WORDS, says, sentence, texts
 from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import StrategyName
 
-STRATEGIES: dict[StrategyName, str] = {
-    "slow": N_("Keep the path and slow down"),
-    "branch": N_("Switch to another IK solution first"),
-    "via_shift": N_("Route the path through a shifted via point"),
-    "via_tilt": N_("Route the path through a tilted via point"),
-    "detour": N_("Cross the region by a joint move"),
-    "stop": N_("Stop before the region with an alarm"),
-    "planned": N_("Use another motion instead, planned in joint space"),
-}
+STRATEGIES: dict[StrategyName, str] = words(
+    {
+        "slow": "Keep the path and slow down",
+        "branch": "Switch to another IK solution first",
+        "via_shift": "Route the path through a shifted via point",
+        "via_tilt": "Route the path through a tilted via point",
+        "detour": "Cross the region by a joint move",
+        "stop": "Stop before the region with an alarm",
+        "planned": "Use another motion instead, planned in joint space",
+    }
+)
 
 FAR = 10.0  # times a limit, beyond which a rate is rounded to two digits: the others depend on where it was sampled
 UNITS = (N_("deg/s²"), N_("deg/s³"))
@@ -57,8 +59,8 @@ TEXTS = texts(
         "undecided": "not decided between the poses solved",
     }
 )
-WORDS["end"] = {"start": N_("start"), "end": N_("end")}
-WORDS["rate"] = {"speed": N_("speed"), "acceleration": N_("acceleration")}
+WORDS["end"] = words({"start": "start", "end": "end"})
+WORDS["rate"] = words({"speed": "speed", "acceleration": "acceleration"})
 
 
 def unit_of(slides: bool) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Amount, Finding, is_one
 from er3a.kinematics.singularity import SingularityType
-from er3a.pipeline.language import N_, tr
+from er3a.pipeline.language import N_, tr, words
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose
 from er3a.pipeline.messages.planning import rate_needed
@@ -29,84 +29,96 @@ from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.program_check.check_program import ProgramCheck
 from er3a.program_check.program_check_findings import RANKS, Level, NotFollowedReason
 
-LEVELS: dict[Level, str] = {
-    "pass": N_("pass"),
-    "note": N_("note"),
-    "caution": N_("caution"),
-    "fail": N_("fail"),
-}
-REASONS: dict[NotFollowedReason, str] = {
-    "undefined": N_("its value is not in the program"),
-    "not_finite": N_("it is no finite number"),
-    "too_far": N_("it is more than 100 m away, as where millimetres were written for metres"),
-    "position_unknown": N_("it depends on where the arm stands, which is not known"),
-    "external_tool": N_("the workpiece is moved along a fixed tool"),
-    "not_understood": N_("it is no target of this motion"),
-    "too_many_joints": N_("it refers to axes that the arm does not have"),
-    "instruction": N_("it may do anything that is not known here"),
-    "setting": N_("motions are not followed as it asks"),
-    "tool": N_("this tool is not given"),
-    "base": N_("this base is not given"),
-    "turns_with_path": N_("it turns the tool with its path (CirPathMode)"),
-    "external_axes": N_("these axes were taken to rest"),
-    "arc_angle": N_("the arc does not end at its target"),
-    "half_turn": N_("the tool turns by half a turn, either way round"),
-    "redundant": N_("the arm can move along it in more ways than one"),
-    "operations": N_("the program carries out too many instructions"),
-    "ways": N_("the program has too many sides of branches that only the cell decides"),
-    "depth": N_("too many calls are within each other"),
-    "unreached": N_("nothing leads to it"),
-}
+LEVELS: dict[Level, str] = words(
+    {
+        "pass": "pass",
+        "note": "note",
+        "caution": "caution",
+        "fail": "fail",
+    }
+)
+REASONS: dict[NotFollowedReason, str] = words(
+    {
+        "undefined": "its value is not in the program",
+        "not_finite": "it is no finite number",
+        "too_far": "it is more than 100 m away, as where millimetres were written for metres",
+        "position_unknown": "it depends on where the arm stands, which is not known",
+        "external_tool": "the workpiece is moved along a fixed tool",
+        "not_understood": "it is no target of this motion",
+        "too_many_joints": "it refers to axes that the arm does not have",
+        "instruction": "it may do anything that is not known here",
+        "setting": "motions are not followed as it asks",
+        "tool": "this tool is not given",
+        "base": "this base is not given",
+        "turns_with_path": "it turns the tool with its path (CirPathMode)",
+        "external_axes": "these axes were taken to rest",
+        "arc_angle": "the arc does not end at its target",
+        "half_turn": "the tool turns by half a turn, either way round",
+        "redundant": "the arm can move along it in more ways than one",
+        "operations": "the program carries out too many instructions",
+        "ways": "the program has too many sides of branches that only the cell decides",
+        "depth": "too many calls are within each other",
+        "unreached": "nothing leads to it",
+    }
+)
 NEARER = N_("Move the target nearer to the arm, or tilt the tool towards it.")
 OTHER_SOLUTION = N_(
     "Correct the target's joint values; if it is given as a pose, give it another orientation or place."
 )
 FRAMES = N_("Map the name to a frame under frames in the file that lists the programs (--frames).")
-REMEDIES: dict[str, str] = {
-    "limit_exceeded": OTHER_SOLUTION,
-    "combination_exceeded": OTHER_SOLUTION,
-    "target_out_of_reach": NEARER,
-    "way_out_of_reach": NEARER,
-    "configuration_ends": N_("End the line before that point: it does not lead on in this configuration."),
-    "joint_jumps": N_("Teach the target with this joint near to where it comes from."),
-    "whole_turn": N_("Teach the target with the nearer angle, unless the turn is meant to unwind cables."),
-    "arrives_otherwise": N_("Teach the target again where the line arrives."),
-    "configuration_not_met": N_("Teach the target again, or correct its configuration."),
-    "configuration_guessed": N_("Give start_deg of the program (--start), or begin with a move to joint angles."),
-    "way_not_known": N_("Give start_deg of the program (--start), or mend the motion before."),
-    "pairs_unexamined": N_("Correct these shapes in the robot's file, or allow the pair there with a reason."),
-    "zone_collides": N_("Make the zone smaller, or stop at the corner."),
-    "clearance_not_proven": N_("Give the check more time."),
-    "program_nothing_moves": N_("Check that this is the program to run."),
-    "program_not_understood": N_("Compare this line with the controller's manual."),
-    "speed_not_given": N_("Give a speed, as a number above 0, before the motion (KRL: $VEL.CP in m/s, 3 at most)."),
-    "frames_from_robot_file": N_("Set tool and base in the program before its first pose."),
-    "load_above_payload": N_("Carry less, or correct the load if it is wrong."),
-    "suspect_number": N_("Correct it if it is a mistake."),
-}
-NOT_FOLLOWED: dict[NotFollowedReason, str] = {
-    "undefined": N_("Put the file beside the program that gives it, or give its value by --assume NAME=VALUE."),
-    "position_unknown": N_("Give start_deg of the program (--start), or begin with a move to joint angles."),
-    "too_far": N_("Write the target in the unit of the language: metres in URScript, mm in the others."),
-    "instruction": N_("Put the module that holds it beside the program; if it moves nothing, say so by --assume."),
-    "tool": FRAMES,
-    "base": FRAMES,
-    "half_turn": N_("Turn the tool in two lines by 90 deg each, or by a joint motion."),
-    "unreached": N_("Check what leads to this motion, or remove it if nothing does."),
-}
+REMEDIES: dict[str, str] = words(
+    {
+        "limit_exceeded": OTHER_SOLUTION,
+        "combination_exceeded": OTHER_SOLUTION,
+        "target_out_of_reach": NEARER,
+        "way_out_of_reach": NEARER,
+        "configuration_ends": "End the line before that point: it does not lead on in this configuration.",
+        "joint_jumps": "Teach the target with this joint near to where it comes from.",
+        "whole_turn": "Teach the target with the nearer angle, unless the turn is meant to unwind cables.",
+        "arrives_otherwise": "Teach the target again where the line arrives.",
+        "configuration_not_met": "Teach the target again, or correct its configuration.",
+        "configuration_guessed": "Give start_deg of the program (--start), or begin with a move to joint angles.",
+        "way_not_known": "Give start_deg of the program (--start), or mend the motion before.",
+        "pairs_unexamined": "Correct these shapes in the robot's file, or allow the pair there with a reason.",
+        "zone_collides": "Make the zone smaller, or stop at the corner.",
+        "clearance_not_proven": "Give the check more time.",
+        "program_nothing_moves": "Check that this is the program to run.",
+        "program_not_understood": "Compare this line with the controller's manual.",
+        "speed_not_given": "Give a speed, as a number above 0, before the motion (KRL: $VEL.CP in m/s, 3 at most).",
+        "frames_from_robot_file": "Set tool and base in the program before its first pose.",
+        "load_above_payload": "Carry less, or correct the load if it is wrong.",
+        "suspect_number": "Correct it if it is a mistake.",
+    }
+)
+NOT_FOLLOWED: dict[NotFollowedReason, str] = words(
+    {
+        "undefined": "Put the file beside the program that gives it, or give its value by --assume NAME=VALUE.",
+        "position_unknown": "Give start_deg of the program (--start), or begin with a move to joint angles.",
+        "too_far": "Write the target in the unit of the language: metres in URScript, mm in the others.",
+        "instruction": "Put the module that holds it beside the program; if it moves nothing, say so by --assume.",
+        "tool": FRAMES,
+        "base": FRAMES,
+        "half_turn": "Turn the tool in two lines by 90 deg each, or by a joint motion.",
+        "unreached": "Check what leads to this motion, or remove it if nothing does.",
+    }
+)
 OTHERWISE = N_("Watch this line at low speed on the controller.")
-SINGULAR: dict[SingularityType, str] = {
-    "wrist": N_("Tilt the tool so that J5 stays away from 0."),
-    "elbow": N_("Keep the path nearer to the arm, so that it is not stretched."),
-    "shoulder": N_("Keep the wrist at a distance from axis 1."),
-}
-KEY_FIGURES = {
-    "programs_passed": N_("Programs that pass, of those meant to"),
-    "instructions_passed": N_("Motion instructions that pass, of programs meant to pass"),
-    "instructions_caution": N_("Motion instructions with caution, of programs meant to pass"),
-    "instructions_failed": N_("Motion instructions that fail, of programs meant to pass"),
-    "least_clearance": N_("Least clearance of programs meant to pass"),
-}
+SINGULAR: dict[SingularityType, str] = words(
+    {
+        "wrist": "Tilt the tool so that J5 stays away from 0.",
+        "elbow": "Keep the path nearer to the arm, so that it is not stretched.",
+        "shoulder": "Keep the wrist at a distance from axis 1.",
+    }
+)
+KEY_FIGURES = words(
+    {
+        "programs_passed": "Programs that pass, of those meant to",
+        "instructions_passed": "Motion instructions that pass, of programs meant to pass",
+        "instructions_caution": "Motion instructions with caution, of programs meant to pass",
+        "instructions_failed": "Motion instructions that fail, of programs meant to pass",
+        "least_clearance": "Least clearance of programs meant to pass",
+    }
+)
 
 
 TEXTS = texts(
@@ -157,21 +169,23 @@ TEXTS = texts(
     }
 )
 WORDS.update(
-    {
-        "target_reason": REASONS,
-        "not_followed": {"": N_("from here on")},
-        "shapes": {True: N_("assumed shapes"), False: N_("stated shapes")},
-        "bounded": {True: N_("stay bounded"), False: N_("have no bound")},
-        "speed_given": {"": N_("none")},
-        "suspect": {
-            "impossible_speed": N_("more than any point of the arm can do"),
-            "share": N_("more than there is"),
-            "speed": N_("ten times the usual speed"),
-            "tool": N_("a tool used only here"),
-            "base": N_("a base used only here"),
-        },
-        "frames": {"tool": N_("tool"), "base": N_("base"), "both": N_("tool and base")},
-    }
+    words(
+        {
+            "target_reason": REASONS,
+            "not_followed": {"": "from here on"},
+            "shapes": {True: "assumed shapes", False: "stated shapes"},
+            "bounded": {True: "stay bounded", False: "have no bound"},
+            "speed_given": {"": "none"},
+            "suspect": {
+                "impossible_speed": "more than any point of the arm can do",
+                "share": "more than there is",
+                "speed": "ten times the usual speed",
+                "tool": "a tool used only here",
+                "base": "a base used only here",
+            },
+            "frames": {"tool": "tool", "base": "base", "both": "tool and base"},
+        }
+    )
 )
 
 

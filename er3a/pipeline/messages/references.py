@@ -3,73 +3,87 @@
 from __future__ import annotations
 
 from er3a.finding import Amount, Finding, is_one
-from er3a.pipeline.language import N_, as_text, own_title, tr, with_unit
+from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
 from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.references import subjects
 from er3a.references.rows import GROUPS, check_complete
 
-GROUP_WORDS = {
-    "zero_pose": N_("zero pose"),
-    "axes": N_("axes"),
-    "key_poses": N_("key poses"),
-    "reach": N_("reach"),
-    "envelope": N_("envelope"),
-    "limits": N_("limits"),
-    "speeds": N_("speeds"),
-}
-POINT_WORDS = {"flange": N_("flange"), "wrist_centre": N_("wrist centre")}
-SEGMENT_WORDS = {"upper_arm": N_("upper arm from the vertical"), "forearm": N_("forearm from the vertical")}
+GROUP_WORDS = words(
+    {
+        "zero_pose": "zero pose",
+        "axes": "axes",
+        "key_poses": "key poses",
+        "reach": "reach",
+        "envelope": "envelope",
+        "limits": "limits",
+        "speeds": "speeds",
+    }
+)
+POINT_WORDS = words({"flange": "flange", "wrist_centre": "wrist centre"})
+SEGMENT_WORDS = words({"upper_arm": "upper arm from the vertical", "forearm": "forearm from the vertical"})
 LABELS = {"abs_x": "|x|"}
 check_complete("words for groups of references", GROUPS, GROUP_WORDS)
-STATUS_WORDS = {
-    "settled": N_("settled"),
-    "settled_up_to_signs": N_("settled but for signs"),
-    "weak": N_("weak"),
-    "contradicted": N_("contradicted"),
-    "consistent": N_("one source"),
-    "open": N_("open"),
-    "gauge": N_("free choice"),
-    "given": N_("given"),
-    "absent": N_("not given"),
-}
-STATUS_MEANINGS = {
-    "settled": N_("keep it: known to within the tolerance"),
-    "settled_up_to_signs": N_("keep it, unless an open entry turns out otherwise: then a sign may change"),
-    "weak": N_("measure it: not known to within the tolerance"),
-    "contradicted": N_("don't use it: the evidence excludes the value"),
-    "consistent": N_("check it on the arm: only the table's own source gives it"),
-    "open": N_("measure it: other values that move the tool fit as well"),
-    "gauge": N_("keep it: only its sum with other entries counts"),
-    "given": N_("chosen by the author of the file"),
-}
-CHECK_KINDS = {
-    "independent": N_("independent"),
-    "consistency": N_("consistency"),
-    "claim": N_("claim"),
-}
+STATUS_WORDS = words(
+    {
+        "settled": "settled",
+        "settled_up_to_signs": "settled but for signs",
+        "weak": "weak",
+        "contradicted": "contradicted",
+        "consistent": "one source",
+        "open": "open",
+        "gauge": "free choice",
+        "given": "given",
+        "absent": "not given",
+    }
+)
+STATUS_MEANINGS = words(
+    {
+        "settled": "keep it: known to within the tolerance",
+        "settled_up_to_signs": "keep it, unless an open entry turns out otherwise: then a sign may change",
+        "weak": "measure it: not known to within the tolerance",
+        "contradicted": "don't use it: the evidence excludes the value",
+        "consistent": "check it on the arm: only the table's own source gives it",
+        "open": "measure it: other values that move the tool fit as well",
+        "gauge": "keep it: only its sum with other entries counts",
+        "given": "chosen by the author of the file",
+    }
+)
+CHECK_KINDS = words(
+    {
+        "independent": "independent",
+        "consistency": "consistency",
+        "claim": "claim",
+    }
+)
 
 
-EXTREMES = {"least": N_("least"), "greatest": N_("greatest")}
-MANNERS = {
-    "moves": N_("the {point} moves {way}"),
-    "tilts": N_("the flange's z axis tilts {way}"),
-    "clockwise": N_("the flange (mark it) turns clockwise, looking {way}"),
-}
-WAYS = {
-    "up": N_("up"),
-    "down": N_("down"),
-    "left": N_("left"),
-    "right": N_("right"),
-    "forward": N_("forward"),
-    "back": N_("back"),
-}
-MEASURED = {
-    "offset": N_("angle of joint {joint} at the zero mark"),
-    "alpha": N_("angle between the z axes of frames {before} and {joint}"),
-    "d": N_("length along the axis of joint {joint}"),
-    "a": N_("distance between the z axes of frames {before} and {joint}"),
-}
+EXTREMES = words({"least": "least", "greatest": "greatest"})
+MANNERS = words(
+    {
+        "moves": "the {point} moves {way}",
+        "tilts": "the flange's z axis tilts {way}",
+        "clockwise": "the flange (mark it) turns clockwise, looking {way}",
+    }
+)
+WAYS = words(
+    {
+        "up": "up",
+        "down": "down",
+        "left": "left",
+        "right": "right",
+        "forward": "forward",
+        "back": "back",
+    }
+)
+MEASURED = words(
+    {
+        "offset": "angle of joint {joint} at the zero mark",
+        "alpha": "angle between the z axes of frames {before} and {joint}",
+        "d": "length along the axis of joint {joint}",
+        "a": "distance between the z axes of frames {before} and {joint}",
+    }
+)
 TEXTS = texts(
     {
         "axis_direction": "axis {joint} direction",

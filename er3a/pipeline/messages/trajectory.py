@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import is_one
-from er3a.pipeline.language import N_, as_text, with_unit
+from er3a.pipeline.language import as_text, with_unit, words
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
@@ -18,34 +18,40 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import RateCause, rate_ratio
 from er3a.planning.names import StrategyName
 
-KEY_FIGURES = {
-    "safe": N_("Paths that pass in the model, of those meant to"),
-    "singular_poses": N_("Singular poses met, on paths meant to be safe (joint moves pass them unharmed)"),
-    "near_passes": N_("Near-singular passes, on paths meant to be safe"),
-    "colliding": N_("Paths with a collision, of those meant to be safe"),
-    "max_joint_speed": N_("Joint speed nearest its limit, on paths meant to be safe"),
-    "assumed_speed_ratio": N_("Ratio to that joint's assumed limit"),
-    "speed_ratio": N_("Ratio to that joint's limit"),
-    "characteristic_length": N_("Characteristic length of the Jacobian"),
-}
-KINDS: dict[model.PathKind, str] = {
-    "joint": N_("joint move"),
-    "joint_sequence": N_("joint moves in sequence"),
-    "line": N_("straight line"),
-    "arc": N_("circular arc"),
-    "sequence": N_("lines and arcs in sequence"),
-    "table": N_("path from a table"),
-    "plan": N_("planned motion"),
-}
-STRATEGIES: dict[StrategyName, str] = {
-    "slow": N_("slow down on the path"),
-    "branch": N_("another IK solution first"),
-    "via_shift": N_("via point, tool point shifted"),
-    "via_tilt": N_("via point, tool tilted"),
-    "detour": N_("joint move across the region"),
-    "stop": N_("stop before it, with an alarm"),
-    "planned": N_("planned motion of the joints"),
-}
+KEY_FIGURES = words(
+    {
+        "safe": "Paths that pass in the model, of those meant to",
+        "singular_poses": "Singular poses met, on paths meant to be safe (joint moves pass them unharmed)",
+        "near_passes": "Near-singular passes, on paths meant to be safe",
+        "colliding": "Paths with a collision, of those meant to be safe",
+        "max_joint_speed": "Joint speed nearest its limit, on paths meant to be safe",
+        "assumed_speed_ratio": "Ratio to that joint's assumed limit",
+        "speed_ratio": "Ratio to that joint's limit",
+        "characteristic_length": "Characteristic length of the Jacobian",
+    }
+)
+KINDS: dict[model.PathKind, str] = words(
+    {
+        "joint": "joint move",
+        "joint_sequence": "joint moves in sequence",
+        "line": "straight line",
+        "arc": "circular arc",
+        "sequence": "lines and arcs in sequence",
+        "table": "path from a table",
+        "plan": "planned motion",
+    }
+)
+STRATEGIES: dict[StrategyName, str] = words(
+    {
+        "slow": "slow down on the path",
+        "branch": "another IK solution first",
+        "via_shift": "via point, tool point shifted",
+        "via_tilt": "via point, tool tilted",
+        "detour": "joint move across the region",
+        "stop": "stop before it, with an alarm",
+        "planned": "planned motion of the joints",
+    }
+)
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s

@@ -11,7 +11,7 @@ from er3a.finding import Finding
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.language import N_, as_text, distinct, tr, with_unit
+from er3a.pipeline.language import as_text, distinct, tr, with_unit, words
 from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, quoted
 from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
@@ -23,50 +23,58 @@ from er3a.pipeline.stages.validation.model import (
     PartFound,
 )
 
-SELF_CHECKS = {
-    "numbers_not_finite": N_("numbers that are not finite"),
-    "crossed_limits": N_("joints whose lower limit is above the upper one"),
-    "odd_directions": N_("joint directions other than +1 and -1"),
-    "length_unit": N_("lengths in another unit (longest below 10 mm or above 20 m)"),
-    "limit_unit": N_("limits in another unit (widest below 6.3 deg)"),
-    "closed_form": N_("properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)"),
-    "joints_to_pose_to_joints": N_("joints to pose to joints"),
-    "unsolved_poses": N_("random poses without any solution"),
-    "joint_error": N_("worst joint error"),
-    "position_error": N_("worst position error"),
-    "orientation_error": N_("worst orientation error"),
-}
-DATA_GRADES = {"official": N_("official"), "measured": N_("measured"), "cad": N_("CAD"), "export": N_("exported")}
-KEY_FIGURES = {
-    "independent_checks": N_("Independent checks passed"),
-    "consistency_checks": N_("Consistency checks passed"),
-    "zero_pose_flange_error": N_("Zero pose: flange off the documents by"),
-    "farthest_axis": N_("Joint axes: largest distance from the documents"),
-    "most_tilted_axis": N_("Joint axes: largest angle to the documents"),
-    "worst_drawing_label": N_("Workspace drawing: worst label off by"),
-    "wrist_centre_reach": N_("Wrist centre: reach from axis 1"),
-    "flange_reach": N_("Flange: reach from axis 1"),
-    "round_trip_joint_error": N_("Round trips: worst joint error"),
-}
-GRADES = {
-    "official": N_("the manufacturer's own document"),
-    "measured": N_("measured on the arm"),
-    "cad": N_("measured on a CAD model that carries the model's name"),
-    "export": N_("a URDF exported from CAD"),
-    "claim": N_("an article's text"),
-    "inferred": N_("inferred, not stated"),
-}
-PLACED = {"tool": N_("tool"), "base": N_("base")}
-PART_ENTRIES = {
-    "geometry": N_("lengths and twists"),
-    "zero_and_directions": N_("zeros and directions"),
-    "limits": N_("limits"),
-    "speeds": N_("speeds"),
-}
+SELF_CHECKS = words(
+    {
+        "numbers_not_finite": "numbers that are not finite",
+        "crossed_limits": "joints whose lower limit is above the upper one",
+        "odd_directions": "joint directions other than +1 and -1",
+        "length_unit": "lengths in another unit (longest below 10 mm or above 20 m)",
+        "limit_unit": "limits in another unit (widest below 6.3 deg)",
+        "closed_form": "properties lacking for a closed-form inverse (parallel axes 2 and 3, spherical wrist)",
+        "joints_to_pose_to_joints": "joints to pose to joints",
+        "unsolved_poses": "random poses without any solution",
+        "joint_error": "worst joint error",
+        "position_error": "worst position error",
+        "orientation_error": "worst orientation error",
+    }
+)
+DATA_GRADES = words({"official": "official", "measured": "measured", "cad": "CAD", "export": "exported"})
+KEY_FIGURES = words(
+    {
+        "independent_checks": "Independent checks passed",
+        "consistency_checks": "Consistency checks passed",
+        "zero_pose_flange_error": "Zero pose: flange off the documents by",
+        "farthest_axis": "Joint axes: largest distance from the documents",
+        "most_tilted_axis": "Joint axes: largest angle to the documents",
+        "worst_drawing_label": "Workspace drawing: worst label off by",
+        "wrist_centre_reach": "Wrist centre: reach from axis 1",
+        "flange_reach": "Flange: reach from axis 1",
+        "round_trip_joint_error": "Round trips: worst joint error",
+    }
+)
+GRADES = words(
+    {
+        "official": "the manufacturer's own document",
+        "measured": "measured on the arm",
+        "cad": "measured on a CAD model that carries the model's name",
+        "export": "a URDF exported from CAD",
+        "claim": "an article's text",
+        "inferred": "inferred, not stated",
+    }
+)
+PLACED = words({"tool": "tool", "base": "base"})
+PART_ENTRIES = words(
+    {
+        "geometry": "lengths and twists",
+        "zero_and_directions": "zeros and directions",
+        "limits": "limits",
+        "speeds": "speeds",
+    }
+)
 names_in_words("references", "reference.group", GROUP_WORDS)
 names_in_words("loose_references", "reference.group", GROUP_WORDS)
 names_in_words("tool_and_base", "placed", PLACED)
-GROUPS = GROUP_WORDS | {"table_sanity": N_("table sanity"), "round_trips": N_("round trips")}
+GROUPS = GROUP_WORDS | words({"table_sanity": "table sanity", "round_trips": "round trips"})
 
 
 TEXTS = texts(
@@ -126,16 +134,18 @@ TEXTS = texts(
 
 
 WORDS.update(
-    {
-        "data": DATA_GRADES,
-        "part_entries": PART_ENTRIES,
-        "self_check": SELF_CHECKS,
-        "speaks": {
-            "uncovered": N_("No independent document covers this table"),
-            "unsettled": N_("Don't rely on this table: no independent document settles any of its entries"),
-            "uncontradicted": N_("Nothing contradicts this table, but part of it is not settled"),
-        },
-    }
+    words(
+        {
+            "data": DATA_GRADES,
+            "part_entries": PART_ENTRIES,
+            "self_check": SELF_CHECKS,
+            "speaks": {
+                "uncovered": "No independent document covers this table",
+                "unsettled": "Don't rely on this table: no independent document settles any of its entries",
+                "uncontradicted": "Nothing contradicts this table, but part of it is not settled",
+            },
+        }
+    )
 )
 
 

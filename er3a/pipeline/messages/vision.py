@@ -12,51 +12,61 @@ import er3a.pipeline.messages.expectations
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.finding import Finding
 from er3a.geometry.transforms import quaternion_of, rpy_of
-from er3a.pipeline.language import N_, as_text
+from er3a.pipeline.language import as_text, words
 from er3a.pipeline.messages.say import WORDS, same_text, say, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
 from er3a.vision.vision_findings import Convention, Suspect
 
-PARTS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
-MENDING = {
-    "half_turn_x": N_("the board is detected turned by 180 deg about its x axis"),
-    "half_turn_y": N_("the board is detected turned by 180 deg about its y axis"),
-    "half_turn_z": N_("the board is detected turned by 180 deg in its plane"),
-    "quarter_turn_z": N_("the board is detected turned by 90 deg in its plane"),
-    "mirrored_tilt": N_("the board's tilt is mirrored, as of a flat board seen from far or head-on"),
-    "rotation": N_("no typical detector error explains it"),
-}
-STREAMS = {
-    "flange": N_("flange"),
-    "target": N_("board"),
-    "board": N_("board"),
-    "camera": N_("camera"),
-    "both": N_("flange and board"),
-}
-CONVENTIONS: dict[Convention, str] = {
-    "inverted": N_("its poses are inverted"),
-    "transposed": N_("its rotations are transposed"),
-    "real_part_first": N_("its quaternions have the real part first"),
-    "real_part_last": N_("its quaternions have the real part last"),
-    "turning_axes": N_("its angles mean R = Rx(roll) Ry(pitch) Rz(yaw)"),
-    "abc": N_("its angles mean R = Rz(roll) Ry(pitch) Rx(yaw)"),
-    "zyz": N_("its angles mean R = Rz(roll) Ry(pitch) Rz(yaw)"),
-    "opengl": N_("its positions are (x, −y, −z)"),
-    "to_optical": N_("its positions are (−y, −z, x)"),
-    "from_optical": N_("its positions are (z, −x, −y)"),
-}
-POSES = {
-    "eye_in_hand": (N_("camera on the flange (T_flange_camera)"), N_("board in the base (T_base_board)")),
-    "eye_to_hand": (N_("camera in the base (T_base_camera)"), N_("board on the flange (T_flange_board)")),
-}
-KEY_FIGURES = {
-    "samples_used": N_("samples used"),
-    "position_half_width": N_("camera's position, largest half-width (95 %)"),
-    "rotation_half_width": N_("camera's rotation, largest half-width (95 %)"),
-    "objects_grasped": N_("objects that can be grasped"),
-    "worst_error": N_("error at the worst grasp (95 %)"),
-    "least_success": N_("least probability of success"),
-}
+PARTS = words({"move": "move to the approach", "approach": "approach", "retreat": "retreat"})
+MENDING = words(
+    {
+        "half_turn_x": "the board is detected turned by 180 deg about its x axis",
+        "half_turn_y": "the board is detected turned by 180 deg about its y axis",
+        "half_turn_z": "the board is detected turned by 180 deg in its plane",
+        "quarter_turn_z": "the board is detected turned by 90 deg in its plane",
+        "mirrored_tilt": "the board's tilt is mirrored, as of a flat board seen from far or head-on",
+        "rotation": "no typical detector error explains it",
+    }
+)
+STREAMS = words(
+    {
+        "flange": "flange",
+        "target": "board",
+        "board": "board",
+        "camera": "camera",
+        "both": "flange and board",
+    }
+)
+CONVENTIONS: dict[Convention, str] = words(
+    {
+        "inverted": "its poses are inverted",
+        "transposed": "its rotations are transposed",
+        "real_part_first": "its quaternions have the real part first",
+        "real_part_last": "its quaternions have the real part last",
+        "turning_axes": "its angles mean R = Rx(roll) Ry(pitch) Rz(yaw)",
+        "abc": "its angles mean R = Rz(roll) Ry(pitch) Rx(yaw)",
+        "zyz": "its angles mean R = Rz(roll) Ry(pitch) Rz(yaw)",
+        "opengl": "its positions are (x, −y, −z)",
+        "to_optical": "its positions are (−y, −z, x)",
+        "from_optical": "its positions are (z, −x, −y)",
+    }
+)
+POSES = words(
+    {
+        "eye_in_hand": ("camera on the flange (T_flange_camera)", "board in the base (T_base_board)"),
+        "eye_to_hand": ("camera in the base (T_base_camera)", "board on the flange (T_flange_board)"),
+    }
+)
+KEY_FIGURES = words(
+    {
+        "samples_used": "samples used",
+        "position_half_width": "camera's position, largest half-width (95 %)",
+        "rotation_half_width": "camera's rotation, largest half-width (95 %)",
+        "objects_grasped": "objects that can be grasped",
+        "worst_error": "error at the worst grasp (95 %)",
+        "least_success": "least probability of success",
+    }
+)
 
 
 TEXTS = texts(

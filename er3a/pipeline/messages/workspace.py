@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.finding import Finding, is_one
-from er3a.pipeline.language import N_, as_text, tr, with_unit
+from er3a.finding import Finding
+from er3a.pipeline.language import as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import sum_of_joints
-from er3a.pipeline.messages.numbers import at_least, at_most
-from er3a.pipeline.messages.say import FORMATS, joined, say, say_as, says, sentence, texts
+from er3a.pipeline.messages.say import FORMATS, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
-from er3a.workspace.causes import VoidCause
 
-KEY_FIGURES = {
-    "greatest_reach": N_("greatest reach from axis 1"),
-    "enclosed_voids_lower": N_("enclosed voids, at least"),
-    "volume_lower": N_("reached volume, at least"),
-    "volume_upper": N_("reached volume, at most"),
-    "hull_volume": N_("convex hull of the samples: holds voids and dents, misses the rim"),
-    "least_reach": N_("least distance from axis 1"),
-    "samples": N_("samples"),
-}
-VOID_KINDS = {"enclosed": N_("enclosed"), "open": N_("open pocket")}
+KEY_FIGURES = words(
+    {
+        "greatest_reach": "greatest reach from axis 1",
+        "enclosed_voids_lower": "enclosed voids, at least",
+        "volume_lower": "reached volume, at least",
+        "volume_upper": "reached volume, at most",
+        "hull_volume": "convex hull of the samples: holds voids and dents, misses the rim",
+        "least_reach": "least distance from axis 1",
+        "samples": "samples",
+    }
+)
+VOID_KINDS = words({"enclosed": "enclosed", "open": "open pocket"})
 
 
 TEXTS = texts(
@@ -57,17 +57,6 @@ TEXTS = texts(
             "room for it{too_small:?}][nowhere on it does the tool reach all of the tray{out_of_reach:?}][the arm "
             "comes within {margin} mm of the scene or of itself{in_the_way:?}]."
         ),
-        "void.at": (
-            "{lower} to {upper} L, centred at ({centre}) mm: no target there can be reached. [It surrounds the "
-            "shoulder, which is normal.{normal:?}][That is not normal: a limit, a zero or a direction of joint 2 "
-            "or 3 may be wrong.{normal:!}]"
-        ),
-        "void.rest": (
-            "It lies within {box} mm of the base. Cause: {cause}. Never widen a limit of the arm for it.[ The "
-            "bounds hold for {limits}, which nothing confirms.][ It is larger where the arm collides: that is not "
-            "counted.{normal:?}][{more:?} Other enclosed voids: {more}.][ {pocket}]"
-        ),
-        "void.pocket": "Open pocket besides: {lower} to {upper} L, within {box} mm.",
         "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
         "box.unknown": "Tray of {box} mm: [{why}][nowhere does the tool reach all of it.{why:!}]",
         "box.run_again": (
@@ -127,61 +116,6 @@ def run_again_text(summary: Summary) -> str:
     """What to do before a motion is run beside the tray, or with a tool."""
     bare = any(each.reason == "tool" for each in summary.assumed)
     return sentence("box.run_again", bare=bare)
-
-
-def void_text(summary: Summary, *, confirmed: bool = True) -> tuple[str, str]:
-    """The void that the verdict tells of: its bounds, centre and what it means; then where it lies, its cause and a
-    larger open pocket. Empty where voids were not judged. ``confirmed``: whether independent documents settle the
-    joints' limits."""
-    finding = summary.verdict.finding
-    if is_one(finding, "workspace.no_void"):
-        return say(finding), ""
-    if not isinstance(summary, model.WorkspaceSummary) or not is_one(
-        finding, "workspace.void_at_shoulder", "workspace.void_unexpected"
-    ):
-        return "", ""
-    judged, pocket = judged_void(summary), max(summary.voids, key=lambda void: void.volume_m3.upper)
-    normal, limits = is_one(finding, "workspace.void_at_shoulder"), _limits(judged.cause)
-    rest = {
-        "cause": judged.cause,
-        "limits": "" if confirmed else limits,
-        "more": len(summary.enclosed_voids) - 1,
-        "pocket": sentence("void.pocket", **_void_parts(pocket)) if pocket.kind == "open" else "",
-    }
-    parts = {"normal": normal, **_void_parts(judged)}
-    return sentence("void.at", **parts), sentence("void.rest", **parts, **rest)
-
-
-def judged_void(summary: model.WorkspaceSummary) -> model.VoidSummary:
-    """The enclosed void that the verdict tells of."""
-    voids = summary.enclosed_voids
-    unexpected = (void for void in voids if not void.holds_shoulder)
-    return next(unexpected, voids[0])
-
-
-def _limits(cause: VoidCause) -> str:
-    """The limits that make a void, or have a part in it; empty where none has."""
-    if is_one(cause, "void_disappears"):
-        limits = tuple(cause.limits)
-    elif cause.most is None:
-        return ""
-    else:
-        limits = (cause.most,)
-    return joined([_limit(limit, limit.limit) for limit in limits], ", ")
-
-
-def _void_parts(void: model.VoidSummary) -> dict[str, str]:
-    bounds = void.volume_m3
-    sides = [
-        f"{axis} {tr('{low} to {high}', low=millimetres((low,)), high=millimetres((high,)))}"
-        for axis, low, high in zip("xyz", void.low_m, void.high_m)
-    ]
-    return {
-        "lower": at_least(1000 * bounds.lower, "L"),
-        "upper": at_most(1000 * bounds.upper, "L"),
-        "box": joined(sides, ", "),
-        "centre": millimetres(void.centroid_m),
-    }
 
 
 def millimetres(values: Sequence[float]) -> str:

@@ -12,7 +12,7 @@ from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres, void_text
+from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -45,7 +45,6 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
-        void_texts=void_text(summary, confirmed=stored.rests_on.get("validation") == "pass"),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         wide=100 * summary.proof.width,
         **context,
