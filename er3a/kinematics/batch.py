@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
-from er3a.kinematics.block_inverse import BLOCK, count_turns, solve_blocks
+from er3a.kinematics.block_inverse import BLOCK, solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, meets_poses, misses, slots_of_class
 from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.classes.six_revolute import CERTAIN
@@ -26,11 +26,10 @@ from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import whole_turns
 
 SMALLEST_PART = 8 * BLOCK  # poses that are worth a thread's start
-SLOTS_BY_STARTS = 16  # rows of a pose that iteration solves: as many as six joints can have
 NEARLY_OWN = 1e-5  # rad
+SLOTS_BY_STARTS = 16  # rows of a pose that iteration solves: as many as six joints can have
 
 
 def inverse_batch(
@@ -200,9 +199,6 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
     turns = np.empty((*q.shape, 2), dtype=np.int8)
-    if robot.joints == 6 and whole_turns(robot).alone.all():
-        count_turns(q.reshape(-1, 6), robot.lower, robot.upper, turns.reshape(-1, 6, 2))
-        return turns
     low, high = turn_bounds(robot, q)
     turns[..., 0], turns[..., 1] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
     return turns

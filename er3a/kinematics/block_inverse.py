@@ -19,16 +19,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from er3a.geometry.transforms import MAX_DISTANCE_M, ORTHONORMAL_TOLERANCE
-from er3a.geometry.vectors import TURN, Vector
+from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import rows_at
 from er3a.kinematics.classes.arm_angle import about_x, about_z
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
-from er3a.robots.whole_turns import LIMIT_TOLERANCE
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_turn
 
 EDGE = 2e-9  # m or rad from where two branches meet or end
 
@@ -165,7 +164,6 @@ def _clean(value: float) -> float:
 
 BLOCK = 64  # poses; a row of 64 numbers fills whole vectors, and all rows stay in the first cache
 NEAR = 1e-6  # m, rad or their product, from where joints become free
-PER_TURN = 1 / TURN
 
 Joints = tuple[Reals, Reals, Reals, Reals]
 
@@ -258,36 +256,10 @@ def _manufacturers_angles(joints: Joints, reference: Reals, pair: Reals) -> None
             inside = (_WITHIN + k) * BLOCK
             for i in range(BLOCK):
                 angle = sign * (pair[row + i] - zero)
-                near = angle - TURN * np.floor((angle - reference[j * BLOCK + i]) * PER_TURN + 0.5)
-                low = np.ceil((smallest - LIMIT_TOLERANCE - near) * PER_TURN)
-                high = np.floor((most + LIMIT_TOLERANCE - near) * PER_TURN)
-                fits = low <= high
-                # No turn if that keeps the limits, else the fewest that do; if none do, the nearer side of the range.
-                turns = low if low > 0.0 else high if high < 0.0 else 0.0
-                below = near + TURN * (low - 1.0)
-                above = near + TURN * low
-                outside = below if smallest - below < above - most else above
-                chosen = near + TURN * turns if fits else outside
+                chosen = nearest_turn(angle, reference[j * BLOCK + i], smallest, most)
+                fits = (chosen >= smallest - LIMIT_TOLERANCE) & (chosen <= most + LIMIT_TOLERANCE)
                 pair[inside + i] = pair[inside + i] if fits else 0.0
                 pair[row + i] = chosen if pair[_VALID * BLOCK + i] > 0.0 else np.nan
-
-
-@kernel
-def count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
-    """Count the whole turns that can be added to angles within the limits. Kernel.
-
-    Parameters
-    ----------
-    q : (n, 6), rad, NaN for no solution
-    lower, upper : (6,), rad
-    turns : (n, 6, 2), filled with the smallest and largest number; 0 and -1 for NaN
-    """
-    for n in range(q.shape[0]):
-        for j in range(6):
-            low = np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
-            high = np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) * PER_TURN)
-            known = q[n, j] == q[n, j]
-            turns[n, j, 0], turns[n, j, 1] = np.int8(low if known else 0.0), np.int8(high if known else -1.0)
 
 
 @inner_kernel

@@ -17,7 +17,6 @@ import numpy as np
 
 from er3a.errors import ShapeError
 from er3a.geometry.transforms import frame_along, rotation_angle, transposed
-from er3a.geometry.vectors import TURN
 from er3a.kinematics.chain import constant_links, joint_starts, size_of
 from er3a.kinematics.classes.arm_angle import is_out_of_reach
 from er3a.kinematics.classes.chain_solvers import Unsolved, chain_solver
@@ -38,7 +37,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, row_limits, unwound, within
 from er3a.robots.robot import Robot, derived
-from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_move, uncoupling, uncoupling_of_linkage
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, nearest_turn, shortest_move, uncoupling, uncoupling_of_linkage
 
 SAME_ROW = 1e-6  # rad or parts of the arm's size
 CONFIRMS = 1e-9  # m and rad by which a row may miss what is asked: far above the rounding of a closed form
@@ -236,7 +235,7 @@ def settle(robot: Robot, T: Reals, rows: Reals, q_ref: Reals, values: Reals, cer
     """
     solver = arm_solver(robot)
     if isinstance(solver.chain, Unsolved | LinkedRows) or (solver.chain.code == "scara" and not len(rows)):
-        return Settled(_apart(robot, rows))
+        return Settled(rows[distinct(robot, rows, SAME_ROW)])
     if solver.chain.code == "scara":  # without the tilt that no joint can take away
         T = forward(robot, rows[0])
     chain = solver.poses_at(T)
@@ -341,13 +340,20 @@ def _starts(robot: Robot, count: int) -> Reals:
     return random.uniform(-1, 1, (count, len(solver.sliding))) * np.where(solver.sliding, 1.5, np.pi)
 
 
-def _apart(robot: Robot, rows: Reals) -> Reals:
-    """Rows (k, n) without duplicates."""
-    kept: list[Reals] = []
-    for row in rows:
-        if not any(float(np.abs(shortest_move(robot, row - other)).max()) < SAME_ROW for other in kept):
-            kept.append(row)
-    return np.array(kept).reshape(-1, robot.joints)
+def distinct(robot: Robot, rows: Reals, most: float) -> Flags:
+    """Which rows are no earlier one, whole turns aside.
+
+    Parameters
+    ----------
+    rows : (k, n), rad or m
+    most : rad or m by which equal rows differ
+
+    Returns
+    -------
+    first : (k,) bool
+    """
+    away = np.abs(shortest_move(robot, rows[:, None] - rows)).max(axis=2, initial=0.0)
+    return np.asarray(~np.triu(away < most, 1).any(axis=0))
 
 
 def _is_same_root(robot: Robot, x: Reals, others: list[Reals], chain: PoseChain) -> bool:
@@ -493,30 +499,24 @@ def to_pendant(pendant: Pendant, x: Reals, q_ref: Reals, q: Reals, inside: Flags
     inside : (N, S), filled with whether the limits are kept
     """
     direction, start, sliding, lower, upper = pendant
-    slots, n, per_turn = x.shape[1], x.shape[2], 1.0 / TURN
+    slots, n = x.shape[1], x.shape[2]
     # all slots in one row and no branches, so that the processor takes several joints at once
-    sign, zero, turn, lowest, highest, ref = np.empty((6, slots * n))
-    for m in range(slots * n):
-        j = m % n
-        sign[m], zero[m], turn[m] = direction[j], start[j], 0.0 if sliding[j] else TURN
-        lowest[m], highest[m], ref[m] = lower[j] - LIMIT_TOLERANCE, upper[j] + LIMIT_TOLERANCE, q_ref[0, j]
+    of = np.arange(slots * n) % n
+    sign, zero, stays, lowest, highest = direction[of], start[of], sliding[of], lower[of], upper[of]
     rows, found = x.reshape(x.shape[0], slots * n), q.reshape(x.shape[0], slots * n)
+    ref = q_ref[0][of]
     for i in range(x.shape[0]):
         if q_ref.shape[0] > 1:
-            for m in range(slots * n):
-                ref[m] = q_ref[i, m % n]
+            ref = q_ref[i][of]
         for m in range(slots * n):
             value = sign[m] * (rows[i, m] - zero[m])
-            value += turn[m] * np.rint((ref[m] - value) * per_turn)
-            low, high = np.ceil((lowest[m] - value) * per_turn), np.floor((highest[m] - value) * per_turn)
-            below, above = value + turn[m] * (low - 1.0), value + turn[m] * low
-            outside = below if lowest[m] - below < above - highest[m] else above
-            found[i, m] = value + turn[m] * min(max(0.0, low), high) if low <= high else outside
+            turned = nearest_turn(value, ref[m], lowest[m], highest[m])
+            found[i, m] = value if stays[m] else turned
         for slot in range(slots):
             fits = True
             for j in range(n):
                 value = found[i, slot * n + j]
-                fits &= (value <= highest[j]) & (value >= lowest[j])
+                fits &= (value <= upper[j] + LIMIT_TOLERANCE) & (value >= lower[j] - LIMIT_TOLERANCE)
             inside[i, slot] = fits
 
 

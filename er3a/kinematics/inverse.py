@@ -33,7 +33,6 @@ from er3a.kinematics.wrist_partitioned import (
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_move
 
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
@@ -115,8 +114,7 @@ def _by_closed_form(robot: Robot, T: Reals, q_ref: Reals) -> _Found:
     continua = families(robot, T, q, q_ref)
     if continua:
         q = _free_joints_near(robot, T, q, q_ref, continua)
-    away = np.abs(wrap_to_pi(q[slots, None] - q[slots])).max(axis=2, initial=0.0)
-    slots = slots[~np.triu(away < SAME_JOINTS, 1).any(axis=0)]
+    slots = slots[by_class.distinct(robot, q[slots], SAME_JOINTS)]
     rows, of = equivalents_within(robot, q[slots], q_ref)
     branches = slots[of]
     for family in continua:
@@ -194,8 +192,7 @@ def _by_class(robot: Robot, T: Reals, q_ref: Reals, redundancy: Reals | None, se
         traced = by_class.LazySelfMotions(robot, T, q_ref, values)
         motions = tuple(traced) if self_motion_rows or not filled.size else ()
     if solver.parameters:  # keep one where two branches meet; other arms' poses of that kind are settled
-        apart = np.abs(shortest_move(robot, slots[filled, None] - slots[filled])).max(axis=2, initial=0.0)
-        filled = filled[~np.triu(apart < SAME_JOINTS, 1).any(axis=0)]
+        filled = filled[by_class.distinct(robot, slots[filled], SAME_JOINTS)]
     rows, of = equivalents_within(robot, slots[filled], q_ref)
     branches = filled[of]
     for motion in motions:

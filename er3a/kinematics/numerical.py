@@ -34,6 +34,7 @@ import numpy as np
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
+from er3a.kinematics.by_class import distinct
 from er3a.kinematics.chain import arm_length, constant_links, joint_starts, rows_at
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import NotFound, Solutions
@@ -42,7 +43,6 @@ from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel, parallel_for
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_move
 
 LANES = 32  # four or more vectors of any processor, while the scratch memory stays in its cache
 TOGETHER = 3  # columns whose products are added at a time; J has room for a multiple
@@ -585,12 +585,8 @@ def all_found(robot: Robot, T: Reals, starts: int) -> Reals:
     low, high = search.without_limits()
     begin = np.random.default_rng([0, 2]).uniform(low, high, (starts, robot.joints))
     q, _, used = search.run(np.tile(T, (starts, 1, 1)), begin, False, 0, 1)
-    distinct: list[Reals] = []
-    for row in q[used > 0]:
-        away = row - np.reshape(distinct, (-1, robot.joints))
-        if not (np.abs(shortest_move(robot, away)).max(axis=1) <= SAME_ARM).any():
-            distinct.append(row)
-    return np.array(distinct).reshape(-1, robot.joints)
+    q = q[used > 0]
+    return q[distinct(robot, q, SAME_ARM)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,15 +25,11 @@ from er3a.geometry.transforms import rpy_of
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
-from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
+from er3a.kinematics.closed_form import BOUNDARY_M
 from er3a.kinematics.families import Family
 from er3a.kinematics.self_motions import SelfMotionCurve, to_rows
 from er3a.kinematics.singularity import determinant_factors
-from er3a.kinematics.wrist_partitioned import (
-    parallel_axes_arm,
-    wrist_partition_missing,
-    wrist_partitioned_arm,
-)
+from er3a.kinematics.wrist_partitioned import has_branches, wrist_partitioned_arm
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import but_for_turns, joint_columns, limits_exceeded, shown
 from er3a.robots.robot import Robot, derived
@@ -63,18 +59,10 @@ def branch_labels(robot: Robot) -> tuple[BranchLabel, ...]:
     NotWristPartitionedError
         for other arms
     """
-    if parallel_axes_arm(robot) is not None:
-        names = arm_solver(robot).chain.names(to_rows(robot, np.zeros(6)))
-        return tuple(LABELS[LABELS.index(name)] for name in names)  # type: ignore[arg-type]
-    arm = wrist_partitioned_arm(robot)
-    w1, w2 = arm.axes[0], arm.axes[1]
-    labels = []
-    for slot in range(SLOTS):
-        outward = _outward(slot) * np.cross(w1, w2)
-        bend = 1.0 if slot % 4 < 2 else -1.0
-        down = bend * (np.cross(w2, outward) @ w1) >= 0
-        labels.append(LABELS[4 * (side_of(robot, slot) == "back") + 2 * int(down) + slot % 2])
-    return tuple(labels)
+    if not has_branches(robot):
+        wrist_partitioned_arm(robot)  # says what the arm lacks
+    names = arm_solver(robot).chain.names(to_rows(robot, np.zeros(6)))
+    return tuple(LABELS[LABELS.index(name)] for name in names)  # type: ignore[arg-type]
 
 
 @derived
@@ -85,8 +73,6 @@ def slot_labels(robot: Robot) -> tuple[BranchLabel | SlotName, ...]:
     -------
     labels : empty where no signs separate the solutions, which are numbered then
     """
-    if not wrist_partition_missing(robot):
-        return branch_labels(robot)
     return arm_solver(robot).chain.names(to_rows(robot, np.zeros(robot.joints)))
 
 

@@ -14,11 +14,11 @@ from er3a.robots.robot import Robot
 from er3a.robots.whole_turns import (
     LIMIT_TOLERANCE,
     nearest_rows,
+    nearest_turns,
     rows_within,
     shortest_move,
     turned_alone,
     turns_alone,
-    turns_in,
     whole_turns,
 )
 
@@ -183,31 +183,16 @@ def nearest_equivalent(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
     Joints that no turn brings back, such as slides, stay where they are. Behind a gear or a ball screw turns are those
     of rows (:mod:`er3a.robots.whole_turns`), which can move several joints, slides among them.
     """
-    turns = whole_turns(robot)
-    if not turns.each:
-        return _nearest_rows(robot, q, q_ref)
-    whole, near = turns.alone, q + turns_in(robot, q_ref - q)
-    low, high = turn_bounds(robot, near)
-    inside = near + TURN * np.clip(0, low, np.maximum(low, high))
-    # No turn fits (low > high): then the nearest turns below and above the range, whichever leaves it by less.
-    below, above = near + TURN * (low - 1), near + TURN * low
-    outside = np.where(robot.lower - below < above - robot.upper, below, above)
-    found = np.where(low <= high, inside, outside)
-    found = found if whole.all() else np.where(whole, found, q)
-    if not robot.combined:
-        return found
-    # Each joint by itself may break the limit of a sum; these rows are searched with all limits together.
-    left = ~within(robot, found)
-    again = found.copy()
-    again[left] = _nearest_rows(robot, found[left], np.broadcast_to(q_ref, found.shape)[left])
-    return again
-
-
-def _nearest_rows(robot: Robot, q: Reals, q_ref: Reals) -> Reals:
-    """:func:`er3a.robots.whole_turns.nearest_rows` for arrays (..., n) that broadcast."""
-    shape = np.broadcast_shapes(q.shape, q_ref.shape)
-    rows, refs = (np.ascontiguousarray(np.broadcast_to(each, shape).reshape(-1, shape[-1])) for each in (q, q_ref))
-    return nearest_rows(robot, rows, refs)[0].reshape(shape)
+    turns, shape = whole_turns(robot), np.broadcast_shapes(q.shape, q_ref.shape)
+    n = shape[-1]
+    found, refs = (np.array(np.broadcast_to(each, shape)).reshape(-1, n) for each in (q, q_ref))
+    if turns.each:
+        nearest_turns(found, refs, (turns.lower[:n], turns.upper[:n], turns.alone), found)
+    if robot.combined or not turns.each:
+        # Each joint by itself may break the limit of a sum; these rows are searched with all limits together.
+        left = ~(within(robot, found) & turns.each)
+        found[left] = nearest_rows(robot, found[left], refs[left])[0]
+    return found.reshape(shape)
 
 
 def equivalents_within(robot: Robot, q: Reals, q_ref: Reals) -> tuple[Reals, Integers]:

@@ -25,6 +25,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.robot import Robot, derived
 
 LIMIT_TOLERANCE = 1e-9  # rad, m
+PER_TURN = 1 / TURN
 WHOLE = 1e-12  # parts of a turn, by which a number of turns may miss a whole one: rounding of inverted couplings
 INVERTIBLE = 1e-9  # smallest determinant of a coupling that is inverted
 WIDENED = (1.0, 2.0, 4.0, 8.0, 16.0)  # how far continuous joints are looked for, in halves of what turns move them by
@@ -244,7 +245,7 @@ def turned_alone(q: Reals, q_ref: Reals, limits: tuple[Reals, Reals], rows: Real
         if fitting == 0:
             fitting = 1
             for j in range(joints):
-                rows[count, j] = _nearest_turn(q[pose, j], q_ref[j], lower[j], upper[j])
+                rows[count, j] = nearest_turn(q[pose, j], q_ref[j], lower[j], upper[j])
         of[count : count + fitting] = pose
         count += fitting
     return count
@@ -260,14 +261,45 @@ def _turn_by_number(q: Reals, number: int, turns: tuple[Reals, Integers], row: R
 
 
 @inner_kernel
-def _nearest_turn(angle: float, reference: float, lower: float, upper: float) -> float:
-    """The turn of a joint that is nearest to the reference within the limits, else the nearest to the limits."""
-    near = angle + TURN * np.round((reference - angle) / TURN)
-    low = np.ceil((lower - LIMIT_TOLERANCE - near) / TURN)
-    high = np.floor((upper + LIMIT_TOLERANCE - near) / TURN)
+def nearest_turn(angle: float, reference: float, lower: float, upper: float) -> float:
+    """The turn of a joint that is nearest to a reference within the limits, else the nearest to the limits. Kernel.
+
+    Parameters
+    ----------
+    angle : rad
+    reference : rad
+    lower, upper : rad; infinite of a joint without limits
+
+    Returns
+    -------
+    angle : rad, whole turns from the one given
+    """
+    near = angle + TURN * np.rint((reference - angle) * PER_TURN)
+    low = np.ceil((lower - LIMIT_TOLERANCE - near) * PER_TURN)
+    high = np.floor((upper + LIMIT_TOLERANCE - near) * PER_TURN)
     below, above = near + TURN * (low - 1.0), near + TURN * low
-    outside: float = below if lower - below < above - upper else above
-    return near + TURN * min(max(0.0, low), high) if low <= high else outside
+    outside = below if lower - below < above - upper else above
+    # one value, not two returns: so the processor takes several joints at once
+    chosen: float = near + TURN * min(max(0.0, low), high) if low <= high else outside
+    return chosen
+
+
+@kernel
+def nearest_turns(q: Reals, q_ref: Reals, limits: tuple[Reals, Reals, Flags], out: Reals) -> None:
+    """Fill in joints by their nearest turns, each by itself: :func:`nearest_turn`. Kernel.
+
+    Parameters
+    ----------
+    q : (N, n), rad or m
+    q_ref : (N or 1, n), rad or m
+    limits : lower and upper (n,), and which joints a whole turn brings back (n,); others stay as they are
+    out : (N, n), filled; q itself will do
+    """
+    lower, upper, turns = limits
+    for i in range(q.shape[0]):
+        ref = i if q_ref.shape[0] > 1 else 0
+        for j in range(q.shape[1]):
+            out[i, j] = nearest_turn(q[i, j], q_ref[ref, j], lower[j], upper[j]) if turns[j] else q[i, j]
 
 
 def nearest_rows(

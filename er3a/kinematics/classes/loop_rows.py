@@ -27,6 +27,7 @@ from er3a.kinematics.classes.hidden_joint import (
     zeros_between,
     zeros_on_circle,
 )
+from er3a.kinematics.classes.polish import null_vector, pivoted
 from er3a.numerics.arrays import Flags, Integers, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel, kernel
 
@@ -157,7 +158,7 @@ def hidden_angles(e: Scratch, level: float, m: LoopMemory) -> int:  # noqa: C901
 
 
 @inner_kernel
-def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:  # noqa: C901
+def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:
     """Find the angles of joints 4 and 5 at a zero, from null vectors of the nine equations. Kernel.
 
     Parameters
@@ -174,50 +175,19 @@ def pairs_at(e: Scratch, angle: float, slides: Flags, m: LoopMemory) -> int:  # 
     at_angle(e.equations, angle, m.F)
     nine_rows(m.F, m.M)
     M = m.M
-    order = np.arange(9)
-    for k in range(9):
-        best, row, column = -1.0, k, k
-        for r in range(k, 9):
-            for c in range(k, 9):
-                if abs(M[r, c]) > best:
-                    best, row, column = abs(M[r, c]), r, c
-        if row != k:
-            for c in range(k, 9):
-                M[k, c], M[row, c] = M[row, c], M[k, c]
-        if column != k:
-            order[k], order[column] = order[column], order[k]
-            for r in range(9):
-                M[r, k], M[r, column] = M[r, column], M[r, k]
-        if best == 0.0:
-            break
-        per = 1.0 / M[k, k]
-        for r in range(k + 1, 9):
-            x = M[r, k] * per
-            for c in range(k + 1, 9):
-                M[r, c] -= x * M[k, c]
+    order = np.empty(9, np.int64)
+    pivoted(M, order)
     Y = np.zeros((2, 9))
-    _null_vector(M, order, 8, 8, Y[0])
+    null_vector(M, order, 8, 8, Y[0])
     count = 0
     m.pairs[count, 0], m.pairs[count, 1] = _angles_of(Y[0], slides)
     count += 1
     if abs(M[7, 7]) < NEAR_NULL * abs(M[0, 0]):
-        _null_vector(M, order, 7, 7, Y[1])
-        _null_vector(M, order, 8, 7, Y[0])
+        null_vector(M, order, 7, 7, Y[1])
+        null_vector(M, order, 8, 7, Y[0])
         count = _pencil(Y, 3, slides, m.pairs, count)
         count = _pencil(Y, 1, slides, m.pairs, count)
     return count
-
-
-@inner_kernel
-def _null_vector(M: Reals, order: Integers, one: int, pivots: int, y: Reals) -> None:
-    """Null vector of the reduced equations with 1 at place ``one`` and 0 at the others from ``pivots`` on."""
-    y[:] = 0.0
-    y[order[one]] = 1.0
-    for k in range(pivots - 1, -1, -1):
-        total = 0.0
-        for c in range(k + 1, 9):
-            total -= M[k, c] * y[order[c]]
-        y[order[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
 
 
 @inner_kernel

@@ -111,58 +111,66 @@ def residual_and_jacobian(links: Reals, sliding: Flags, T: Reals, q: Reals, w: R
 
 
 @inner_kernel
-def eliminate(J: Reals, columns: Integers) -> float:  # noqa: C901, PLR0912
+def pivoted(M: Reals, columns: Integers) -> float:  # noqa: C901, PLR0912
     """Reduce a linear system by complete pivoting. Kernel.
 
     Parameters
     ----------
-    J : (6, 7), changed in place, its last column the right side
-    columns : (6,), filled with the order of the columns
+    M : (n, n) or wider, changed in place; further columns are right sides
+    columns : (n,), filled with the order of the columns
 
     Returns
     -------
     ratio : the last pivot to the first; 0 if one vanishes
     """
-    for k in range(6):
+    n = M.shape[0]
+    for k in range(n):
         columns[k] = k
     first = 0.0
-    for k in range(6):
+    for k in range(n):
         best, row, column = -1.0, k, k
-        for r in range(k, 6):
-            for c in range(k, 6):
-                if abs(J[r, c]) > best:
-                    best, row, column = abs(J[r, c]), r, c
+        for r in range(k, n):
+            for c in range(k, n):
+                if abs(M[r, c]) > best:
+                    best, row, column = abs(M[r, c]), r, c
         if row != k:
-            for c in range(7):
-                J[k, c], J[row, c] = J[row, c], J[k, c]
+            for c in range(k, M.shape[1]):
+                M[k, c], M[row, c] = M[row, c], M[k, c]
         if column != k:
             columns[k], columns[column] = columns[column], columns[k]
-            for r in range(6):
-                J[r, k], J[r, column] = J[r, column], J[r, k]
+            for r in range(n):
+                M[r, k], M[r, column] = M[r, column], M[r, k]
         if k == 0:
             first = best
         if best == 0.0:
             return 0.0
-        per = 1.0 / J[k, k]
-        for r in range(k + 1, 6):
-            x = J[r, k] * per
-            for c in range(k + 1, 7):
-                J[r, c] -= x * J[k, c]
-    return abs(J[5, 5]) / first if first > 0.0 else 0.0
+        per = 1.0 / M[k, k]
+        for r in range(k + 1, n):
+            x = M[r, k] * per
+            for c in range(k + 1, M.shape[1]):
+                M[r, c] -= x * M[k, c]
+    ratio: float = abs(M[n - 1, n - 1]) / first
+    return ratio
 
 
 @inner_kernel
-def _null_vector(J: Reals, columns: Integers, v: Reals) -> bool:
-    """Fill ``v`` (6,) with what an eliminated J makes zero, 1 in the last pivot's place; False where a pivot is 0."""
-    v[columns[5]] = 1.0
-    for k in range(4, -1, -1):
-        if J[k, k] == 0.0:
-            return False
+def null_vector(M: Reals, columns: Integers, one: int, pivots: int, v: Reals) -> None:
+    """Find what a reduced system makes zero. Kernel.
+
+    Parameters
+    ----------
+    M, columns : as :func:`pivoted` leaves them
+    one : place that is 1
+    pivots : how many equations count; places from there on are 0 but for ``one``
+    v : (n,), filled; 0 where a pivot is
+    """
+    v[:] = 0.0
+    v[columns[one]] = 1.0
+    for k in range(pivots - 1, -1, -1):
         total = 0.0
-        for c in range(k + 1, 6):
-            total -= J[k, c] * v[columns[c]]
-        v[columns[k]] = total / J[k, k]
-    return True
+        for c in range(k + 1, M.shape[0]):
+            total -= M[k, c] * v[columns[c]]
+        v[columns[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
 
 
 @kernel
@@ -209,7 +217,7 @@ def newton(  # noqa: C901
                 best[k] = q[k]
         if error < 2e-16:
             return error, pivot
-        pivot = eliminate(J, columns)
+        pivot = pivoted(J, columns)
         _step(J, columns, dq)
         size = 0.0
         for k in range(6):
@@ -249,10 +257,11 @@ def twin_start(
     -------
     near : False where no other root is near
     """
-    v = np.zeros(6)
+    v, u = np.empty(6), np.empty(6)
     residual_and_jacobian(links, sliding, T, q, w, J)
-    if eliminate(J, columns) > NEAR_FOLD or not _null_vector(J, columns, v):
+    if pivoted(J, columns) > NEAR_FOLD or J[4, 4] == 0.0:
         return False
+    null_vector(J, columns, 5, 5, v)
     v /= np.abs(v).max()
     # left null vector by the transposed Jacobian
     residual_and_jacobian(links, sliding, T, q, w, J)
@@ -261,10 +270,8 @@ def twin_start(
             J[r, c], J[c, r] = J[c, r], J[r, c]
     for r in range(6):
         J[r, 6] = 0.0
-    eliminate(J, columns)
-    u = np.zeros(6)
-    if not _null_vector(J, columns, u):
-        return False
+    pivoted(J, columns)
+    null_vector(J, columns, 5, 5, u)
     values = np.zeros(2)
     for side in range(2):
         for k in range(6):
