@@ -23,7 +23,6 @@ from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import read_results
 from er3a.pipeline.stages import run
@@ -36,11 +35,9 @@ from er3a.pipeline.stages.inverse.model import (
     TargetResult,
     shown_targets,
 )
-from er3a.pipeline.stages.inverse.page.report import of_a_joint, overview_row
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant
 from er3a.selection.select import RULES
-from testing.arms import scara
 from testing.on_demand import OnDemand
 
 ROOT = Path(__file__).parents[2]
@@ -225,36 +222,6 @@ def test_wrist_singularity_is_named(computed):
         assert "so only joint moves lead there: " + ", ".join(singular) in say(finding)
 
 
-def test_the_chosen_branch_and_what_is_not_singular_stand_in_the_first_table(computed):
-    name, results = computed
-    for target in results.summary.targets:
-        rows = results.solutions.take(results.solutions.target == target.name)
-        cells = overview_row(load_robot(name), target, rows)
-        if target.chosen_deg is None:
-            assert cells[3:5] == ["none", "–"]
-            continue
-        best = rows.take(rows.rank == 1)
-        told = cells[3].split("<br>")
-        assert told[0] == branch_word(best.label[0])
-        assert f"{target.clearance.least_mm:.1f} mm: {say(target.clearance.between)}".replace("-", "−") == cells[4]
-        assert (len(told) == 3) == best.singular.any()
-        if best.singular.any():
-            other = rows.take((rows.rank > 0) & ~rows.singular.any(axis=1))
-            assert "wrist singularity: joint moves only" in told[2]
-            assert (branch_word(other.label[other.rank.argmin()]) in told[2]) == bool(len(other))
-        if target.reason.code == "moves_less":
-            others = rows.greatest_move_deg[rows.rank == 2]
-            assert target.reason.less.value == pytest.approx(others[0] - best.greatest_move_deg[0], abs=1e-6)
-
-
-def test_values_of_one_joint_have_its_unit():
-    """The greatest move and the least margin of a solution, which compare mm of a slide with deg; sums are in deg."""
-    robot = scara()
-    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 30.0, 0) == "30 mm"
-    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 5.0, 1) == "5.0 deg"
-    assert of_a_joint(robot, np.array([10.0, 20, 30, 5]), 29.0, 1) == "29.0 deg"
-
-
 def test_each_branch_has_what_its_clearance_is_of(computed):
     name, results = computed
     ranked, robot = results.rankings.take(results.rankings.rule == "clearance"), load_robot(name)
@@ -415,7 +382,9 @@ def test_page_and_recording_show_every_target(folders, tmp_path):
     targets = read_results(folders[name], RESULTS).results.summary.targets
     for target in targets:
         assert f'<h2 id="{target.name}">' in page
-    assert page.count('<svg class="arms"') == len(targets)
+    played = json.loads(re.search(r'id="player-data">(.*?)</script>', page)[1])["motions"]
+    assert [motion["name"] for motion in played] == [target.name for target in targets]
+    assert [len(motion["times"]) // 2 for motion in played] == [max(1, target.solutions) for target in targets]
     assert not re.search(r"\bnan\b", page.split("<main")[1].split("<script")[0])
     run.show("record", "inverse", make_study(), name, folders[name], tmp_path / "inverse.rrd")
     rerun = Path(sys.executable).with_name("rerun")

@@ -155,7 +155,6 @@ def test_no_place_is_no_error():
     assert done.placement.places == ()
     context = context_of(load_robot("er3_600"), done)
     assert context["place_rows"] == []
-    assert context["place_picture"] is None
     (nowhere,) = _assumed(done)
     assert (nowhere.reason, nowhere.names) == ("tray_nowhere", ("2000 × 2000 × 100 mm",))
     assert "no place for the tray was found" in assumed_text(nowhere)

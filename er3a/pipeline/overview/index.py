@@ -28,6 +28,7 @@ from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
+from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import SHORT_NAMES, Head, alternative_table, head_of
 from er3a.pipeline.viewing.side_view import Kind, SeenArm, border_lines, seen_arm, side_view
 
@@ -180,7 +181,8 @@ def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Res
     wrong = [entry for entry in entries if entry.use == "never"][:1]
     right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
     drawn = [_seen(study, entry, stored[entry.name], first=entry in right[:1]) for entry in (*wrong, *right[::-1])]
-    return side_view(drawn)
+    floor = floor_of(study.scene(right[0].name, "trajectory")) if right else None
+    return side_view(drawn, None if floor is None else 1000 * floor)
 
 
 def _seen(study: Study, entry: RobotRow, stored: Results, *, first: bool) -> SeenArm:
@@ -229,8 +231,9 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
     if left or not evidence:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
-        text = tr("Read five poses (er3a confirm {robot} --plan): they settle {names}.", robot=chosen.name, names=named)
-        steps.append((text, f"{address}#table-entries" if left else address))
+        steps.append(
+            (tr("Read five poses: they settle {names}.", names=named), f"{address}#table-entries" if left else address)
+        )
     limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
     if not evidence or any(part.settled + part.up_to_signs < part.entries for part in limits):
         steps.append((tr("Enter limits and speeds from the controller."), address))

@@ -110,6 +110,8 @@ class PlayedMotion:
     name, text : what it is called, and what is said of it where no event is near; label : for people, if not the name
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
+    ghosts : (n,) each, joint coordinates of poses in which the first arm is drawn pale all the while
+    loads : (N, n), what each joint bears, N m, or N where it slides: a bar at each; None where nothing is known
     """
 
     name: str
@@ -120,6 +122,8 @@ class PlayedMotion:
     marks: Sequence[Mark] = ()
     beside: Sequence[Reals] = ()
     label: str = ""
+    ghosts: Sequence[Reals] = ()
+    loads: Reals | None = None
 
 
 def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:

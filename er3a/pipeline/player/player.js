@@ -15,6 +15,7 @@ const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const WORLD = translation(0, 0, 0);
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
+const NOTHING = 0.01; // of the greatest load: a bar that is left out where there is no room
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
@@ -35,6 +36,7 @@ const space = new Space(canvas, data.target, data.length, refresh);
 const arms = [data, ...data.others].map((arm, k) => ({
   table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
 }));
+const ghosts = Array.from({ length: Math.max(...data.motions.map(({ ghosts }) => ghosts.length)) }, () => new Arm(space, data));
 const surroundings = space.add(data.scene);
 if (arms.length > 1) space.turn(data.turned, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
@@ -45,7 +47,8 @@ const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
   const count = motion.times.length;
-  return { ...motion, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
+  const loads = motion.loads && decodeValues(motion.loads, count);
+  return { ...motion, loads, values: motion.values.map((text) => decodeValues(text, count)), trails: null };
 }
 
 const start = () => motion.times[0];
@@ -113,6 +116,7 @@ function draw() {
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
+  ghosts.forEach((ghost, k) => (motion.ghosts[k] ? ghost.show(posesOf(arms[0], motion.ghosts[k]), new Map(), "visual", true) : ghost.hide()));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh));
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -123,14 +127,16 @@ function draw() {
   }
   for (const T of poses) toolFrame(T.at(-1));
   for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
-  const marks = (motion.marks ?? []).filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
+  const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
   space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
-    if (String(from) === String(to)) space.dot(from, page.touching, 5, true);
-    else space.line([from, to], data.colours.mark, 3);
-    space.word(text, scaled(add(from, to), 0.5), touching.size ? page.touching : page.ink);
+    const css = touching.size ? page.touching : page.ink;
+    if (String(from) === String(to)) space.dot(from, css, 5, true);
+    else space.line([from, to], data.colours.mark, text ? 3 : 1.5);
+    if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
+  if (motion.loads) tellLoads(poses[0]);
   for (const [j, { status }] of failing()) {
     space.word(`J${j}`, moved(poses[0][j], data.rows[j - 1].middle), status === "caution" ? page.doubtful : page.touching);
   }
@@ -147,9 +153,20 @@ function singularAxis(j, T) {
   space.word(`J${j}`, add(middle, way), space.page.doubtful);
 }
 
+/** What each joint bears now, as a bar of the most that any bears on this motion. */
+function tellLoads(poses) {
+  const most = Math.max(...motion.loads.flat().map(Math.abs)) || 1;
+  const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
+  valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
+    const text = `J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`;
+    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > NOTHING * most, Math.abs(load) / most);
+  });
+}
+
 /** Names where a motion starts and where it ends. */
 function nameEnds(trail) {
   const [first, last] = [trail[0], trail.at(-1)];
+  if (trail.every((point) => Math.hypot(...subtract(point, first)) < CLOSED * data.size)) return; // at rest
   const closed = Math.hypot(...subtract(last, first)) < CLOSED * data.size;
   for (const [at, text] of closed ? [[first, words.start_and_end]] : [[first, words.start], [last, words.end]]) {
     space.dot(at, space.page.ink, 4);
@@ -227,7 +244,6 @@ function newMotion() {
     return tick;
   });
   part("ticks").replaceChildren(...ticks);
-  part("next").disabled = !ticks.length;
 }
 
 /** Lays a cursor over each panel of a plot; returns what moves them. */
@@ -291,15 +307,10 @@ const step = (sign) => {
   play(false);
   goTo(null, motion.times[sign > 0 ? (i < 0 ? motion.times.length - 1 : i) : Math.max(0, before)]);
 };
-const nextEvent = () => {
-  const event = motion.events.find((each) => each.t > t + 1e-6) ?? motion.events[0];
-  if (event) goTo(null, event.t);
-};
 
 part("play").addEventListener("click", () => play(!playing));
 part("back").addEventListener("click", () => step(-1));
 part("forward").addEventListener("click", () => step(1));
-part("next").addEventListener("click", nextEvent);
 part("undock").addEventListener("click", () => place.classList.remove("docked"));
 part("looks")?.addEventListener("change", refresh);
 chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser.value).times[0]));

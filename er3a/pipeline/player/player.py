@@ -17,9 +17,10 @@ from markupsafe import Markup
 from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
-from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
+from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
 from er3a.pipeline.viewing.page import packed_text
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
@@ -32,6 +33,7 @@ TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 SEEN = 0.64  # of the arm's size: what the picture is filled by
+WIDENED = 0.7  # of how far away a place is, that the picture then shows
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -54,7 +56,6 @@ WORDS = {
     "pause": N_("Pause"),
     "back": N_("one step back"),
     "forward": N_("one step forward"),
-    "next": N_("Next event"),
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
     "clock": N_("{t} of {end} s"),
@@ -84,6 +85,7 @@ def player(
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
     opened: tuple[str, float] | None = None,
+    added: Sequence[Shape] = (),
 ) -> Markup:
     """The player as HTML, one a page, whose head holds ``drawing_head``; empty where there is no motion.
 
@@ -91,6 +93,7 @@ def player(
     ----------
     opened : the motion and the time (s) that it opens at; None for the worst contact, or else the first start
     beside : further arms, which move at the same time; their bases say where they stand
+    added : shapes of ``viewing/drawn.py`` around the arm, or in its tool's frame, that nothing collides with
     signs : what is written below the base of each arm, the first included; nothing if empty
     """
     shown = [motion for motion in motions if len(motion.t) > 1]
@@ -98,6 +101,9 @@ def player(
         return Markup()
     words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
     data = _data(robot, shown, scene, words, beside, signs)
+    for shape in added:
+        data["carried" if shape["frame"] else "scene"].append(shape)
+    _widened(data, [shape["T"] for shape in added if not shape["frame"]])
     known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
     data["opened"] = known or _worst(robot, shown)
     return Markup(
@@ -166,6 +172,18 @@ def _data(
     }
 
 
+def _widened(data: dict[str, Any], places: Sequence[Any]) -> None:
+    """Has the picture hold these places, (k, 4, 4), m, too."""
+    if not places:
+        return
+    points = np.array(places)[:, :3, 3]
+    far = points[np.linalg.norm(points - data["target"], axis=1).argmax()]
+    reach = float(np.linalg.norm(far - data["target"]))
+    if reach > data["length"]:
+        data["target"] = (data["target"] + 0.4 * (far - data["target"])).tolist()
+        data["length"] = max(data["length"], WIDENED * reach)
+
+
 def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
     """The first contact that a motion fails by, rather with what is around the arm than with itself; or else the first
     motion's start."""
@@ -189,12 +207,16 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     at = [np.array([np.interp(t, motion.t, own) for own in q.T]) for q in values]
     poses = [poses_at(robot, q) for robot, q in zip(robots, at)]
     picture = scene_still(data, poses, colours, TURNED if len(robots) > 1 else 0.0)
+    for q in motion.ghosts:
+        picture.solids([shape | {"pale": True} for shape in data["looks"]["checked"]], poses_at(robots[0], q), {})
     for robot, q in zip(robots, values):
         picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
     for mark in motion.marks:
-        if mark.t0 <= t <= mark.t1:
-            picture.dot(np.array(mark.start), "fail", 5.0, rings=True)
-            picture.word(mark.text, np.array(mark.start), "fail")
+        if mark.t0 <= t <= mark.t1 and mark.start == mark.end:
+            picture.dot(np.array(mark.start), "fail" if colours else "ink", 5.0, rings=True)
+            picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
+        elif mark.t0 <= t <= mark.t1:
+            picture.line(np.array([mark.start, mark.end]), INK, 1.5)
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")
@@ -228,13 +250,19 @@ def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
         "name": motion.name,
         "text": motion.text,
         "times": np.round(motion.t[rows], 4).tolist(),
-        "values": [base64.b64encode(q[rows].astype("<f4")).decode() for q in (motion.q, *motion.beside)],
+        "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
+        "ghosts": [q.tolist() for q in motion.ghosts],
+        "loads": None if motion.loads is None else _packed(motion.loads[rows]),
         "events": [asdict(event) for event in sorted(motion.events, key=lambda event: event.t)],
         "marks": [
             {"from": mark.start, "to": mark.end, "text": mark.text, "t0": mark.t0, "t1": mark.t1}
             for mark in motion.marks
         ],
     }
+
+
+def _packed(values: Reals) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
 
 
 def _shown(motion: PlayedMotion, most: int) -> np.ndarray:

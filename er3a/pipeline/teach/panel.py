@@ -32,7 +32,7 @@ from er3a.pipeline.stages.trajectory.motion import near_singular
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.drawn import drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
-from er3a.pipeline.viewing.page import render, robots_with, run_command
+from er3a.pipeline.viewing.page import FOUNDATION_WORDS, render, robots_with, run_command
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
@@ -184,16 +184,10 @@ WORDS: dict[str, Any] = {
         "shoulder": N_("Near the shoulder singularity: the wrist centre is {distance} from the plane of axes 1 and 2."),
     },
     "at": {
-        "wrist": N_(
-            "At the wrist singularity: axes 4 and 6 are parallel, so J6 adds nothing to what the other joints do. "
-            "Joint moves are unaffected."
-        ),
-        "elbow": N_(
-            "At the elbow singularity: the arm is straight or folded, so the forearm's end can't move along the arm."
-        ),
+        "wrist": N_("At the wrist singularity: axes 4 and 6 are parallel. Joint moves only."),
+        "elbow": N_("At the elbow singularity: the arm is straight or folded. Joint moves only."),
         "shoulder": N_(
-            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2, where no joint moves it "
-            "along axis 2."
+            "At the shoulder singularity: the wrist centre is in the plane of axes 1 and 2. Joint moves only."
         ),
     },
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
@@ -337,6 +331,7 @@ def write_panel(
         joint_colours=JOINTS,
         degrees=float(np.degrees(1.0)),
         words=panel["words"],
+        foundation=tr(FOUNDATION_WORDS[first_caveat.status]) if first_caveat else "",
         first_caveat=first_caveat,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),

@@ -83,7 +83,7 @@ def _keys(found: Comparison) -> list[tuple[str, str]]:
 def _seen(one: Robot, other: Robot, *, same: bool) -> Markup:
     kind: Kind = "right" if same else "wrong"
     arms = [seen_arm(one, own_title(one.title), "A", kind), seen_arm(other, own_title(other.title), "B", "right")]
-    return side_view(arms, least_wide=UPRIGHT)
+    return side_view(arms, ratio=UPRIGHT)
 
 
 def _columns() -> list[str]:

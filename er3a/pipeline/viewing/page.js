@@ -569,47 +569,32 @@ function linkJoints(page) {
   }
 }
 
-// Of parts that are alike, one at a time: picked by list, buttons, a link or the browser's search. A sheet of paper has all.
+// Of parts that are alike, one at a time: picked by list, a link or the browser's search. A sheet of paper has all.
 function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
   const idOf = (part) => part.querySelector("h2").id;
-  const nameOf = (part) => {
-    const title = part.querySelector("h2").firstChild.textContent.trim();
-    return title.includes(idOf(part)) ? title : `${idOf(part)}${WORDS.colon}${title}`;
-  };
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(nameOf(part), idOf(part))));
-  const choose = (part, all = false) => {
+  chooser.append(...parts.map((part) => new Option(idOf(part).replace(/-solutions$/, ""), idOf(part))));
+  const choose = (part) => {
     chooser.value = idOf(part);
-    everything.checked = all;
-    for (const other of parts) other === part || all ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
+    for (const other of parts) other === part ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
     dispatchEvent(new Event("resize")); // for what takes its size from a part that was not there
     dispatchEvent(new CustomEvent("chosen", { detail: chooser.value }));
   };
-  const go = (index) => {
-    choose(parts[(index + parts.length) % parts.length]);
-    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
-  };
   const label = document.createElement("label");
+  label.className = "pickers";
   label.append(`${group.dataset.oneOf} `, chooser);
-  const every = document.createElement("label");
-  const everything = document.createElement("input");
-  everything.type = "checkbox";
-  every.append(everything, ` ${WORDS.all}`);
-  const strip = document.createElement("p");
-  strip.className = "pickers";
-  strip.append(
-    label, toolButton(WORDS.previous, () => go(chooser.selectedIndex - 1)), toolButton(WORDS.next, () => go(chooser.selectedIndex + 1)), every,
-  );
-  group.before(strip);
-  chooser.addEventListener("change", () => go(chooser.selectedIndex));
-  everything.addEventListener("change", () => choose(parts[chooser.selectedIndex], everything.checked));
+  group.before(label);
+  chooser.addEventListener("change", () => {
+    choose(parts[chooser.selectedIndex]);
+    history.replaceState(null, "", `#${encodeURIComponent(chooser.value)}`);
+  });
   for (const part of parts) part.addEventListener("beforematch", () => choose(part));
   const follow = () => {
     const aim = document.getElementById(decodeURIComponent(location.hash.slice(1)));
     const part = aim && parts.find((each) => each.contains(aim));
-    if (!part || everything.checked) return;
+    if (!part) return;
     choose(part);
     aim.scrollIntoView();
   };
@@ -782,14 +767,16 @@ const mark = (shown) => {
   fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
   fix.querySelector("a").href = shown.dataset.instead;
 };
+const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
 rows.forEach((row) => row.addEventListener("click", () => {
   mark(row);
-  dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
+  pick(row);
 }));
 const played = new URLSearchParams(location.search).get("play");
-const pictured = document.querySelector(".hero [data-one-of] > :not([hidden]) h2")?.id.replace(/-solutions$/, "");
-const called = (name) => rows.find((row) => name && decodeURIComponent(row.hash.slice(1)) === name);
-mark((played ? rows.find((row) => row.dataset.play === played) : rows.find((row) => row.hash === location.hash)) ?? called(pictured) ?? rows[0]);
+const playing = (name) => rows.find((row) => name && row.dataset.play === name);
+const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
+mark(first);
+if (first && location.hash.length < 2) pick(first);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

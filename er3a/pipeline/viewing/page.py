@@ -105,9 +105,6 @@ SCRIPT_WORDS = {
     "elsewhere": N_("{count} of them on other pages"),
     "none": N_("Nothing has all these words: try fewer, or others"),
     "noneAnywhere": N_("No page has all these words in one place: try fewer, or others"),
-    "previous": N_("Previous"),
-    "next": N_("Next"),
-    "all": N_("all at once"),
     "colon": N_(": "),
     "bounds": N_("at least|at most|up to|about"),  # words before a number by which cells are sorted all the same
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,9 +17,9 @@ from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong", "other"]
 MARGIN = 0.06  # of the larger side
-LETTERS = 0.034  # of the height
-WIDE, UPRIGHT = 1.25, 0.77  # at least, of the height
-FLATTEST = 1.6  # width, of the height: letters stay legible over a level arm
+WIDE, UPRIGHT = 1.68, 0.82  # width of a drawing, of its height
+NAME, LABEL, SCALE = 0.06, 0.3, 0.05  # of the height: room for names above, labels at the right, the scale below
+GAP = 0.04  # of the height, between two labels
 BONE = 0.045  # an arm's thickness, of the height of what is drawn
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
@@ -30,11 +30,10 @@ class SeenArm:
 
     Attributes
     ----------
-    title, note : beside the drawing, in the arm's colour
+    title, note : in a corner of the drawing, in the arm's colour
     kind : of its colour
     points_mm : (k, 2), the joints' places from the base to the flange: forward, up
-    reach_mm : outlines (m, 2) of what the tool point reaches
-    holes : a word and a place (2,) each
+    reach_mm : outlines (m, 2) of what the tool point reaches; that of a wrong arm may leave the drawing
     """
 
     title: str
@@ -42,7 +41,16 @@ class SeenArm:
     kind: Kind
     points_mm: Reals
     reach_mm: Sequence[Reals] = ()
-    holes: Sequence[tuple[str, Reals]] = field(default=())
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A word at a place (2,), mm, in the colour of its kind; ``name``: by which an address on the page leads to it."""
+
+    text: str
+    at: Reals
+    kind: Literal["wrong", "open", "hole", "tray", "right"]
+    name: str = ""
 
 
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
@@ -50,31 +58,39 @@ def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence
     return SeenArm(title, note, kind, skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000, reach_mm)
 
 
-def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None, least_wide: float = WIDE) -> Markup:
-    """The drawing as SVG.
+def side_view(
+    arms: Sequence[SeenArm],
+    floor_mm: float | None = None,
+    ratio: float = WIDE,
+    labels: Sequence[Label] = (),
+    trays: Sequence[Reals] = (),
+) -> Markup:
+    """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
     Parameters
     ----------
     arms : drawn in this order, later ones over earlier ones
     floor_mm : height of the floor; None where there is none
-    least_wide : how wide it is at least, of its height
+    ratio : width of the drawing, of its height
+    labels : moved up or down where they would be on each other
+    trays : corners (k, 2), mm, of what is drawn behind the arms
 
     Returns
     -------
-    svg : colours come from the page's style sheet
+    drawing : colours come from the page's style sheet
     """
-    named = [[at] for arm in arms for _, at in arm.holes]
-    corners = np.concatenate([*named, *(each for arm in arms for each in (arm.points_mm, *arm.reach_mm))])
+    right = [arm for arm in arms if arm.kind != "wrong"] or arms
+    corners = np.concatenate([*(arm.points_mm for arm in arms), *(ring for arm in right for ring in arm.reach_mm)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
-    flat = max(0.0, float(high[0] - low[0]) / FLATTEST - float(high[1] - low[1])) / 2
-    low[1], high[1] = low[1] - flat, high[1] + flat
-    names, scale = (lines * 1.7 * LETTERS * (high[1] - low[1]) for lines in (len(arms), 1.2))
-    low[1], high[1] = low[1] - scale, high[1] + names  # room for both
+    tall = float(high[1] - low[1])
+    low[1] -= SCALE * tall
+    high += [LABEL * tall if labels else 0.0, NAME * tall * len(arms)]
     wide, tall = high - low
-    low[0] -= max(0.0, least_wide * tall - wide) / 2
-    wide = max(wide, least_wide * tall)
+    spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
+    low, high = low - spare, high + spare
+    wide, tall = high - low
     parts = [_reach(arm) for arm in arms]
     if floor_mm is not None:
         parts.append(
@@ -82,13 +98,37 @@ def side_view(arms: Sequence[SeenArm], floor_mm: float | None = None, least_wide
                 low[0], -floor_mm, wide, max(0.0, floor_mm - low[1])
             )
         )
+    outline = Markup('<polygon class="tray" points="{}"/>')
+    parts += [outline.format(_line(corners)) for corners in trays]
     parts += [_arm(arm, BONE * tall) for arm in arms]
-    parts += _names(arms, low, high)
-    parts.append(_scale(low, wide, LETTERS * tall))
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
-    return Markup('<svg class="arms" viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
+    drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
     )
+    length = max((each for each in SCALES_MM if each < wide / 3), default=SCALES_MM[0])
+    scale = Markup('<span class="scale" style="width: {:.2f}%">{}</span>').format(
+        100 * length / wide, tr("{length} mm", length=length)
+    )
+    words = [*map(_name, arms), *_labels(labels, low, np.array([wide, tall])), scale]
+    return Markup('<div class="arms" style="--ratio: {:.3f}">{}{}</div>').format(
+        wide / tall, drawn, Markup("").join(words)
+    )
+
+
+def _name(arm: SeenArm) -> Markup:
+    return Markup('<p class="{}"><b>{}</b> {}</p>').format(arm.kind, arm.title, arm.note)
+
+
+def _labels(labels: Sequence[Label], low: Reals, size: Reals) -> list[Markup]:
+    """Words at their places, in parts of the drawing."""
+    shown, above = [], np.inf
+    for label in sorted(labels, key=lambda each: -each.at[1]):
+        left, up = (label.at - low) / size
+        above = min(up, above - GAP)
+        text = '<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">◂ {}</span>'
+        name = Markup(' id="{}"').format(label.name) if label.name else ""
+        shown.append(Markup(text).format(label.kind, name, 100 * left, 100 * above, label.text))
+    return shown
 
 
 def _line(points: Reals) -> str:
@@ -126,27 +166,3 @@ def _arm(arm: SeenArm, thick: float) -> Markup:
         '<polyline class="edge" points="{0}" stroke-width="{1:.0f}"/><polyline points="{0}" stroke-width="{2:.0f}"/>'
     )
     return Markup('<g class="bones {}">{}{}</g>').format(arm.kind, drawn.format(line, thick, 0.78 * thick), joints)
-
-
-def _names(arms: Sequence[SeenArm], low: Reals, high: Reals) -> list[Markup]:
-    """Titles and notes in the upper corner, one below the other, each in its arm's colour; holes at their places."""
-    letters = LETTERS * float(high[1] - low[1])
-    named, y = [], -high[1] + 1.6 * letters
-    for arm in arms:
-        text = '<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}"><tspan font-weight="700">{}</tspan> {}</text>'
-        named.append(Markup(text).format(arm.kind, low[0] + letters, y, letters, arm.title, arm.note))
-        y += 1.5 * letters
-        for word, at in arm.holes:
-            hole = '<text class="hole" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>'
-            named.append(Markup(hole).format(at[0] + letters, -at[1], 0.85 * letters, word))
-    return named
-
-
-def _scale(low: Reals, wide: float, letters: float) -> Markup:
-    """A bar of a round length, in the lower corner."""
-    length = max((each for each in SCALES_MM if each < wide / 3), default=SCALES_MM[0])
-    x, y = low[0] + letters, -low[1] - letters
-    bar = Markup('<path d="M{:.0f} {:.0f}h{}"/>').format(x, y, length)
-    text = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>')
-    said = text.format(x, y - 0.5 * letters, 0.8 * letters, tr("{length} mm", length=length))
-    return Markup('<g class="scale">{}{}</g>').format(bar, said)

@@ -12,7 +12,7 @@ const LAMP = [0.9, -1.3, 2.4];
 const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 8; // lines of the floor on each side of the base
-const PALE = 0.28;
+const PALE = 0.36;
 const HIDDEN = 0.22; // of a line, where a body is before it
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
 const WIDE = 3; // a word, in its heights, about
@@ -94,8 +94,8 @@ export class Space extends Orbit {
       mesh.matrix.multiplyMatrices(matrix(poses[Math.min(shape.frame, poses.length - 1)]), local);
       mesh.updateMatrixWorld(true);
       const through = shape.pale || pale(mesh);
-      const own = shape.pale ? this.page.grid : shape.colour;
-      mesh.material = this.material(colours.get(shape.name) ?? own, through, colours.has(shape.name));
+      const marked = !shape.pale && colours.has(shape.name); // a floor is not red all over
+      mesh.material = this.material(marked ? colours.get(shape.name) : shape.pale ? (shape.own ?? this.page.grid) : shape.colour, through, marked);
       mesh.castShadow = !through;
       mesh.visible = true;
     }
@@ -211,13 +211,13 @@ export class Space extends Orbit {
 
   /**
    * A word near a point in space, where no earlier word is in its way, nor what is kept clear; a line leads to it from afar.
-   * Where no place is free, one that is not `needed` is left out.
+   * Where no place is free, one that is not `needed` is left out. With a `share` a bar below the word is filled that far.
    */
-  word(text, point, css = this.page.ink, needed = true) {
+  word(text, point, css = this.page.ink, needed = true, share = null) {
     const size = WORD * this.letters;
     pen.font = `600 ${size}px system-ui, sans-serif`;
     const [x, y] = this.seen(point);
-    const [width, height] = [pen.measureText(text).width + 0.5 * size, 1.25 * size];
+    const [width, height] = [pen.measureText(text).width + 0.5 * size, (share === null ? 1.25 : 2.2) * size];
     const places = PLACES.filter(([i, j]) => needed || Math.hypot(WIDE * i, j) < NEAR).map(([i, j]) => [x + i * width, y + j * height]);
     const seen = ([u, v]) => Math.min(u, this.width - u) > width / 2 && Math.min(v, this.height - v) > height / 2;
     const apart = ([u, v]) => this.taken.every(([a, b, w, h]) => Math.abs(u - a) > (width + w) / 2 || Math.abs(v - b) > (height + h) / 2);
@@ -227,7 +227,9 @@ export class Space extends Orbit {
     this.taken.push([u, v, width, height]);
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
     if (Math.hypot(edge[0] - x, edge[1] - y) > height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
-    this.#svg("text", { x: u, y: v, fill: css, stroke: this.page.halo, "font-size": size }, text);
+    const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };
+    for (const [part, fill] of share === null ? [] : [[1, this.page.halo], [share, this.page.accent]]) this.#svg("rect", { ...bar, width: part * width, fill });
+    this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
   }
 
   /** The names of what is around the arm: those of `needed` in a colour of their own, then others as far as there is room. */

@@ -12,6 +12,8 @@ from er3a.pipeline.stages.collision.model import Closest, CollisionResults, Path
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+MOMENT = 1e-6  # s
+
 
 def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
     """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
@@ -21,6 +23,18 @@ def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
         q = meant(robot, rows.q_deg)
         motions.append(PlayedMotion(name, "", rows.t_s, q, events(results, name, rows), nearest(rows)))
     return motions
+
+
+def poses(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
+    """The chosen solution of each target at rest, with the line between what is nearest."""
+    return [_pose(robot, found) for found in results.summary.closest if found.kind == "target"]
+
+
+def _pose(robot: Robot, found: Closest) -> PlayedMotion:
+    t, q = np.array([0.0, 1.0]), np.tile(meant(robot, np.array(found.q_deg)), (2, 1))
+    (a, b, c), (d, e, f) = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
+    mark = Mark(0.0, 1.0, (a, b, c), (d, e, f), _clearance(found.clearance_mm))
+    return PlayedMotion(found.name, _least(found).text, t, q, marks=[mark])
 
 
 def events(results: CollisionResults, path: str, rows: PathClearances) -> list[PlayedEvent]:
@@ -51,8 +65,9 @@ def _least(found: Closest) -> PlayedEvent:
 def nearest(rows: PathClearances) -> list[Mark]:
     """The nearest points, each pair shown until the next was measured."""
     until = np.append(rows.t_s[1:], rows.t_s[-1:])
+    until[-2:-1] -= MOMENT  # the last pair alone is shown at the end
     return [
-        Mark(t0, t1, start, end, tr("{clearance} mm", clearance=fixed(clearance, 0)))
+        Mark(t0, t1, start, end, _clearance(clearance))
         for t0, t1, start, end, clearance in zip(
             rows.t_s.tolist(),
             until.tolist(),
@@ -62,3 +77,7 @@ def nearest(rows: PathClearances) -> list[Mark]:
         )
         if np.isfinite(start).all() and np.isfinite(end).all()
     ]
+
+
+def _clearance(clearance_mm: float) -> str:
+    return tr("{clearance} mm", clearance=fixed(clearance_mm, 0))

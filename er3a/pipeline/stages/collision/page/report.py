@@ -18,10 +18,10 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
-from er3a.pipeline.stages.collision.page.played import motions
+from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
@@ -98,7 +98,7 @@ def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
 
 
 NO_BREAK_SPACE = "\u00a0"
-MAX_ROWS = 100  # of a table of targets and paths
+MAX_ROWS = 100  # of the list of targets and paths
 
 
 def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -> None:
@@ -118,10 +118,8 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         tried=TRIED,
         most_often=most_often(results.pairs),
         workspace=workspace(results),
-        player=player(robot, motions(robot, results), scene, opened=worst),
+        player=player(robot, [*motions(robot, results), *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
-        closest=[_closest(found) for found in closest[:MAX_ROWS]],
-        rows_left_out=len(closest) - MAX_ROWS,
         home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",
         home_from=word("collision.home", HOMES, summary.home_from),
         mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
@@ -147,8 +145,7 @@ def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest]) -
 def _row(found: model.Closest) -> ListRow:
     """A path or chosen solution: how near it comes, and to what."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
-    play = None if found.t_s is None else (found.name, found.t_s)
-    return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, "" if play else "#clearance", play)
+    return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, play=(found.name, found.t_s or 0.0))
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:
@@ -176,12 +173,6 @@ def _angles(robot: Robot, values: Reals) -> str:
     if not np.isfinite(values).all():
         return ""
     return ", ".join(fixed(value, 0) + (" mm" if slides else "°") for value, slides in zip(values, robot.slides))
-
-
-def _closest(found: model.Closest) -> list[str]:
-    kind = tr("chosen solution of a target") if found.kind == "target" else tr("path")
-    at = "" if found.t_s is None else moment(found.name, found.t_s, tr("t = {t} s", t=fixed(found.t_s, 2)))
-    return [found.name, kind, fixed(found.clearance_mm, 1), at, say(found.between)]
 
 
 def _mounted(solid: str, depth_mm: float, inside: bool) -> str:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from er3a.pipeline.language import tr
-from er3a.pipeline.messages.numbers import measured
+import numpy as np
+
+from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.numbers import measured, number
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad, Unit
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
+
+FELT = 0.01  # of the greatest peak: what is less is no event
 
 
 def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
@@ -17,9 +21,32 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
         if not path.complete:
             continue
         rows = results.torques.take(results.torques.path == path.name)
-        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in path.joints]
-        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks))
+        felt = [load for load in path.joints if load.peak > FELT * path.hardest.peak]
+        peaks = [PlayedEvent(load.peak_at_s, load.peak_at_s, _peak(load), "plain") for load in felt]
+        motions.append(PlayedMotion(path.name, "", rows.t_s, meant(robot, rows.q), peaks, loads=rows.torque))
     return motions
+
+
+def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
+    """For each joint the arm at rest in the pose in which it holds most."""
+    return [
+        PlayedMotion(
+            holding_name(each.joint),
+            tr("J{joint} holds {torque} at most.", joint=each.joint, torque=_size(each.torque, each.unit)),
+            np.array([0.0, 1.0]),
+            np.tile(meant(robot, np.array(each.q)), (2, 1)),
+        )
+        for each in results.summary.holding
+    ]
+
+
+def holding_name(joint: int) -> str:
+    """What the player calls the pose in which a joint holds most."""
+    return tr("J{joint}, held", joint=joint)
+
+
+def _size(torque: float, unit: Unit) -> str:
+    return with_unit(number(abs(torque), 3), unit)
 
 
 def _peak(load: JointLoad) -> str:

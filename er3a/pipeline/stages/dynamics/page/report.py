@@ -15,7 +15,7 @@ from er3a.pipeline.messages.say import bracketed, joined, listed, word
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import motions
+from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, row_of_panels
@@ -100,7 +100,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
-        _answer(summary),
+        _answer(results),
         arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
@@ -113,7 +113,11 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),
         margins=any(path.payload or path.speed_scale for path in summary.paths),
         figures=figures,
-        player=player(robot, motions(robot, results), opened=_greatest(results)),
+        player=player(
+            robot,
+            [*motions(robot, results), *held(robot, results)],
+            opened=_moment_of(results, _worst(summary.motors)) if summary.motors else None,
+        ),
         drawing_head=drawing_head(),
         wrist=_wrist(summary),
         units=_units(summary),
@@ -121,13 +125,10 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
     )
 
 
-def _greatest(results: model.DynamicsResults) -> tuple[str, float] | None:
-    """The path and the time (s) of the greatest torque that the headline names; None without paths."""
-    rows, motors = results.torques, results.summary.motors
-    if not motors or not len(rows):
-        return None
-    worst = _worst(motors)
-    at = int(np.argmin(np.abs(np.abs(rows.torque[:, worst.joint - 1]) - worst.peak)))
+def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:
+    """The path and the time (s) at which a joint needs most."""
+    rows = results.torques
+    at = int(np.argmin(np.abs(np.abs(rows.torque[:, motor.joint - 1]) - motor.peak)))
     return str(rows.path[at]), float(rows.t_s[at])
 
 
@@ -135,8 +136,9 @@ def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
     return max(motors, key=lambda motor: motor.peak if motor.unit == motors[0].unit else 0.0)
 
 
-def _answer(summary: model.DynamicsSummary) -> Answer:
+def _answer(results: model.DynamicsResults) -> Answer:
     """The greatest torque that is needed, and that of each joint against its limit."""
+    summary = results.summary
     if not summary.motors:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
@@ -157,14 +159,16 @@ def _answer(summary: model.DynamicsSummary) -> Answer:
     keys = [
         (with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))
     ]
-    rows = [_row(motor, worst.peak) for motor in sorted(summary.motors, key=lambda motor: -motor.peak)]
+    order = sorted(summary.motors, key=lambda motor: -motor.peak)
+    rows = [_row(motor, worst.peak, _moment_of(results, motor)) for motor in order]
+    still = [_held_row(motor, worst.holding) for motor in order if motor.holding > model.NOTHING_HELD]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
         "",
         rest,
         keys,
-        (Group(tr("Greatest torque on the paths"), rows),),
+        (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
     )
 
 
@@ -175,18 +179,28 @@ def _mark(motor: model.MotorNeed) -> Mark:
     return "pass" if motor.peak <= motor.peak_limit else "fail"
 
 
-def _row(motor: model.MotorNeed, most: float) -> ListRow:
+def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> ListRow:
     """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    size, held = (
-        with_unit(number(value if value > model.NOTHING_HELD else 0.0, 3), motor.unit)
-        for value in (motor.peak, motor.holding)
-    )
-    limit = tr("limit {value}", value=with_unit(number(motor.peak_limit, 3), motor.unit)) if motor.peak_limit else ""
+    limit = tr("limit {value}", value=_sized(motor.peak_limit, motor)) if motor.peak_limit else ""
+    note = joined([_sized(motor.peak, motor), limit or moment[0]], ", ")
     full = motor.peak_limit or most or 1.0
-    note = joined([size, limit or tr("holding {value}", value=held)], ", ")
+    return ListRow(_mark(motor), f"J{motor.joint}", note, "#motors", moment, 1.0, _filled(motor.peak / full))
+
+
+def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
+    """What a joint holds in its worst pose, which the player shows."""
+    play = holding_name(motor.joint), 0.0
     return ListRow(
-        _mark(motor), f"J{motor.joint}", note, "#motors", None, 1.0, [Part(min(1.0, motor.peak / full), 1.0, "rest")]
+        "none", play[0], _sized(motor.holding, motor), "#rest", play, 1.0, _filled(motor.holding / (most or 1.0))
     )
+
+
+def _filled(share: float) -> list[Part]:
+    return [Part(min(1.0, share), 1.0, "rest")]
+
+
+def _sized(value: float, motor: model.MotorNeed) -> str:
+    return with_unit(number(value if value > model.NOTHING_HELD else 0.0, 3), motor.unit)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

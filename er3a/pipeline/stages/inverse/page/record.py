@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from er3a.finding import is_one
 from er3a.kinematics.forward import skeleton
-from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word, say
 from er3a.pipeline.messages.say import listed
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
+from er3a.pipeline.stages.inverse.page.played import refusal_in_short
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES, capsules
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
@@ -100,7 +99,6 @@ def _about(target: TargetResult, branches: SolutionRows) -> str:
 
 
 def _outcome(branches: SolutionRows, k: int) -> str:
-    refusal = branches.refusal[k]
-    if refusal is not None:
-        return limits_in_short(refusal) if is_one(refusal, "limits_exceeded") else say(refusal)
+    if branches.refusal[k] is not None:
+        return refusal_in_short(branches.refusal[k])
     return "taken" if branches.rank[k] == 1 else "within limits"

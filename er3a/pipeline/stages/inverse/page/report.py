@@ -3,85 +3,36 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
-from er3a.kinematics.forward import skeleton
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import (
     FREE_AT,
     NEAREST_RULE,
-    limits_in_short,
 )
 from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.player.motions import PlayedMotion, bar_of
+from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
+from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
-from er3a.pipeline.viewing.palette import shape_of
-from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, SeenArm, side_view
-from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
 
-
-def solutions_seen(robot: Robot, target: model.TargetResult, branches: model.SolutionRows) -> Markup:
-    """All arm shapes that solve a target, from the side, along its direction; the one taken over the others.
-
-    Parameters
-    ----------
-    branches : the best row of each branch
-    """
-    from_world = np.linalg.inv(robot.base)
-
-    def seen(points_m: Reals) -> Reals:
-        points: Reals = (points_m @ from_world[:3, :3].T + from_world[:3, 3]) * 1000
-        return np.stack([points[..., :2] @ level, points[..., 2]], axis=-1)
-
-    def arm(q: Reals, title: str, note: str, kind: Kind) -> SeenArm:
-        return SeenArm(title, note, kind, seen(skeleton(robot, meant(robot, q))))
-
-    level = np.array([1.0, 0.0])
-    goal = from_world[:2] @ [*np.array(target.xyz_mm) / 1000, 1.0]
-    level = goal / np.hypot(*goal) if np.hypot(*goal) > AT_AXIS else level
-    arms = []
-    shapes = np.array([shape_of(int(branch), label) for branch, label in zip(branches.branch, branches.label)])
-    for rows in (branches.take(shapes == shape) for shape in np.unique(shapes)):
-        refused, taken = not (rows.rank > 0).any(), (rows.rank == 1).any()
-        kind: Kind = "right" if taken else "wrong" if refused else "other"
-        note = tr("chosen") if taken else tr("refused") if refused else ""
-        arms.append(arm(rows.q_deg[0], _shape_word(rows.label[0], int(rows.branch[0])), note, kind))
-    if not arms:
-        arms = [arm(np.array(target.q_ref_deg), tr("arm at the reference"), "", "other")]
-    arms.sort(key=lambda each: ("wrong", "other", "right").index(each.kind))
-    places = [(tr("target"), target.xyz_mm)]
-    if target.neighbours and target.neighbours.shifted_to_mm:
-        places.append((tr("nearest position with a solution"), target.neighbours.shifted_to_mm))
-    named = [(f"◂ {word}", seen(np.array(place) / 1000)) for word, place in places]
-    return side_view([*arms[:-1], replace(arms[-1], holes=named)], least_wide=UPRIGHT)
-
-
-def _shape_word(label: str, branch: int) -> str:
-    """An arm shape: a branch whatever its wrist."""
-    return branch_word(label.removesuffix("_flip").removesuffix("_no"), branch)
-
-
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
-AT_AXIS = 1e-3  # m, nearer to axis 1 a target has no direction
-
-
 MAX_SELF_MOTIONS = 6
 
 
@@ -94,20 +45,21 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
         return results.solutions.take(names == target.name)
 
+    played = [solutions_played(robot, target, best_of_branches(of_target(target))) for target in chosen]
     contradicted = stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, chosen),
+        _answer(summary, chosen, {motion.name: motion for motion in played}),
+        player=player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
+        drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
-        overview=[overview_row(robot, target, of_target(target)) for target in chosen],
         sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
         outcomes=_outcomes(summary.targets),
         not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
-        chosen_heading=tr("Chosen branch, and its J1 to J{count} ({units})", count=robot.joints, units=_units(robot)),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         trips=trips,
         stops=_stops(summary.sequence, {target.name for target in chosen}),
@@ -115,7 +67,14 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
     )
 
 
-def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) -> Answer:
+def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
+    """The target with the most solutions, and the solution taken there."""
+    return max(shown, key=lambda each: each.solutions).name, 0.0
+
+
+def _answer(
+    summary: model.InverseSummary, shown: Sequence[model.TargetResult], played: Mapping[str, PlayedMotion]
+) -> Answer:
     """How many targets the arm can take, and of each what came of it."""
     met = [each for each in summary.targets if each.outcome == "reached"]
     caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
@@ -125,24 +84,30 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     if summary.round_trips:
         keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
-    failed = Group(tr("No solution to take"), [_row(each) for each in shown if each.outcome != "reached"])
+    rows = [_row(each, played[each.name]) for each in shown]
     return Answer(
         headline,
         all_caught(len(caught)),
         "",
         keys,
-        (failed, Group(tr("Reached"), [_row(each) for each in shown if each in met])),
+        (
+            Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
+            Group(tr("Reached"), [row for row in rows if row.mark == "pass"]),
+        ),
     )
 
 
-def _row(target: model.TargetResult) -> ListRow:
+def _row(target: model.TargetResult, motion: PlayedMotion) -> ListRow:
     """A target: how many branches serve it, or what it came to."""
     note = (
-        tr("{within} of {all} solutions within limits", within=target.within_limits, all=target.solutions)
+        tr("{within} of {all} within limits", within=target.within_limits, all=target.solutions)
         if target.outcome == "reached"
         else outcome_word(target.outcome)
     )
-    return ListRow("pass" if target.outcome == "reached" else "fail", target.name, note, f"#{target.name}")
+    mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
+    parts = bar_of(motion, float(motion.t[-1])) if target.solutions else ()
+    length = 1.0 if target.solutions else 0.0
+    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts)
 
 
 def _section(
@@ -152,29 +117,46 @@ def _section(
     contradicted: bool,
 ) -> dict[str, Any]:
     branches = best_of_branches(rows)
+    cells = _branch_rows(rows, branches)
     own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return dict(
         target=target,
-        picture=solutions_seen(robot, target, branches),
         position=_listed(target.xyz_mm),
         orientation=_listed(target.rpy_deg),
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
+        clearance=_clearance(target),
         advice=own if contradicted else listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if is_one(target.method, "closed_form") else say(target.method),
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
-        rows=_branch_rows(rows, branches),
+        rows=cells,
+        listed=_solutions_listed(target.name, branches, cells),
         residual_mm=rows.position_residual_mm.max() if len(rows) else None,
         residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
 
 
+def _solutions_listed(
+    target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
+) -> list[tuple[str, Markup, Markup, str]]:
+    """The branches as they are listed by the player: mark, where it shows each, its name, and what came of it."""
+    return [
+        (
+            "fail" if branches.refusal[k] else "",
+            stretch(target, k, k + SHOWN_S),
+            moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
+            cells[k][-1],
+        )
+        for k in range(len(branches))
+    ]
+
+
 def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
-    """The best row of each branch of a target, by number of the branch."""
+    """The best row of each branch of a target, by its place in the ranking, refused ones last."""
     best = rows.take(rows.first_of_branch)
-    return best.take(np.argsort(best.branch, kind="stable"))
+    return best.take(np.lexsort((best.branch, best.rank, best.rank == 0)))
 
 
 def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
@@ -230,53 +212,9 @@ def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]
     ]
 
 
-def overview_row(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> list[str]:
-    """The cells of a target with its ``rows``: name, place, branches, what is chosen, and its clearance."""
+def _clearance(target: model.TargetResult) -> str:
     near = target.clearance
-    return [
-        Markup('<a href="#{0}">{0}</a>').format(target.name),
-        _listed(target.xyz_mm),
-        tr("{within} of {all}", within=target.within_limits, all=target.solutions),
-        tr("none") if target.chosen_deg is None else _chosen(robot, target, rows),
-        tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else "–",
-    ]
-
-
-def _chosen(robot: Robot, target: model.TargetResult, rows: model.SolutionRows) -> str:
-    """The solution taken of a target's rows: its branch and joints; at a singularity that it is, and the best solution
-    that is at none."""
-    chosen = rows.take(rows.rank == 1)
-    name = branch_word(chosen.label[0], int(chosen.branch[0]))
-    cell = Markup("{0}<br>{1}").format(name, Markup(_joints(target.chosen_deg or ())))
-    if not (kinds := _singular(chosen, 0)):
-        return cell
-    other = rows.take((rows.rank > 0) & rows.first_of_branch & ~rows.singular.any(axis=1))
-    said = tr("▲ {kinds} singularity: joint moves only", kinds=kinds)
-    if len(other):
-        k = int(np.argmin(other.rank))
-        moved = np.abs(other.q_deg[k] - np.array(target.q_ref_deg))
-        room = np.minimum(other.q_deg[k] - shown(robot, robot.lower), shown(robot, robot.upper) - other.q_deg[k])
-        said = tr(
-            "{singular}; not singular: {branch} ({move} move, {margin} from a limit)",
-            singular=said,
-            branch=branch_word(other.label[k], int(other.branch[k])),
-            move=of_a_joint(robot, moved, float(other.greatest_move_deg[k]), 0),
-            margin=of_a_joint(robot, room, float(other.limit_margin_deg[k]), 1),
-        )
-    return cell + Markup("<br><strong>{0}</strong>").format(said)
-
-
-def of_a_joint(robot: Robot, of_joints: np.ndarray, value: float, digits: int) -> str:
-    """The value of one joint, in its unit, among those ``of_joints`` (n,), deg or mm; deg, if it is that of a sum."""
-    apart = np.abs(of_joints - value)
-    slides = apart.min() < SAME and robot.slides[int(apart.argmin())]
-    return with_unit(fixed(value, digits), "mm" if slides else "deg")
-
-
-def _singular(rows: model.SolutionRows, k: int) -> str:
-    """At which singularities a solution is; empty for none."""
-    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, rows.singular[k]) if on]
-    return tr(", ").join(map(singularity_word, kinds))
+    return tr("{far} mm: {pair}", far=fixed(near.least_mm, 1), pair=say(near.between)) if near else ""
 
 
 def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list[list[str]]:
@@ -299,9 +237,8 @@ def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list
 
 
 def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
-    refusal = branches.refusal[k]
-    if refusal is not None:
-        return limits_in_short(refusal) if is_one(refusal, "limits_exceeded") else say(refusal)
+    if branches.refusal[k] is not None:
+        return refusal_in_short(branches.refusal[k])
     taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
         taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)

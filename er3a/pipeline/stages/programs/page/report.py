@@ -38,6 +38,7 @@ from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
 
+SHORTEST_S = 0.005  # of a cycle: what is shorter was not followed
 MAX_LINES = 400  # of a listing that the page shows
 AROUND = 3  # lines around those with motions or findings, in a longer listing
 
@@ -89,7 +90,7 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
 
 def _in_few_words(fault: Fault) -> str:
     """What is wrong first, up to where its details begin."""
-    return re.split(r"[:;(：；（]", fault.moments[0].what)[0].strip()
+    return re.split(r"[:;(：；（]| while ", fault.moments[0].what)[0].strip()
 
 
 def _passed(program: model.ProgramSummary) -> str:
@@ -116,7 +117,7 @@ def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> d
         status=program.outcome,
         expected=as_expected(program),
         language=LANGUAGES[program.language].title,
-        cycle=cycle_text(program),
+        cycle=cycle_text(program) if program.cycle.stopping_s >= SHORTEST_S else "–",
         lines=_listing(program, text, rows, motion, found),
         elsewhere=elsewhere,
     )

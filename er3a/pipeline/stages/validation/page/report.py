@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
-from er3a.kinematics.forward import skeleton
+from er3a.identifiability.entries import column_of
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.forward import frames, skeleton
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured, number
 from er3a.pipeline.messages.pages import GRADE_NAMES
-from er3a.pipeline.messages.say import bracketed, say, word
+from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
@@ -34,10 +37,11 @@ from er3a.pipeline.viewing.page import (
     render_stage,
     text_address,
 )
-from er3a.pipeline.viewing.side_view import UPRIGHT, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, Label, seen_arm, side_view
 from er3a.robots.robot import Robot
 
 SEEN_M = 2e-3  # by which two arms differ in a drawing
+ANGLES = ("alpha", "beta", "offset")
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -128,7 +132,9 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         stored,
         output,
         _answer(stored.robot, summary, instead),
-        arms=_both_arms(robot, study.robot(instead) if instead else other_robot(robot, summary.evidence)),
+        arms=_both_arms(
+            robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}
+        ),
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
         head_links={instead: f"../{instead}/validation.html"} if instead else {},
@@ -148,15 +154,38 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     )
 
 
-def _both_arms(robot: Robot, other: Robot | None) -> Markup:
-    """The arm of the table, and the one that documents describe, from the side at one scale."""
+def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -> Markup:
+    """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
+    scale."""
     zero = np.zeros(robot.joints)
     seen = [skeleton(each, zero) for each in (robot, other) if each is not None]
     differs = len(seen) == 2 and (seen[0].shape != seen[1].shape or np.abs(seen[0] - seen[1]).max() > SEEN_M)
-    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "wrong" if differs else "right")]
+    kind: Kind = "wrong" if differs else "right"
+    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), kind)]
     if other is not None and differs:
         arms.append(seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
-    return side_view(arms, least_wide=UPRIGHT)
+    return side_view(arms, ratio=UPRIGHT, labels=_doubts(robot, evidence))
+
+
+def _doubts(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
+    """The entries of geometry that evidence contradicts or leaves open, each at the link or joint that it is of."""
+    parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
+    found = []
+    for joint, cells in evidence.get("rows", ()):
+        shown = [(column_of(cell["entry"]), cell) for cell in cells if cell]
+        along = parts[joint, ALONG_Z, :3, 3]
+        middles = {"d": along / 2, "a": along + parts[joint, TO_NEXT_AXIS, :3, 3] / 2}
+        texts: list[tuple[str, Reals, Literal["wrong", "open"]]] = [
+            (f"{cell['entry']}: {cell['value']} → {cell['gives']}", middles[kind], "wrong")
+            for kind, cell in shown
+            if cell["status"] == "contradicted" and cell["gives"] and kind in middles and cell["value"] != "0"
+        ]
+        if unsure := [cell["entry"] for kind, cell in shown if cell["status"] == "open" and kind in ANGLES]:
+            texts.append((f"{joined(unsure, ', ')}: ?", along, "open"))
+        for text, local, kind in texts:
+            place = T[joint - 1, :3, :3] @ local + T[joint - 1, :3, 3]
+            found.append(Label(text, 1000 * place[::2], kind))
+    return found
 
 
 def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:

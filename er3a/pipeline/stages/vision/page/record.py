@@ -6,15 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import scipy
 
 from er3a.files.vision_file import VisionFile, load_vision
-from er3a.geometry.transforms import posed
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, SampleRows, VisionResults, VisionSummary
+from er3a.pipeline.stages.vision.model import ObjectResult, SampleRows, VisionResults, VisionSummary
+from er3a.pipeline.stages.vision.page.played import OBJECT_M, SIGHT, placed
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
@@ -23,7 +22,6 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 MAGNIFIED = 50.0
-SIGHT = 0.35  # of the farthest distance, how far the drawn pyramid reaches
 IMAGE = 1280  # pixels, the width of the picture that the viewer shows through the camera
 STEP_S, SAMPLE_S = 0.1, 0.5
 NOTE = f"""# Camera, samples and grasps
@@ -70,15 +68,10 @@ def record(study: Study, stored: Stored[VisionResults], output: Path) -> float |
     )
 
 
-def _placed(pose: PoseEstimate) -> Reals:
-    R = scipy.spatial.transform.Rotation.from_quat(pose.quaternion_wxyz, scalar_first=True).as_matrix()
-    return posed(R, np.array(pose.xyz_mm) / 1000)
-
-
 def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str, Logged]:
     found = summary.calibration
     assert found is not None
-    camera = _placed(found.hand_eye)
+    camera = placed(found.hand_eye)
     fixed = found.setup == "eye_to_hand"
     if not fixed:
         camera = forward(robot.without_tool(), meant(robot, np.array(task.picture_deg or task.home_deg))) @ camera
@@ -93,7 +86,7 @@ def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str,
     )
     shapes: dict[str, Logged] = {"camera": [place, sight]}
     if not fixed:
-        board = _placed(found.board)
+        board = placed(found.board)
         place = rr.Transform3D(translation=board[:3, 3], mat3x3=board[:3, :3])
         shapes["board"] = [place, rr.Arrows3D(vectors=0.08 * np.eye(3), colors=AXES, radii=0.002)]
     return shapes
@@ -115,7 +108,7 @@ def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
     w, x, y, z = each.quaternion_wxyz
     place = rr.Transform3D(translation=np.array(each.xyz_mm) / 1000, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
     colour, entity = rgb(MODEL if each.grasp else MUTED), f"objects/{each.name}"
-    box = rr.Boxes3D(sizes=[[0.04, 0.04, 0.06]], colors=[colour], labels=[each.name], show_labels=True)
+    box = rr.Boxes3D(sizes=[OBJECT_M], colors=[colour], labels=[each.name], show_labels=True)
     axes = rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002)
     shapes: dict[str, Logged] = {entity: [place, box], f"{entity}/axes": axes}
     if each.error_mm:

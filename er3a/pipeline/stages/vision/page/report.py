@@ -16,10 +16,10 @@ from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
 from er3a.pipeline.messages.say import bracketed, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
+from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
 from er3a.pipeline.viewing.figures import new_figure
@@ -29,8 +29,6 @@ from er3a.pipeline.viewing.page import (
     render_stage,
 )
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
-from er3a.robots.joint_limits import meant
-from er3a.robots.robot import Robot
 
 MAX_IMAGES = 9
 WIDEST_PX = 480
@@ -111,8 +109,6 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
-POINTER_M = 0.15
-WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 AXES = ("x", "y", "z")
 PARTS = {
     "camera": N_("camera's noise in one reading"),
@@ -127,12 +123,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
     found, scene = summary.calibration, study.scene(name, stored.stage)
+    task = load_vision(str(study.entry(name).vision))
     robot = study.robot(name)
     render_stage(
         study,
         stored,
         output,
-        _answer(summary),
+        _answer(results),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
@@ -140,18 +137,24 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
-        overview=[_overview(each) for each in summary.objects],
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
         errors=[_errors(each) for each in summary.objects if each.error_mm],
         error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
-        player=player(robot, _motions(robot, results), scene),
+        player=player(
+            robot,
+            motions(robot, results, task),
+            scene,
+            opened=next((grasp_moment(results, each) for each in summary.objects), None),
+            added=seen_shapes(robot, task, summary),
+        ),
         drawing_head=drawing_head(),
     )
 
 
-def _answer(summary: model.VisionSummary) -> Answer:
+def _answer(results: model.VisionResults) -> Answer:
     """How many objects can be grasped, and how well the camera's place is known."""
+    summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
@@ -163,7 +166,7 @@ def _answer(summary: model.VisionSummary) -> Answer:
     if found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
-    shown = [_row(each) for each in summary.objects]
+    shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [Group(tr("Objects"), shown)]
     if found and (found.suspects or found.warnings):
         texts = [say(each) for each in (*found.suspects, *found.warnings)]
@@ -173,12 +176,12 @@ def _answer(summary: model.VisionSummary) -> Answer:
     return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
 
 
-def _row(each: model.ObjectResult) -> ListRow:
+def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
-        return ListRow("fail", each.name, say(each.refusal) if each.refusal else tr("none"), "#objects")
+        return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
     note = tr("{percent} % success", percent=fixed(100 * each.grasp.probability, 1))
-    return ListRow("pass", each.name, note, "#objects", (each.name, 0.0))
+    return ListRow("pass", each.name, note, "#objects", moment)
 
 
 def _image_folder(study: Study, name: str) -> Path:
@@ -186,22 +189,6 @@ def _image_folder(study: Study, name: str) -> Path:
     file = Path(str(study.entry(name).vision))
     head = file.parent / load_vision(file).calibration
     return (head.parent / load(HandEyeFile, head).samples).parent
-
-
-def _motions(robot: Robot, results: model.VisionResults) -> list[PlayedMotion]:
-    """The way to each object grasped and away from it, with a line that points at the object."""
-    motions = []
-    for each in results.summary.objects:
-        rows = results.ways.take(results.ways.target == each.name)
-        if each.grasp is None or not len(rows):
-            continue
-        parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
-        events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-        x, y, z = (value / 1000 for value in each.xyz_mm)
-        mark = Mark(0.0, float(rows.t_s[-1]), (x, y, z), (x, y, z + POINTER_M), each.name)
-        text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
-        motions.append(PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, [mark]))
-    return motions
 
 
 def _listed(values: Iterable[float], digits: int = 1) -> str:
@@ -235,24 +222,15 @@ def _touched(found: model.TouchResult) -> list[list[str]]:
     ]
 
 
-def _overview(each: model.ObjectResult) -> list[str]:
-    if each.grasp:
-        parts = {"grasp": each.grasp.grasp, "turn": fixed(each.grasp.turn_deg, 0)}
-        outcome = tr("{grasp}, turned by {turn} deg", **parts)
-        success = f"{100 * each.grasp.probability:.1f} ± {196 * each.grasp.deviation:.1f} %"
-    else:
-        outcome, success = say(each.refusal), tr("none")
-    counts = tr("{poses} poses, {solutions} solutions", poses=each.poses, solutions=each.solutions)
-    name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
-    return [name, _listed(each.xyz_mm), outcome, success, counts]
-
-
 def _grasp(each: model.ObjectResult) -> list[str]:
     grasp = each.grasp
     assert grasp is not None
     near = tr("none") if grasp.clearance_mm is None else fixed(grasp.clearance_mm, 0)
+    name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
     return [
-        each.name,
+        name,
+        tr("{grasp}, turned by {turn} deg", grasp=grasp.grasp, turn=fixed(grasp.turn_deg, 0)),
+        f"{100 * grasp.probability:.1f} ± {196 * grasp.deviation:.1f} %",
         _listed(grasp.tool_xyz_mm),
         panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
         panel_link(grasp.q_deg, _listed(grasp.q_deg)),

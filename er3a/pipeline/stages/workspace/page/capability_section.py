@@ -9,15 +9,12 @@ import numpy as np
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import AxLine, Line2D
-from matplotlib.patches import Patch, Polygon, Rectangle
 
 import er3a.pipeline.messages.collision  # noqa: F401
-from er3a.collision.scene import Plane, Scene
 from er3a.finding import Finding
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say
@@ -30,13 +27,12 @@ from er3a.pipeline.messages.workspace import (
 )
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
-from er3a.pipeline.stages.workspace.page.tray import Placing, Tray, limit_text
+from er3a.pipeline.stages.workspace.page.tray import Placing, limit_text
 from er3a.pipeline.stages.workspace.page.workspace_figures import slide_names
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.drawn import outlines
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED
+from er3a.pipeline.viewing.palette import INK
 from er3a.robots.robot import Robot
 
 ROUNDING = 1e-6  # mm
@@ -162,32 +158,8 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
     ]
 
 
-_EDGE_ON = 1e-6  # by which a plane's normal may leave the drawing for the plane to be a line in it
-_STYLE: dict[str, Any] = {"edgecolor": MUTED, "linewidth": 1.1, "hatch": "////", "fill": False, "zorder": 1.5}
-
-
-def draw_scene(axes: Axes, scene: Scene | None, shown: list[int]) -> None:
-    """Draw the solids of a scene in mm, which widen no limits of the drawing; a plane only where it is seen edge on.
-
-    Parameters
-    ----------
-    shown : the numbers of the two axes that the drawing shows
-    """
-    for solid in scene.solids if scene else ():
-        if isinstance(solid, Plane):
-            normal = np.asarray(solid.normal)[shown]
-            if abs(np.linalg.norm(normal) - 1.0) < _EDGE_ON:
-                along = np.array([-normal[1], normal[0]])
-                start = 1000 * solid.offset * normal
-                axes.add_artist(AxLine(tuple(start), tuple(start + along), None, color=MUTED, linewidth=1.1))
-            continue
-        for outline in outlines(solid, shown):
-            axes.add_artist(Polygon(1000 * outline, **_STYLE))
-
-
 SHADES = "viridis_r"
 PIXELS = 301
-_LABEL = 0.035  # height of a label, of the longer side of a drawing
 
 
 def upright_slices(robot: Robot, capability: model.CapabilitySummary, cells: model.CapabilityCells) -> Figure:
@@ -241,47 +213,6 @@ def across_slide(capability: model.CapabilitySummary) -> Reals:
     return np.array(frame.axes)[[0, 2]] @ frame.origin_m if capability.bar_m else np.zeros(2)
 
 
-def placement_views(
-    robot: Robot,
-    capability: model.CapabilitySummary,
-    placement: model.PlacementSummary,
-    places: model.BoxPlaces,
-    scene: Scene | None = None,
-    trays: Sequence[Tray] = (),
-) -> Figure:
-    """Where the middle of the tray can stand, from above and from the side, with the best places as boxes; ``trays`` on
-    or over surfaces besides these, by the surface's name."""
-    numbered = [place for _, place in placement.named_places]
-    over = [(own_title(each.below.name), each.place) for each in trays if each.below and each.place not in numbered]
-    percent = 100 * places.manipulability_m3 / capability.overall.best_manipulability_m3
-    figure, axes = new_figure(1, 2, width=12.0, height=5.6)
-    top = max(1.0, float(percent.max()))
-    for panel, (across, up, title) in zip(axes, (("x", "y", tr("From above")), ("x", "z", tr("From the side")))):
-        shown = ["xyz".index(across), "xyz".index(up)]
-        steps = [placement.spacing_m[axis] for axis in shown]
-        edges, value = _raster(places.centre_m[:, shown], steps, percent)
-        extent = [1000 * edge for edge in edges]
-        shown_value = np.ma.masked_less(value, 0)
-        mesh = panel.pcolormesh(*extent, shown_value.T, cmap=SHADES, vmin=0, vmax=top, rasterized=True)
-        draw_scene(panel, scene, shown)
-        _draw_boxes(panel, [*placement.named_places, *over], shown)
-        panel.plot(
-            *skeleton(robot, np.zeros(robot.joints)).T[shown] * 1000, color=INK, linewidth=2.2, marker="o", markersize=3
-        )
-        equal_scale(panel, f"{across} (mm)", f"{up} (mm)")
-        panel.set_title(title)
-        panel.grid(False)
-    figure.colorbar(mesh, ax=axes, label=tr("least manipulability in the tray (% of the arm's best)"), shrink=0.85)
-    handles = [
-        Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.2, label=tr("arm, all joints 0")),
-        Patch(facecolor="none", edgecolor=HIGHLIGHT, label=tr("best positions, numbered or named as in the tables")),
-    ]
-    if scene:
-        handles.append(Patch(fill=False, edgecolor=MUTED, hatch="////", label=tr("scene")))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    return figure
-
-
 def _looked_up(values: Reals | model.Singles, row: Integers) -> np.ma.MaskedArray:
     return np.ma.masked_array(values[np.maximum(row, 0)], row < 0)
 
@@ -293,40 +224,9 @@ def _draw_arm(axes: Axes, robot: Robot, frame: model.SectionFrame, origin: Reals
     axes.plot(local[:, 0], local[:, 2], color=INK, linewidth=2.0, marker="o", markersize=3, solid_capstyle="round")
 
 
-def _raster(points: Reals, steps: list[float], percent: model.Singles) -> tuple[list[Reals], Reals]:
-    """Edges of the raster's columns and rows (m), and the largest value in each of its cells (-1: none there)."""
-    low = points.min(axis=0)
-    index = tuple(np.floor((points - low) / steps + 1e-3).astype(int).T)
-    shape = tuple(part.max() + 1 for part in index)
-    value = np.full(shape, -1.0)
-    np.maximum.at(value, index, percent)
-    return [start + (np.arange(n + 1) - 0.5) * step for start, step, n in zip(low, steps, shape)], value
-
-
-def _draw_boxes(axes: Axes, listed: Sequence[tuple[str, model.PlaceSummary]], shown: list[int]) -> None:
-    """Outlines with their names; boxes that fall on each other share a label."""
-    labels: dict[tuple[float, float], list[str]] = {}
-    for name, place in listed:
-        centre, size = (1000 * np.array(part)[shown] for part in (place.centre_m, place.size_m))
-        low = centre - size / 2
-        axes.add_patch(Rectangle((low[0], low[1]), *size, fill=False, edgecolor=HIGHLIGHT, linewidth=1.6))
-        labels.setdefault((low[0].round(3), (low[1] + size[1]).round(3)), []).append(name)
-    shade = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1}
-    near = _LABEL * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim()))
-    taken: list[tuple[float, float]] = []
-    for corner, numbers in sorted(labels.items()):
-        x, y = corner
-        while any(abs(x - other[0]) < 2 * near and abs(y - other[1]) < near for other in taken):
-            y -= near  # below the label that is there already
-        taken.append((x, y))
-        text = ", ".join(numbers)
-        axes.annotate(text, (x, y), (3, -10), textcoords="offset points", color=HIGHLIGHT, fontsize=8, bbox=shade)
-
-
 def capability_context(
     robot: Robot,
     results: model.WorkspaceResults,
-    scene: Scene | None = None,
     placing: Placing | None = None,
     payload: str = "",
 ) -> dict[str, Any]:
@@ -344,21 +244,13 @@ def capability_context(
         "tray_rows": tray_rows(placing, results, placement, payload)
         if placing and isinstance(placement, model.PlacementSummary)
         else [],
-    } | _placement_context(robot, results, capability, placement, scene, placing)
+    } | _placement_context(capability, placement)
 
 
-def _placement_context(
-    robot: Robot,
-    results: model.WorkspaceResults,
-    capability: model.CapabilitySummary,
-    placement: model.Placement,
-    scene: Scene | None,
-    placing: Placing | None,
-) -> dict[str, Any]:
+def _placement_context(capability: model.CapabilitySummary, placement: model.Placement) -> dict[str, Any]:
     if not isinstance(placement, model.PlacementSummary):
         return {"nowhere": say(placement)}
     rows = [place_row(name, place, capability) for name, place in placement.named_places]
-    trays = [each.tray for each in placing.tried] if placing else []
     return {
         "nowhere": "",
         "placing_scene": placement.scene,
@@ -366,17 +258,6 @@ def _placement_context(
         "stands": [stand_text(stand, placement) for stand in placement.stands],
         "points_serving": placement.points_serving,
         "place_rows": rows,
-        "place_picture": Picture(
-            placement_views(robot, capability, placement, results.places, scene, trays),
-            tr("Possible positions of the tray centre, from above and from the side, with the best ones"),
-            tr(
-                "{fitting} grid positions pass. A colour marks where the tray's centre passes; it shows the best value "
-                "along the line of sight.",
-                fitting=number(placement.fitting),
-            ),
-        )
-        if len(results.places)
-        else None,
     }
 
 

@@ -32,7 +32,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     contradicted = stored.rests_on.get("validation") == "fail"
     placing = placing_of(study, stored)
-    context = _context(robot, results, scene, placing, _payload(study, stored) if placing else "")
+    context = _context(robot, results, placing, _payload(study, stored) if placing else "")
     if contradicted:
         context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
     bare = any(each.reason == "tool" for each in summary.assumed)
@@ -53,15 +53,14 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
 
 def _labelled(
     robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None
-) -> Picture | None:
+) -> Markup | None:
     """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
     if results.summary.proof.bars or results.summary.hull.volume_m3 <= 0:
         return None
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
-    figure = workspace_figures.labelled(robot, results, floor_mm, placing.tray if placing else None)
-    text = tr("All joints at 0; blue is reachable.")
-    return Picture(figure, text, text)
+    trays = [each.tray for each in placing.tried] if placing else []
+    return workspace_figures.labelled(robot, results, floor_mm, trays)
 
 
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: bool) -> Answer:
@@ -96,7 +95,7 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#void-{number_}")
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}")
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -104,10 +103,10 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     if placing is None:
         return [ListRow("caution", tr("nowhere"), tr("no place fits"), "#placement")]
     rows = []
-    for tried in placing.tried:
+    for number_, tried in enumerate(placing.tried, start=1):
         blocked = sum(map(len, placing.hindered(tried).values()))
         note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
-        rows.append(ListRow("caution" if blocked else "pass", tried.tray.where, note, "#placement"))
+        rows.append(ListRow("caution" if blocked else "pass", tried.tray.name, note, f"#tray-{number_}"))
     return rows
 
 
@@ -119,14 +118,12 @@ def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
     there = tr("What the arm can carry at the tray was not examined.")
     if summary is None:
         return joined([lead, there], " ")
-    return Markup('{} <a href="dynamics.html#payload">{}</a>').format(lead, there)
+    return joined([lead, there], " ")
 
 
-def _context(
-    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None, payload: str
-) -> dict[str, Any]:
+def _context(robot: Robot, results: model.WorkspaceResults, placing: Placing | None, payload: str) -> dict[str, Any]:
     summary = results.summary
-    return capability_context(robot, results, scene, placing, payload) | {
+    return capability_context(robot, results, placing, payload) | {
         "section": Picture(
             workspace_figures.sections(robot, results),
             tr("Sections across the slide of joint 1: density of the samples, and proven cells")

@@ -71,6 +71,11 @@ class Tray:
         return self.below.height_m if self.below and self.below.place is None else None
 
     @property
+    def name(self) -> str:
+        """The surface that it is on or over, in few words."""
+        return tr("tray over {name}", name=own_title(self.below.name)) if self.below else tr("tray")
+
+    @property
     def where(self) -> str:
         """On what it stands."""
         if self.below is None:

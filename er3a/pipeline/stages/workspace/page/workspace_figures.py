@@ -13,7 +13,7 @@ from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
 from er3a.collision.scene import Scene
@@ -27,7 +27,8 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import BODY, HIGHLIGHT, INK, JOINTS, MODEL, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.palette import BODY, HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
+from er3a.pipeline.viewing.side_view import Label, SeenArm, border_lines, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -54,7 +55,8 @@ PROOF = {
     N_("unreachable"): "#ffffff",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-PROOF_BLUE = "#cfe3f2"
+RATIO = 1.2  # of the labelled drawing, width over height
+STAND_M = 0.005  # half the width of a drawn stand
 _CLOUD_CELLS = 80
 PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
 
@@ -147,36 +149,27 @@ def _draw_cloud(axes: Axes, bars: model.Bars, points: Reals) -> QuadMesh:
     return axes.pcolormesh(*edges, masked(counts).T, cmap=DENSITY, norm=log_norm(counts), rasterized=True)
 
 
-def _draw_proof(
-    axes: Axes,
-    proof: model.ProofCells,
-    bars: model.Bars | None,
-    shades: Sequence[str] = tuple(PROOF.values()),
-    sides: Sequence[int] = (1,),
-) -> None:
-    """Cells of the proof, in a shade for each of its states; on both sides of axis 1 for ``sides`` 1 and -1."""
+def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) -> None:
+    """Cells of the proof, in a shade for each of its states."""
     corners = (np.concatenate([proof.rho_m, proof.z_m], axis=1) + _origin_across(bars)[[0, 0, 1, 1]]) * 1000
     filled, empty = proof.filled_ratio, proof.empty_ratio
     if bars:  # their ends are empty
         filled, empty = filled / np.maximum(1 - empty, 1e-12), (empty >= 1).astype(float)
         filled = np.where((filled > 0.5) | (empty == 1), 1 - empty, 0.0)
     kinds = np.select([1 - filled - empty > 0.5, empty >= 0.5, filled < 1], [UNDECIDED, EMPTY, WEDGE], FILLED)
-    for kind, colour in enumerate(shades):
+    for kind, colour in enumerate(PROOF.values()):
         a, b, c, d = corners[kinds == kind].T
         boxes = np.stack([np.stack([a, c], 1), np.stack([b, c], 1), np.stack([b, d], 1), np.stack([a, d], 1)], axis=1)
-        for side in sides:
-            corners_seen = list(boxes * [side, 1])
-            axes.add_collection(
-                PolyCollection(corners_seen, facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
-            )
+        axes.add_collection(
+            PolyCollection(list(boxes), facecolors=colour, edgecolors=colour, linewidths=0.2, rasterized=True)
+        )
     axes.set_ylim(corners[:, 2].min(), corners[:, 3].max())
 
 
-def _draw_border(axes: Axes, border: model.Border, colour: str = INK, sides: Sequence[int] = (1,)) -> None:
+def _draw_border(axes: Axes, border: model.Border) -> None:
     for each in np.unique(border.arc):
         line = border.take(border.arc == each)
-        for side in sides:
-            axes.plot(line.rho_m * 1000 * side, line.z_m * 1000, color=colour, linewidth=1.3)
+        axes.plot(line.rho_m * 1000, line.z_m * 1000, color=INK, linewidth=1.3)
 
 
 def _about(axis: model.AxisSummary, points: Reals) -> Reals:
@@ -266,67 +259,46 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
     return points
 
 
-LABEL_GAP = 0.07  # of the figure's height, between two labels
-
-
-def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, tray: Tray | None) -> Figure:
-    """The arm in what it reaches, seen across axis 1, with names: reach, voids, floor, tray.
+def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, trays: Sequence[Tray]) -> Markup:
+    """The arm in what it reaches, seen across axis 1, with names: reach, voids, floor, trays.
 
     Parameters
     ----------
     floor_mm : height of the floor in the base's frame; None where there is none
-    tray : where it is best placed; None where it is placed nowhere
+    trays : where they are placed, turned into view
 
     Returns
     -------
-    figure : of axes 1 that turn; what is behind axis 1 is drawn as what is before it
+    drawing : as HTML
     """
-    figure, axes = new_figure(1, 1, width=9.0, height=7.6)
-    reach, axis = results.summary.reach_m, results.summary.axis
-    sides, shades = (1, -1), (PROOF_BLUE, PROOF_BLUE, PROOF_BLUE, "#ffffff")
-    _draw_proof(axes, results.proof, None, shades, sides)
-    _draw_border(axes, results.border, MODEL, sides)
-    points = skeleton(robot, np.zeros(robot.joints))
-    arm = np.stack([(points - axis.point_m)[:, 0], (points - axis.point_m) @ axis.direction], axis=1) * 1000
-    axes.plot(*arm.T, color=INK, linewidth=11, solid_capstyle="round", solid_joinstyle="round", zorder=5)
-    axes.plot(*arm.T, color="#e9edf1", linewidth=8, solid_capstyle="round", solid_joinstyle="round", zorder=6)
-    axes.plot(*arm.T, "o", color=REFERENCE, markersize=6, zorder=7)
-    top, wide = 1000 * reach.highest, 1000 * reach.furthest_from_axis
-    low = min(1000 * reach.lowest, floor_mm if floor_mm is not None else 0.0)
-    labels = [(tr("reaches {far} mm", far=fixed(wide, 0)), (0.94 * wide, 0.55 * top), MODEL)]
-    for void in results.summary.enclosed_voids:
-        at = (void.high_m[0] * 500, 1000 * void.centroid_m[2])
-        size = fixed(1000 * void.volume_m3.lower, 1)
-        labels.append((tr("hole, {size} L", size=size), at, HIGHLIGHT))
-    if floor_mm is not None:
-        axes.axhspan(low - 80, floor_mm, color=MUTED, alpha=0.18, linewidth=0)
-        axes.axhline(floor_mm, color=MUTED, linewidth=1.2)
-        axes.text(-1.05 * wide, floor_mm - 8, tr("floor"), color=MUTED, va="top", fontsize=10)
-    if tray is not None:
-        x, y, height = (1000 * value for value in tray.place.centre_m)
-        wide_x, wide_y, tall = (1000 * value for value in tray.place.size_m)
-        away = float(np.hypot(x, y))
-        half = (abs(x) * wide_x + abs(y) * wide_y) / max(2 * away, 1.0)  # along the line from the axis to it
-        corner = (away - half, height - tall / 2)
-        if tray.floor is not None:
-            axes.plot([away, away], [1000 * tray.floor, corner[1]], color=VERDICTS["pass"], linewidth=3, zorder=4)
-        axes.add_patch(Rectangle(corner, 2 * half, tall, color=VERDICTS["pass"], zorder=4))
-        labels.append((tr("tray, turned into view"), (away, height), VERDICTS["pass"]))
-    _name(axes, labels, 1.12 * wide, (low, top))
-    axes.set_xlim(-1.08 * wide, 1.55 * wide)
-    axes.set_ylim(low - 80, 1.06 * top)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    return figure
+    summary, border = results.summary, results.border
+    points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
+    arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
+    far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
+    lines = border_lines(border.arc, border.rho_m, border.z_m)
+    labels = [_void_label(number_, void) for number_, void in enumerate(summary.voids, start=1)]
+    outlines = [_tray_corners(tray) for tray in trays]
+    labels += [
+        Label(tray.name, corners[1], "tray", f"tray-{k}") for k, (tray, corners) in enumerate(zip(trays, outlines), 1)
+    ]
+    seen = SeenArm(own_title(robot.title), far, "right", arm, lines)
+    return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
-def _name(axes: Axes, labels: list[tuple[str, tuple[float, float], str]], x: float, span: tuple[float, float]) -> None:
-    """Labels in a column at ``x``, in the order of what they name, each with a line to it, none over another."""
-    gap, above = LABEL_GAP * (span[1] - span[0]), np.inf
-    for text, at, colour in sorted(labels, key=lambda each: -each[1][1]):
-        y = min(at[1], above - gap)
-        line = {"arrowstyle": "-", "color": colour, "linewidth": 1.2}
-        axes.annotate(
-            text, at, (x, y), color=colour, fontsize=12, fontweight="bold", va="center", arrowprops=line, zorder=9
-        )
-        above = y
+def _void_label(number_: int, void: model.VoidSummary) -> Label:
+    name = tr("hole, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
+    if void.kind != "enclosed":
+        name = tr("pocket, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
+    return Label(name, 1000 * np.array([void.high_m[0] / 2, void.centroid_m[2]]), "hole", f"hole-{number_}")
+
+
+def _tray_corners(tray: Tray) -> Reals:
+    """The outline (k, 2), mm, of a tray and its stand, turned about axis 1 into view."""
+    x, y, height = tray.place.centre_m
+    wide_x, wide_y, tall = tray.place.size_m
+    away = float(np.hypot(x, y))
+    half = (abs(x) * wide_x + abs(y) * wide_y) / max(2 * away, 1e-3)  # along the line from the axis to it
+    low, high = height - tall / 2, height + tall / 2
+    foot = low if tray.floor is None else tray.floor
+    stand = [(away + STAND_M, low), (away + STAND_M, foot), (away - STAND_M, foot), (away - STAND_M, low)]
+    return 1000 * np.array([(away - half, high), (away + half, high), (away + half, low), *stand, (away - half, low)])

@@ -1,0 +1,115 @@
+"""The objects for the player: the way to each one's grasp, the camera with what it sees, and each object's place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from er3a.files.vision_file import VisionFile
+from er3a.geometry.transforms import inverted, posed
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import N_, tr
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import say
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
+from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, VisionResults, VisionSummary
+from er3a.pipeline.viewing.drawn import Shape
+from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
+from er3a.robots.joint_limits import meant
+from er3a.robots.robot import Robot
+
+WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
+SIGHT = 0.3  # of the farthest distance, how far the drawn pyramid reaches
+CAMERA_M = (0.05, 0.05, 0.04)
+SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
+CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
+
+
+def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
+    """The way to each object and away from it, with the arm before the approach drawn pale; the arm where it waits for
+    an object that it does not grasp."""
+    home, sight = meant(robot, np.array(task.home_deg)), _sight(task, results.summary)
+    found = [_motion(robot, results, each, home) for each in results.summary.objects]
+    return [
+        replace(motion, marks=[*motion.marks, *(replace(edge, t1=float(motion.t[-1])) for edge in sight)])
+        for motion in found
+    ]
+
+
+def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
+    rows = results.ways.take(results.ways.target == each.name)
+    x, y, z = (value / 1000 for value in each.xyz_mm)
+    if each.grasp is None or not len(rows):
+        mark = Mark(0.0, 1.0, (x, y, z), (x, y, z), "")
+        event = PlayedEvent(0.0, 1.0, refusal_text(each), "fail")
+        return PlayedMotion(each.name, "", np.array([0.0, 1.0]), np.tile(home, (2, 1)), [event], [mark])
+    parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
+    events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
+    text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    ghosts = [meant(robot, np.array(each.grasp.q_before_deg))]
+    return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, ghosts=ghosts)
+
+
+def refusal_text(each: ObjectResult) -> str:
+    """Why an object is not grasped."""
+    return say(each.refusal) if each.refusal else tr("none")
+
+
+def grasp_moment(results: VisionResults, each: ObjectResult) -> tuple[str, float]:
+    """The motion to an object, and when (s) it is there; its start where the arm does not go there."""
+    rows = results.ways.take((results.ways.target == each.name) & (results.ways.part == "approach"))
+    return each.name, float(rows.t_s[-1]) if len(rows) else 0.0
+
+
+def placed(pose: PoseEstimate) -> Reals:
+    """A pose as a transform (4, 4), m."""
+    R = scipy.spatial.transform.Rotation.from_quat(pose.quaternion_wxyz, scalar_first=True).as_matrix()
+    return posed(R, np.array(pose.xyz_mm) / 1000)
+
+
+def seen_shapes(robot: Robot, task: VisionFile, summary: VisionSummary) -> list[Shape]:
+    """The camera with the cone of what it sees, and a box at each object; a camera on the arm moves with it.
+
+    Returns
+    -------
+    shapes : of ``viewing/drawn.py``
+    """
+    found = summary.calibration
+    shapes = [_object(each) for each in summary.objects]
+    if found is None:
+        return shapes
+    fixed_camera = found.setup == "eye_to_hand"
+    T = placed(found.hand_eye) if fixed_camera else inverted(robot.last_to_tool) @ placed(found.hand_eye)
+    frame = 0 if fixed_camera else robot.rows + 1
+    common = {"frame": frame, "name": tr("camera"), "T": T.tolist(), "colour": REFERENCE}
+    points = np.concatenate([np.zeros((1, 3)), _corners(task, SIGHT * task.view.farthest_mm / 1000)])
+    cone = {"kind": "mesh", "points": points.tolist(), "faces": CONE, "pale": True, "own": REFERENCE}
+    return [*shapes, {**common, "kind": "box", "size": CAMERA_M}, {**common, **cone}]
+
+
+def _corners(task: VisionFile, far: float) -> Reals:
+    """The corners (4, 3) of what a camera sees at a depth, m, in its frame."""
+    x, y = far * np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
+    return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
+
+
+def _sight(task: VisionFile, summary: VisionSummary) -> list[Mark]:
+    """The edges of what a fixed camera sees, down to the farthest object; none of a camera that moves."""
+    found = summary.calibration
+    if found is None or found.setup != "eye_to_hand" or not summary.objects:
+        return []
+    T = placed(found.hand_eye)
+    depths = (np.array([each.xyz_mm for each in summary.objects]) / 1000 - T[:3, 3]) @ T[:3, 2]
+    corners = _corners(task, float(depths.max())) @ T[:3, :3].T + T[:3, 3]
+    ends = [*zip([T[:3, 3]] * 4, corners), *zip(corners, np.roll(corners, -1, axis=0))]
+    return [Mark(0.0, 0.0, tuple(start.tolist()), tuple(end.tolist()), "") for start, end in ends]
+
+
+def _object(each: ObjectResult) -> Shape:
+    R = scipy.spatial.transform.Rotation.from_quat(each.quaternion_wxyz, scalar_first=True).as_matrix()
+    T = posed(R, np.array(each.xyz_mm) / 1000)
+    colour = VERDICTS["pass" if each.grasp else "fail"]
+    return {"frame": 0, "name": each.name, "kind": "box", "T": T.tolist(), "size": OBJECT_M, "colour": colour}
