@@ -66,7 +66,7 @@ GAP_WORDS: Mapping[str, str] = words(
 ASSUMED: Mapping[str, str] = words(
     {
         "own_values": "values of the robot's file that are inferred",
-        "own_speeds": "joint speeds",
+        "own_speeds": "joint speeds: begin at 10 % override",
         "own_accelerations": "joint accelerations",
         "tool": "no tool: the flange's centre is the tip",
         "carried": "nothing is carried",
