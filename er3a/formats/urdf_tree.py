@@ -683,7 +683,7 @@ def masses_from_urdf(
             notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
             continue
         try:
-            body, T = _body(name, inertials[0])
+            body, T = body_of(name, inertials[0])
         except InputError as error:
             notes.append(f"{error.field}: {error.problem}; its mass was left out")
             continue
@@ -750,8 +750,22 @@ def write_friction(robot: Robot, joint: int, element: ElementTree.Element) -> No
         ElementTree.SubElement(element, "dynamics", written)
 
 
-def _body(name: str, inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
-    """Mass and inertia about the centre, and the frame of the centre (4, 4) in the link's."""
+def body_of(name: str, inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
+    """The body of a URDF's link.
+
+    Parameters
+    ----------
+    name : of the link, for errors; inertial : its element
+
+    Returns
+    -------
+    body, T : kg and kg m^2 about the centre, in the axes of the inertial's origin; that frame (4, 4), m, in the link's
+
+    Raises
+    ------
+    InputError
+        for what is no number, or a mass below 0
+    """
     where = f"inertial of link {name}"
     origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
     xyz, rpy = _origin(None, where, origin)

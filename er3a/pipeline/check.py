@@ -38,9 +38,12 @@ from er3a.files.scene_file import SceneFile, load_scene
 from er3a.files.target_file import TargetFile, load_targets, read_targets
 from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load, read_yaml
+from er3a.formats.urdf_lint import is_wrong, lint
+from er3a.pipeline.messages.urdf import rule_text
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.planning.commands import CommandSource
+from er3a.program_check.check_program import LocatedFinding
 from er3a.programs.languages import SUFFIXES, read_program
 from er3a.robots.robot import Robot
 
@@ -107,6 +110,29 @@ def _check_vision(path: Path) -> None:
     _check_hand_eye(path.parent / load_vision(path).calibration)
 
 
+URDF_FILE = "a URDF"
+
+
+def rules_broken(path: Path, kind: str) -> list[tuple[LocatedFinding, str]]:
+    """The rules that a URDF breaks, each with its text.
+
+    Parameters
+    ----------
+    kind : of the file, as :func:`check_file` says it; no others have rules
+
+    Raises
+    ------
+    InputError
+        for what is no XML
+    """
+    if kind != URDF_FILE:
+        return []
+    return [
+        (LocatedFinding("fail" if is_wrong(found) else "caution", found, place), rule_text(found))
+        for found, place in lint(path)
+    ]
+
+
 _CHECKS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "study": ("a study", lambda path: check_study(path)),
     "robot": ("a robot", _check_robot),
@@ -144,7 +170,7 @@ def check_file(path: Path) -> str:
         return "a D-H table"
     if path.suffix in URDF and path.exists():
         load_robot(path)
-        return "a URDF"
+        return URDF_FILE
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():
             raise InputError(path, None, "there is no such file", "Check the path")

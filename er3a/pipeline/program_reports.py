@@ -461,24 +461,41 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
     -------
     log : one run; paths relative to the folder that the command runs in. Fingerprints do not change with line numbers.
     """
-    results, rules = [], set()
+    results = []
     seen: dict[str, int] = {}
     for each in checked:
         lines = each.check.execution.program.lines if each.check else ()
         for one in each.findings:
-            rules.add(one.finding.code)
-            results.append(_result(one, _line_text(one.place, each.file, lines), seen))
+            times = f" ({one.times} times)" if one.times > 1 else ""
+            results.append(_result(one, say(one.finding) + times, _line_text(one.place, each.file, lines), seen))
+    return _log("er3a check-program", results, _notifications(checked))
+
+
+def sarif_of_rules(found: Sequence[tuple[LocatedFinding, str]]) -> dict[str, Any]:
+    """Rules that URDFs break as a SARIF log, as :func:`sarif_of` makes one of programs' findings.
+
+    Parameters
+    ----------
+    found : each with its text
+    """
+    seen: dict[str, int] = {}
+    return _log("er3a check", [_result(one, text, "", seen) for one, text in found], [])
+
+
+def _log(name: str, results: list[dict[str, Any]], notifications: list[dict[str, Any]]) -> dict[str, Any]:
+    """A log of one run of a tool."""
+    rules = sorted({each["ruleId"] for each in results})
     driver = {
-        "name": "er3a check-program",
+        "name": name,
         "version": __version__,
-        "rules": [{"id": code, "shortDescription": {"text": code.replace("_", " ")}} for code in sorted(rules)],
+        "rules": [{"id": code, "shortDescription": {"text": code.replace("_", " ")}} for code in rules],
     }
     run = {
         "tool": {"driver": driver},
         "originalUriBaseIds": {BASE: {"description": {"text": "The folder that the command was run in."}}},
         "columnKind": "unicodeCodePoints",
         "results": results,
-        "invocations": [{"executionSuccessful": True, "toolExecutionNotifications": _notifications(checked)}],
+        "invocations": [{"executionSuccessful": True, "toolExecutionNotifications": notifications}],
     }
     return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
 
@@ -498,16 +515,15 @@ def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
     ]
 
 
-def _result(one: LocatedFinding, line_text: str, seen: dict[str, int]) -> dict[str, Any]:
+def _result(one: LocatedFinding, text: str, line_text: str, seen: dict[str, int]) -> dict[str, Any]:
     code, place = one.finding.code, one.place
     parts = (code, _uri_from_here(place.file), place.element, line_text)
     print_of = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     number = seen[print_of] = seen.get(print_of, 0) + 1
-    times = f" ({one.times} times)" if one.times > 1 else ""
     found: dict[str, Any] = {
         "ruleId": code,
         "level": WORDS[one.level],
-        "message": {"text": say(one.finding) + times},
+        "message": {"text": text},
         "locations": [_location(place)],
         "partialFingerprints": {FINGERPRINT: f"{print_of}:{number}"},
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import subprocess
 from collections import Counter
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, ResultError
+from er3a.files.kept_files import write_text
 from er3a.pipeline.commands import options
 from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.progress import shown_work
@@ -73,13 +75,18 @@ def check(
         list[Path],
         typer.Argument(callback=options.given_files, help="robot, study, target, path, scene or reference files"),
     ],
+    sarif: Annotated[Path | None, typer.Option(help="write the rules that URDFs break as SARIF 2.1.0")] = None,
     as_json: options.AsJson = False,
 ):
-    """Check input files: print the kind of each file, or its error. Exit code 1 if a unit is in doubt."""
-    from er3a.files.units import noted_doubts
-    from er3a.pipeline.check import PROGRAM, check_file
+    """Check input files: print the kind of each file, or its error; of a URDF also the rules that it breaks.
 
-    found, worst = list[dict[str, object]](), 0
+    Exit code 1 if a unit is in doubt, or a URDF states what can't be meant.
+    """
+    from er3a.files.units import noted_doubts
+    from er3a.pipeline.check import PROGRAM, check_file, rules_broken
+    from er3a.pipeline.program_reports import WORDS, sarif_of_rules
+
+    found, worst, rules = list[dict[str, object]](), 0, []
     for file in files:
         try:
             with noted_doubts() as doubts:
@@ -92,12 +99,21 @@ def check(
             continue
         more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
-        found.append({"file": str(file), "in_order": not doubts, "kind": kind} | more)
-        worst = max(worst, int(bool(doubts)))
+        broken = rules_broken(file, kind)
+        rules += broken
+        more |= {"rules": [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]}
+        wrong = bool(doubts) or any(one.level == "fail" for one, _ in broken)
+        found.append({"file": str(file), "in_order": not wrong, "kind": kind} | more)
+        worst = max(worst, int(wrong))
         if not as_json:
+            for one, text in broken:
+                print(f"{file}:{one.place.line}: {WORDS[one.level]}: {text} [{one.finding.code}]")
             state = f"{len(doubts)} doubtful unit{'s' if len(doubts) > 1 else ''}" if doubts else "in order"
+            state = "numbers that can't be meant" if wrong and not doubts else state
             only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
             print(f"{file}: {kind}, {state}{only}")
+    if sarif is not None:
+        write_text(sarif, json.dumps(sarif_of_rules(rules), indent=1, ensure_ascii=False) + "\n")
     if as_json:
         options.print_json(found)
     if worst:

@@ -1,0 +1,153 @@
+"""Rules for URDFs: what a file states and can't mean, and what it leaves out, each with its code and its line.
+
+What no parser can use at all (joints in a loop, an axis without length) is an error of reading, and no rule. A rule
+that several elements break is one finding, at the first of them. Reference: the ROS URDF specification, whose lengths
+are in metres and angles in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from er3a.errors import InputError
+from er3a.finding import Finding, fact
+from er3a.formats.mesh_file import read_link_mesh, read_text
+from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of
+from er3a.programs.instructions import Place
+from er3a.programs.lexing import ProgramText
+from er3a.programs.rpl.xml_reader import LINE, read_xml
+from er3a.robots.masses import no_body
+
+WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
+"""Rules of numbers that can't be meant; the others name what is missing or no data."""
+XACRO = "<xacro:"
+MANY_TURNS = 10 * 2 * math.pi
+AXIS_OFF = 1e-3  # by which an axis' length may differ from 1
+ALIKE = 3  # joints or links whose efforts or masses no maker's arm has alike
+
+Broken = tuple[str, Element, str]
+"""A rule, the element that breaks it, and its name or value."""
+
+
+def lint(path: Path) -> tuple[tuple[Finding, Place], ...]:
+    """The rules that a URDF breaks.
+
+    Parameters
+    ----------
+    path : of a URDF that can be read; of xacro, which has to be expanded before, nothing is said
+
+    Returns
+    -------
+    found : one finding for each rule, ``names`` being the elements (at most as many as are printed), and the line of
+        the first
+
+    Raises
+    ------
+    InputError
+        for what is no XML
+    """
+    text = read_text(path, MAX_BYTES)
+    if XACRO in text:
+        return ()
+    root = read_xml(ProgramText(path, text))
+    broken: dict[str, list[tuple[Element, str]]] = {}
+    for code, element, name in (*_of_joints(root), *_of_links(path, root)):
+        broken.setdefault(code, []).append((element, name))
+    return tuple(
+        (fact(code, names=tuple(dict.fromkeys(name for _, name in where))), Place(path, int(where[0][0].attrib[LINE])))
+        for code, where in broken.items()
+    )
+
+
+def is_wrong(found: Finding) -> bool:
+    """Whether a rule that a file breaks is one of numbers that can't be meant.
+
+    Parameters
+    ----------
+    found : of :func:`lint`
+    """
+    return found.code in WRONG
+
+
+def _number(element: Element | None, key: str) -> float:
+    """One number of an attribute; NaN where there is none."""
+    found = _numbers(element, key)
+    return float(found[0]) if len(found) == 1 else math.nan
+
+
+def _numbers(element: Element | None, key: str) -> np.ndarray:
+    try:
+        return np.array([float(word) for word in ("" if element is None else element.get(key, "")).split()])
+    except ValueError:
+        return np.empty(0)
+
+
+def _of_joints(root: Element) -> Iterator[Broken]:
+    moving = [joint for joint in root.findall("joint") if joint.get("type") in MOVING]
+    for joint in root.findall("joint"):
+        name, origin = joint.get("name", "?"), joint.find("origin")
+        if (np.abs(_numbers(origin, "xyz")) > FAR_APART_M).any():
+            yield "urdf_lengths", joint, name
+        if (np.abs(_numbers(origin, "rpy")) > WHOLE_TURN).any():
+            yield "urdf_angles", joint, name
+    for joint in moving:
+        name, limit, axis = joint.get("name", "?"), joint.find("limit"), _numbers(joint.find("axis"), "xyz")
+        lower, upper = _number(limit, "lower"), _number(limit, "upper")
+        slides, endless = joint.get("type") == "prismatic", joint.get("type") == "continuous"
+        if len(axis) == 3 and abs(np.linalg.norm(axis) - 1) > AXIS_OFF:
+            yield "urdf_axis", joint, name
+        if lower > upper:
+            yield "urdf_limits_reversed", joint, name
+        if max(abs(lower), abs(upper)) > (FAR_APART_M if slides else MANY_TURNS):
+            yield "urdf_lengths" if slides else "urdf_angles", joint, name
+        if not endless and (math.isnan(lower) or math.isnan(upper) or lower == upper):
+            yield "urdf_no_limits", joint, name
+        for key, code in (("velocity", "urdf_no_velocity"), ("effort", "urdf_no_effort")):
+            if joint.find("mimic") is None and not _number(limit, key) > 0:
+                yield code, joint, name
+    yield from _alike(moving, [_number(joint.find("limit"), "effort") for joint in moving], "urdf_efforts_alike")
+
+
+def _of_links(path: Path, root: Element) -> Iterator[Broken]:
+    children = {each.get("link") for each in root.findall("joint/child")}
+    links = [link for link in root.findall("link") if link.get("name") in children]
+    masses = [_number(link.find("inertial/mass"), "value") for link in links]
+    yield from _alike(links, masses, "urdf_masses_alike")
+    for link, mass in zip(links, masses):
+        name = link.get("name", "?")
+        if link.find("visual") is not None and not mass > 0:
+            yield "urdf_no_mass", link, name
+        if link.find("visual") is not None and link.find("collision") is None:
+            yield "urdf_no_collision", link, name
+        inertial = link.find("inertial")
+        try:
+            if inertial is not None and mass > 0 and no_body(body_of(name, inertial)[0]):
+                yield "urdf_inertia", link, name
+        except InputError:  # an inertia that is no numbers
+            yield "urdf_inertia", link, name
+    for mesh in root.findall("link/collision/geometry/mesh"):
+        yield from _of_mesh(path, mesh)
+
+
+def _of_mesh(path: Path, mesh: Element) -> Iterator[Broken]:
+    name, scale = mesh.get("filename", ""), _numbers(mesh, "scale")
+    file = mesh_of(path, name)
+    if file is None:
+        yield "urdf_mesh_missing", mesh, name
+        return
+    try:
+        read_link_mesh(file, scale if len(scale) == 3 else np.ones(3))
+    except InputError as error:
+        yield "urdf_mesh_unusable", mesh, f"{name}: {error.problem}"
+
+
+def _alike(elements: list[Element], values: list[float], code: str) -> Iterator[Broken]:
+    """Values above 0 that are all the same."""
+    known = [(element, value) for element, value in zip(elements, values) if value > 0]
+    if len(known) >= ALIKE and len({value for _, value in known}) == 1:
+        yield code, known[0][0], f"{known[0][1]:g}"
