@@ -28,7 +28,6 @@ MARKS = re.compile(r"[\[\]]|\{\w+:[?!]\}")  # of optional parts
 OF_PROGRAMS = "test_a_program_that_is_mended_as_advised_passes"
 OF_SETS = "test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning"
 AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice"
-AT_OVERRIDE = "test_at_the_override_that_is_advised_a_controller_ten_times_as_fast_keeps_the_assumed_speeds"
 MEASURED = "test_the_proposed_measurement_settles_or_contradicts"
 CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
@@ -46,7 +45,6 @@ CARRIED_OUT = {
     "strategy.stop": "test_stop_rests_on_the_path_before_the_region",
     "strategy.planned": "test_planned_motions_touch_nothing_and_keep_their_limits",
     "advice.slower": "test_the_slower_pace_that_is_advised_keeps_the_limits",
-    **dict.fromkeys(("advice.full_speed", "advice.limits"), AT_OVERRIDE),
     "advice.clear_until": "test_a_path_that_ends_where_its_advice_says_keeps_the_margin",
     "advice.end": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
     "advice.within_reach": "test_a_path_that_ends_before_the_edge_of_the_reach_as_advised_is_safe",
@@ -97,7 +95,6 @@ ON_PAGES = {  # texts without a key that are none of the remedies above: the fir
         "Evidence contradicts this table",
         "Run no path or program on the arm",
     ),  # that forbid something
-    "Try other guesses",  # quoted from the article
 }
 
 

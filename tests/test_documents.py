@@ -15,7 +15,6 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-import trimesh
 import typer
 import yaml
 
@@ -43,7 +42,6 @@ STANDS_FOR = {
     "export-urdf": {"my_arm": "er3_600"},
     "import-urdf": {"their_arm.urdf": "my_arm.urdf"},
     "teach": {"ROBOT": "data/robots/er3_600.yaml", "FILE": "data/robots/er3_600.yaml"},
-    "mesh": {},
     "check": {"FILE": "data/paths/er3a_c60.yaml", "文件": "data/paths/er3a_c60.yaml"},
     "check-program": {"FILE": "data/programs/pick_place.src", "R": "er3a_c60"},
     "program": {},
@@ -225,7 +223,6 @@ def test_commands_that_need_no_study_run_as_they_stand_in_the_documents(call, tm
     shutil.copytree(
         ROOT / "data/robots", tmp_path / "data/robots"
     )  # where a study has its own; all else comes with er3a
-    trimesh.creation.box((80, 60, 200)).export(tmp_path / "upper_arm.stl")
     write_measured(tmp_path / "measured.csv")
     write_typed(tmp_path / "filled.csv")
     deltas = (f"delta_{key} = [0, 0, 0, 0, 0, 0]" for key in ("theta", "a", "d", "alpha"))

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 60  # lines without its docstring
 MAX_POSITIONAL = 6
@@ -59,6 +61,7 @@ def several(places: dict[str, set[str]]) -> dict[str, set[str]]:
     return {name: where for name, where in places.items() if len(where) > 1}
 
 
+@pytest.mark.long
 def test_the_rules_are_read_off_the_whole_package():
     assert len(trees()) > 200
     assert len(list(functions())) > 1000

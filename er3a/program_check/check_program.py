@@ -508,7 +508,7 @@ class ProgramPart:
 
 FOUND_OF_PATHS = frozenset(
     (
-        *("above_limit", "below_limit", "limit_exceeded", "combination_exceeded", "target_out_of_reach"),
+        *("above_limit", "below_limit", "combination_exceeded", "target_out_of_reach"),
         *("way_out_of_reach", "configuration_ends", "meets_singularity", "motion_collides", "pairs_unexamined"),
     )
 )

@@ -56,7 +56,7 @@ def with_touches_of(found: Finding, others: Iterable[Finding]) -> Finding:
 FAILS = frozenset(
     (
         *("target_out_of_reach", "way_out_of_reach", "configuration_ends", "above_limit", "below_limit"),
-        *("limit_exceeded", "combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
+        *("combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
     )
 )
 NOTES = frozenset(("frames_from_robot_file", "clear_of_assumed", "passes_singularity"))

@@ -41,7 +41,7 @@ def test_a_contradicted_table_takes_six_screens_and_none_of_its_tables_is_cut(br
 CUT = "return [...document.querySelectorAll('.scroll')].filter((e) => e.scrollWidth > e.clientWidth).map((e) => e.id)"
 
 
-NOT_PROSE = ".answer p, .fix, .before, .now-shown, .tools, .warning, .turns, .pickers, td p"
+NOT_PROSE = ".answer p, .arms p, .fix, .before, .now-shown, .tools, .warning, .turns, .pickers, td p"
 MEASURES = """
 const size = parseFloat(getComputedStyle(document.documentElement).fontSize);
 const widths = [...document.querySelectorAll(`main p:not(${arguments[0]})`)].map((p) => p.offsetWidth);

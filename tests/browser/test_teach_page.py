@@ -24,8 +24,9 @@ from er3a.files.path_file import load_paths
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.kinematics.forward import forward
+from er3a.kinematics.solutions import branch_labels
 from er3a.pipeline import language
-from er3a.pipeline.messages.kinematics import BRANCHES
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.pages import FOUNDATIONS
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.study import load_study
@@ -370,7 +371,7 @@ def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypat
         words = [text for text in texts if re.search("[A-Za-z]{3}", text) and not re.match("(<p>)?⟦", text)]
         known = {
             "EFORT ER3A-C60",
-            *BRANCHES.values(),
+            *map(branch_word, branch_labels(load_robot("er3a_c60"))),
             *FOUNDATIONS.values(),
             FLAT,
             *(solid.name for solid in scene.solids),

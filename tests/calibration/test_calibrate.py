@@ -26,7 +26,7 @@ from er3a.finding import fact, is_one
 from er3a.pipeline.cli import app
 from er3a.pipeline.messages import confirm, diagnosis  # noqa: F401
 from er3a.pipeline.messages.calibration import lines_of
-from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.confirm import JOINTS
 from er3a.robots.robot import to_modified
 from testing.simulated_measurements import covered, measured
 
@@ -378,7 +378,7 @@ def test_swapped_columns_and_a_joints_sign_are_named(convert, cause, known, rand
     write_robot(robot.replace(name="own"), tmp_path / "own.yaml")
     done = CliRunner().invoke(app, ["calibrate", str(tmp_path / "own.yaml"), str(path)])
     assert done.exit_code == 1
-    assert say(cause) in done.output
+    assert JOINTS[cause.code].format(**cause.params) in done.output
     advised = [replace(row, pose=tuple(own)) for row, own in zip(rows, np.degrees(convert(wrong)).tolist())]
     assert er3a.calibrate(robot, advised).fits
 

@@ -12,13 +12,13 @@ from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import load_study
-from tests.conftest import ROBOT, ROBOTS
+from tests.conftest import ROBOTS
 from tests.viewing.untranslated import PageTexts, plain_words, texts_from_files, wide_letters
 
 pytestmark = pytest.mark.long  # a study on top of another
 
-SWEEP = f"sweeps:\n  a3: {{robot: {ROBOT}, vary: joints.3.a_mm, values: [30, 37], stages: [workspace]}}\n"
-VARIANTS = [f"{ROBOT}-a3-0{number}" for number in (1, 2)]
+SWEEP = "sweeps:\n  a3: {robot: er3a_c60, vary: joints.3.a_mm, values: [50, 70], stages: [workspace]}\n"
+VARIANTS = [f"er3a_c60-a3-0{number}" for number in (1, 2)]
 JOBS = {f"{name}: {job}" for name in VARIANTS for job in ("compute workspace", "write pages and recordings")}
 
 
@@ -44,7 +44,7 @@ def test_a_new_sweep_runs_its_variants_and_nothing_else(swept):
 
 def test_a_variant_at_the_base_s_own_value_gives_the_base_s_tables(swept):
     run, _ = swept
-    base, own = (run.folder / f"results/{name}/workspace" for name in (ROBOT, VARIANTS[1]))
+    base, own = (run.folder / f"results/{name}/workspace" for name in ("er3a_c60", VARIANTS[1]))
     tables = sorted(path.name for path in base.glob("*.parquet"))
     assert len(tables) >= 10
     for table in tables:
@@ -54,9 +54,9 @@ def test_a_variant_at_the_base_s_own_value_gives_the_base_s_tables(swept):
 def test_results_tell_the_base_s_file_and_the_value(swept):
     run, _ = swept
     stored = [read_stage(run.folder / f"results/{name}/workspace", STAGES["workspace"]) for name in VARIANTS]
-    for each, value in zip(stored, (30.0, 37.0)):
+    for each, value in zip(stored, (50.0, 70.0)):
         assert each.provenance.config["robot"] == {"varied": {"joints.3.a_mm": value}}
-        assert each.provenance.inputs[0].path == f"data/robots/{ROBOT}.yaml"
+        assert each.provenance.inputs[0].path == "data/robots/er3a_c60.yaml"
     reaches = [
         next(figure.value for figure in each.results.summary.figures if figure.name == "greatest_reach")
         for each in stored
@@ -82,7 +82,7 @@ def test_another_value_reruns_its_variant_only(swept):
     run, _ = swept
     study = run.folder / "config/small.yaml"
     written = study.read_text()
-    study.write_text(written.replace("values: [30, 37]", "values: [30, 40]"))
+    study.write_text(written.replace("values: [50, 70]", "values: [50, 75]"))
     try:
         assert run.planned() == {job for job in JOBS if VARIANTS[1] in job} | {"write the index"}
     finally:

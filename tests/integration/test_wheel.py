@@ -160,14 +160,14 @@ def test_a_study_from_nothing_to_its_reports(er3a, new_cell):
     assert done.returncode == 0, done.stderr
     pages = {path.relative_to(cell / "reports").as_posix() for path in (cell / "reports").rglob("*.html")}
     stages = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
-    assert pages == {"index.html", *(f"er3_600/{page}.html" for page in (*stages, "teach"))}
+    assert pages == {"index.html", *(f"odd_arm/{page}.html" for page in (*stages, "teach"))}
     verdicts = {each["stage"]: each["status"] for each in json.loads(er3a(cell, "verdicts", "--json").stdout)}
     assert verdicts["inverse"] == verdicts["trajectory"] == "pass"
     assert verdicts["validation"] == "no_reference"
     cases = ElementTree.parse(cell / "reports/junit.xml").findall(".//testcase")
     assert [case.get("name") for case in cases] == list(stages)
-    foot = (cell / "reports/er3_600/validation.html").read_text(encoding="utf-8")
-    assert "er3a run --study config/config.yaml reports/er3_600/validation.html" in foot
+    foot = (cell / "reports/odd_arm/validation.html").read_text(encoding="utf-8")
+    assert "er3a run --study config/config.yaml reports/odd_arm/validation.html" in foot
     assert str(cell) not in foot
     for words in (("run", "--fail-on", "fail"), ("run", "validation"), ("verdicts",)):
         done = er3a(cell, *words)

@@ -612,6 +612,7 @@ def test_a_place_in_a_solid_is_named_but_not_one_that_stands_on_it(tmp_path, kin
     assert found == ((Open("inside_solid", ("here: solid",)),) if inside else ())
 
 
+@pytest.mark.long
 def test_a_place_in_a_mesh_is_named():
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.1
     points, faces = np.concatenate([corners + np.array([0.5, 0, 0]), corners]), hull_faces(corners)

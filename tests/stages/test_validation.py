@@ -394,7 +394,7 @@ def test_the_page_tells_the_articles_reader(study, stored, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_views_are_written_for_each_robot(study, stored, tmp_path, name):
     page = page_of(study, stored[name], tmp_path)
-    assert page.count('<svg class="arms"') == 1
+    assert page.count('class="arms"') == 1
     assert not re.search(r"\bnan\b", page)
 
 
@@ -445,7 +445,7 @@ def test_every_count_of_checks_is_of_one_scheme(study, stored, summaries, tmp_pa
     key = re.search(r"<dd>(\d+) of (\d+)</dd><dt>independent checks pass</dt>", page)
     assert key.groups() == (str(counts["independent"].passed), str(counts["independent"].total))
     failed = sum(check.status == "fail" for check in summary.checks)
-    assert re.findall(r"<summary>(\d+) that fails?</summary>", page) == [str(failed)] * bool(failed)
+    assert re.findall(r"<summary>(\d+) that fails?[^<]*</summary>", page) == [str(failed)] * bool(failed)
 
 
 @pytest.mark.parametrize("name", NAMES)

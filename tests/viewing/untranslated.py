@@ -28,7 +28,7 @@ WIDE = {ord(letter): ord(letter) + 0xFEE0 for letter in "abcdefghijklmnopqrstuvw
 WORD = re.compile(r"[A-Za-z]{3,}")
 # Units, and names that are the same in every language.
 SAME_EVERYWHERE = {"deg", "rad", "er3a", "sha", "rrd", "rpm", "ppb", *LANGUAGES}
-PROGRAM_SUFFIXES = ("dat", "var", "XPL", *(suffix[1:] for suffix in SUFFIXES))
+PROGRAM_SUFFIXES = ("csv", "dat", "var", "XPL", *(suffix[1:] for suffix in SUFFIXES))
 NAMES = re.compile(
     r"\b(?:alpha|beta|offset|direction|lower|upper|speed) ?\d(?:, \d)*\b"  # entries of a table
     r"|\bT_[a-z]+_[a-z]+\b"  # transforms

@@ -68,7 +68,6 @@ OTHER_SOLUTION = N_(
 FRAMES = N_("Map the name to a frame under frames in the file that lists the programs (--frames).")
 REMEDIES: dict[str, str] = words(
     {
-        "limit_exceeded": OTHER_SOLUTION,
         "combination_exceeded": OTHER_SOLUTION,
         "target_out_of_reach": NEARER,
         "way_out_of_reach": NEARER,

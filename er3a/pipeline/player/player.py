@@ -82,6 +82,7 @@ def player(
     robot: Robot,
     motions: Sequence[PlayedMotion],
     scene: Scene | None = None,
+    *,
     beside: Sequence[Robot] = (),
     signs: Sequence[str] = (),
     opened: tuple[str, float] | None = None,
