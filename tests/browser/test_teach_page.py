@@ -361,7 +361,7 @@ def marked(words: Any) -> Any:
 def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder, monkeypatch):
     monkeypatch.setattr(teach_page, "WORDS", marked(WORDS))
     panel = Panel(browser, folder / "marked.html").open()
-    assumed = browser.find_element(By.CLASS_NAME, "assumed-shapes").text
+    assumed = browser.find_element(By.CSS_SELECTOR, ".chip").get_attribute("textContent")
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
     for degrees in ([0] * 6, [30, -20, 15, 40, 60, 10], [167, 90, 105, 180, 2, 360]):
         panel.move(*degrees)
