@@ -101,7 +101,8 @@ def check(
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
         broken = rules_broken(file, kind)
         rules += broken
-        more |= {"rules": [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]}
+        named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]
+        more |= {"rules": named} if named else {}
         wrong = bool(doubts) or any(one.level == "fail" for one, _ in broken)
         found.append({"file": str(file), "in_order": not wrong, "kind": kind} | more)
         worst = max(worst, int(wrong))
