@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
-from er3a.pipeline.language import N_, as_text, with_unit, words
+from er3a.pipeline.language import N_, as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
 
@@ -71,8 +71,6 @@ same_text("inverse.targets", "inverse.all_solved", "inverse.none_solved", "inver
 
 def limits_in_short(found: Finding) -> str:
     """Which limits are left and by how much, for a cell of a table."""
-    signs = {"above": 1, "below": -1}
-    by_how_much = [as_text(signs[each.side] * each.excess.value, "+.1f") for each in found.joints]
-    units = [each.excess.unit for each in found.joints]
-    shown = map(with_unit, by_how_much, units)
-    return joined((f"{limited(each)} {text}" for each, text in zip(found.joints, shown)), ", ")
+    sides = {"above": tr("over"), "below": tr("under")}
+    beyond = (with_unit(as_text(each.excess.value, ".1f"), each.excess.unit) for each in found.joints)
+    return joined((f"{limited(each)} {text} {sides[each.side]}" for each, text in zip(found.joints, beyond)), ", ")

@@ -765,7 +765,8 @@ const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
   if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
   fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
-  fix.querySelector("a").href = shown.dataset.instead;
+  const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
+  lead.hidden = lead.hash === shown.hash; // nothing else is there to be shown
 };
 const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
 rows.forEach((row) => row.addEventListener("click", () => {

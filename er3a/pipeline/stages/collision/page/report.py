@@ -16,14 +16,14 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.pipeline.viewing.palette import HIGHLIGHT, VERDICTS
@@ -112,7 +112,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, closest),
+        _answer(summary, closest, _unreached(results.paths)),
         matrix=_matrix(robot, results.matrix),
         never=int((results.matrix.state == "never").sum()),
         tried=TRIED,
@@ -126,26 +126,37 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     )
 
 
-def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest]) -> Answer:
-    """How much of the joint space is free, and how near each path and chosen solution comes to anything."""
+def _unreached(paths: model.PathClearances) -> set[str]:
+    """Names of paths of which a part can't be reached, and is therefore clear of nothing."""
+    return set(paths.path[np.isnan(paths.q_deg).any(axis=1)].tolist())
+
+
+def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest], unreached: set[str]) -> Answer:
+    """How much of the joint space is free, and how near each path and chosen solution comes to anything.
+
+    ``unreached``: of some paths only a part was measured.
+    """
     found = {figure.name: figure.value for figure in summary.figures}
     free, places = found.get("free_of_collisions"), summary.places
     share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
     headline = tr("{share} of joint space is free.", share=share) if share else tr("Collisions checked.")
     touch = sum(each.clearance_mm < 0 for each in closest)
-    rest = tr("{count} of {all} motions collide.", count=touch, all=len(closest)) if closest else ""
+    rest = tr("{count} of {all} paths and poses collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
     groups = (
-        Group(tr("Paths"), [_row(each) for each in closest[:MAX_ROWS] if each.kind == "path"]),
-        Group(tr("Targets"), [_row(each) for each in closest[:MAX_ROWS] if each.kind == "target"]),
+        Group(tr("Paths"), [_row(each, unreached) for each in closest[:MAX_ROWS] if each.kind == "path"]),
+        Group(tr("Targets"), [_row(each, set()) for each in closest[:MAX_ROWS] if each.kind == "target"]),
     )
     return Answer(headline, rest, "", keys, groups)
 
 
-def _row(found: model.Closest) -> ListRow:
+def _row(found: model.Closest, unreached: set[str]) -> ListRow:
     """A path or chosen solution: how near it comes, and to what."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
-    return ListRow("fail" if found.clearance_mm < 0 else "pass", found.name, note, play=(found.name, found.t_s or 0.0))
+    mark: Mark = "fail" if found.clearance_mm < 0 else "pass"
+    if mark == "pass" and found.name in unreached:
+        mark, note = "none", joined([note, tr("not all of it is reached")], ", ")
+    return ListRow(mark, found.name, note, play=(found.name, found.t_s or 0.0))
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

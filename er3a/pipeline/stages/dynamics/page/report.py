@@ -85,6 +85,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
 
 MAX_USES = 12
 NONE = "–"
+LEAST = 0.01  # N m or N, below which no motor feels anything
 
 
 def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) -> None:
@@ -161,7 +162,7 @@ def _answer(results: model.DynamicsResults) -> Answer:
     ]
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     rows = [_row(motor, worst.peak, _moment_of(results, motor)) for motor in order]
-    still = [_held_row(motor, worst.holding) for motor in order if motor.holding > model.NOTHING_HELD]
+    still = [_held_row(motor, worst.holding) for motor in order if motor.holding >= LEAST]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
@@ -200,7 +201,8 @@ def _filled(share: float) -> list[Part]:
 
 
 def _sized(value: float, motor: model.MotorNeed) -> str:
-    return with_unit(number(value if value > model.NOTHING_HELD else 0.0, 3), motor.unit)
+    """A torque or force to three digits, of less than ``LEAST`` only that."""
+    return with_unit(number(value, 3) if value >= LEAST else f"< {LEAST}", motor.unit)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

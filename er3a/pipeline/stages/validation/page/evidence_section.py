@@ -22,7 +22,7 @@ MARKS: Mapping[Status, str] = {
     "settled_up_to_signs": "(✓)",
     "weak": "~",
     "contradicted": "✗",
-    "consistent": STATUS_WORDS["consistent"],  # a sign would be read as a confirmation
+    "consistent": "①",  # of one source: no sign that would be read as a confirmation
     "open": "?",
     "gauge": "↔",
     "given": "·",
@@ -154,17 +154,13 @@ def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any]
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     gives = _gives(each, evidence) or _alone(each)
     return dict(
-        entry=each.entry, value=_value(each), status=each.status, mark=_mark(each.status), title=title, gives=gives
+        entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title, gives=gives
     )
 
 
-def _mark(status: Status) -> str:
-    return tr(MARKS[status]) if MARKS[status] == STATUS_WORDS[status] else MARKS[status]
-
-
 def _marked(status: Status) -> str:
-    """A status with its mark, unless that is the same word."""
-    return _status(status) if MARKS[status] == STATUS_WORDS[status] else f"{MARKS[status]} {_status(status)}"
+    """A status with its mark."""
+    return f"{MARKS[status]} {_status(status)}"
 
 
 def _status(status: Status) -> str:

@@ -169,10 +169,9 @@ def _answer(results: model.VisionResults) -> Answer:
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [Group(tr("Objects"), shown)]
     if found and (found.suspects or found.warnings):
-        texts = [say(each) for each in (*found.suspects, *found.warnings)]
-        groups.append(
-            Group(tr("Doubts"), [ListRow("caution", str(k), text, "#samples") for k, text in enumerate(texts, 1)])
-        )
+        doubts = [(each.params.get("sample", tr("camera")), say(each)) for each in (*found.suspects, *found.warnings)]
+        rows = [ListRow("caution", name, text.removeprefix(f"{name}: "), "#samples") for name, text in doubts]
+        groups.append(Group(tr("Doubts"), rows))
     return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
 
 

@@ -289,7 +289,9 @@ def _void_label(number_: int, void: model.VoidSummary) -> Label:
     name = tr("hole, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
     if void.kind != "enclosed":
         name = tr("pocket, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
-    return Label(name, 1000 * np.array([void.high_m[0] / 2, void.centroid_m[2]]), "hole", f"hole-{number_}")
+    low, high = void.low_m[0], void.high_m[0]
+    across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
+    return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
 
 
 def _tray_corners(tray: Tray) -> Reals:
