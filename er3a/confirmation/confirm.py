@@ -48,6 +48,9 @@ class FoundEntry:
     half_width: float
 
 
+UPRIGHT_DEG = 90.0
+
+
 @dataclass(frozen=True, eq=False)
 class Placed(ByValue):
     """Base or tool of the controller, (4, 4), m, with half of its 95 % intervals, mm and deg."""
@@ -63,8 +66,11 @@ class Placed(ByValue):
 
     @property
     def rpy_deg(self) -> Reals:
-        """(3,), roll, pitch and yaw, deg."""
-        return np.degrees(rpy_of(self.T))
+        """(3,), roll, pitch and yaw, deg; where the pitch is upright within its interval, the others act as one: roll."""
+        roll, pitch, yaw = np.degrees(rpy_of(self.T))
+        if UPRIGHT_DEG - abs(pitch) <= self.half_width_deg:
+            roll, yaw = (roll - np.sign(pitch) * yaw + 180) % 360 - 180, 0.0
+        return np.array([roll, pitch, yaw])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -82,6 +82,13 @@ def test_a_tool_and_a_base_are_named_with_intervals():
         assert np.abs(place.T[:3, 3] - true[:3, 3]).max() * 1000 < 2 * place.half_width_mm < 0.2
 
 
+def test_a_tool_that_is_turned_by_a_quarter_has_round_angles():
+    q, X = poses(), moved((0, 0, 0), (0, -90, 0))
+    found = er3a.confirm(arm(), typed(q, shown(q) @ X))
+    assert found.layers == ("frames",)
+    np.testing.assert_allclose(found.tool.rpy_deg, [0, -90, 0], atol=0.05)
+
+
 @pytest.mark.long
 def test_zero_and_sense_of_joints_are_named():
     q = poses()
