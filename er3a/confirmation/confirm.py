@@ -66,7 +66,7 @@ class Placed(ByValue):
 
     @property
     def rpy_deg(self) -> Reals:
-        """(3,), roll, pitch and yaw, deg; where the pitch is upright within its interval, the others act as one: roll."""
+        """(3,), roll, pitch and yaw, deg; where the pitch is upright, within its interval, all else is roll."""
         roll, pitch, yaw = np.degrees(rpy_of(self.T))
         if UPRIGHT_DEG - abs(pitch) <= self.half_width_deg:
             roll, yaw = (roll - np.sign(pitch) * yaw + 180) % 360 - 180, 0.0
