@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +55,10 @@ def recorded_lines(path: Path) -> Lines:
     """
     states: dict[str, tuple[list[float], list[list[float]]]] = {}
     poses: dict[str, list[list[float]]] = {}
-    for topic, seconds, message in _messages(path):
+    for count, (topic, seconds, message) in enumerate(_messages(path)):
+        if count == MOST_MESSAGES:
+            problem = f"more than {MOST_MESSAGES:,} joint states, poses and transforms"
+            raise InputError(path, None, problem, "Record at fewer Hz, or cut it: a few stops are enough")
         if hasattr(message, "position"):
             for name, value, rate in zip(message.name, message.position, _rates(message)):
                 times, values = states.setdefault(name, ([], []))
@@ -94,10 +96,8 @@ def _messages(path: Path) -> Iterator[tuple[str, float, Any]]:
     try:
         with (Reader1 if first else Reader2)(path) as bag:
             wanted = [each for each in bag.connections if each.msgtype in TYPES]
-            for connection, nanoseconds, raw in islice(bag.messages(wanted), MOST_MESSAGES) if wanted else ():
+            for connection, nanoseconds, raw in bag.messages(wanted) if wanted else ():
                 yield connection.topic, nanoseconds * 1e-9, read(raw, TYPES[connection.msgtype])
-    except InputError:
-        raise
     except Exception as error:  # of rosbags, of the database, of decompression: each has its own
         problem = f"can't be read as a recording of ROS ({str(error)[:120]})"
         raise InputError(path, None, problem, "Give a .bag, .mcap or .db3 file, or a ROS 2 bag's folder") from None

@@ -91,3 +91,11 @@ def test_what_is_no_recording_of_poses_ends_in_one_line(tmp_path):
             recorded_lines(tmp_path / name)
     with pytest.raises(InputError, match="no geometry_msgs/msg/PoseStamped"):
         recorded_lines(write(tmp_path, "bag", [f"joint_{k}" for k in range(6)], q, poses, topic="/goal_pose"))
+
+
+def test_no_part_of_a_recording_is_left_out_in_silence(tmp_path, monkeypatch):
+    q, poses = poses_of(load_robot("er3a_c60"))
+    path = write(tmp_path, "mcap", [f"joint_{k}" for k in range(6)], q, poses)
+    monkeypatch.setattr("er3a.confirmation.bag.MOST_MESSAGES", 2 * len(q) - 1)
+    with pytest.raises(InputError, match="more than 23 joint states, poses and transforms"):
+        recorded_lines(path)

@@ -26,7 +26,7 @@ COMMANDS = {
     "check": (
         "studies",
         FIRST,
-        "Check input files: print the kind of each file, or its error. Exit code 1 if a unit is in doubt.",
+        "Check input files: print the kind of each file, or its error; of a URDF also the rules that it breaks.",
     ),
     "run": ("studies", FIRST, "Run the study in this folder; finished parts are not run again."),
     "verdicts": ("studies", FIRST, "Print the verdict of each stage of each robot."),
