@@ -273,7 +273,7 @@ class StudyBase(InputFile):
         entry, robot = self.entry(name), self.robot(name)
         if entry.home_deg is None:
             return robot.home
-        field = f"robots.{self._base(name)}.home_deg"
+        field = f"robots.{name}.home_deg"
         if len(entry.home_deg) != robot.joints:
             raise InputError(None, field, f"{len(entry.home_deg)} joint values", f"The arm has {robot.joints}")
         q = meant(robot, np.array(entry.home_deg))
@@ -299,7 +299,7 @@ class StudyBase(InputFile):
 
     def _doubt(self, name: str, *keys: str) -> None:
         """Tell again what is doubtful of a robot's entry, to those who rest on it."""
-        begins = tuple(f"robots.{self._base(name)}.{key}." for key in keys)
+        begins = tuple(f"robots.{name}.{key}." for key in keys)
         self._tell(each for each in self._doubts if each.key.startswith(begins))
 
     @staticmethod
