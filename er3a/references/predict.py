@@ -27,7 +27,6 @@ from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import (
     MM,
     ZERO_POSE,
-    AxisLines,
     Extreme,
     ModelState,
     Pose,
@@ -223,7 +222,6 @@ def state_of(
     quantities: Sequence[Quantity],
     starts: int = REACH_STARTS,
     extremes: Mapping[Quantity, float] | None = None,
-    axes: AxisLines | None = None,
 ) -> ModelState:
     """The state of one model, from which quantities are read.
 
@@ -233,7 +231,6 @@ def state_of(
     quantities : the poses at which they look at the arm are computed
     starts : local searches for each extreme
     extremes : values (mm) of extremes; None: they are searched for
-    axes : axis lines that were measured on the model; None: those of its frames
 
     Returns
     -------
@@ -252,7 +249,6 @@ def state_of(
         upper=robot.upper,
         speed=robot.speed,
         extremes=extremes,
-        axes=axes,
         slides=robot.slides,
         sliding=robot.sliding,
         coupling=robot.coupling,

@@ -54,7 +54,6 @@ class ModelState:
     columns : (..., 6) each, of the table: a, d in m, alpha, offset in rad; ``twist`` (..., 5), between joint axes
     slides : (n,), joints whose limits are in m; None where all turn
     sliding : (m,), rows that slide, and coupling : (m, n), of the robot; None where all turn, and without one
-    axes : the joints' axis lines in the zero pose, if they were measured on the model; else those of the frames
     """
 
     frames: Reals
@@ -64,7 +63,6 @@ class ModelState:
     upper: Reals
     speed: Reals
     extremes: Mapping[Quantity, float]
-    axes: AxisLines | None = None
     columns: Mapping[str, Reals] = field(default_factory=dict)
     slides: Flags | None = None
     sliding: Flags | None = None
@@ -84,7 +82,7 @@ class ModelState:
         return self.frames[..., self.index[pose], :, :, :]
 
     def axis(self, joint: int) -> tuple[Reals, Reals]:
-        """A joint's axis line in the zero pose.
+        """A joint's axis line in the zero pose: that of the first row that it moves.
 
         Parameters
         ----------
@@ -95,18 +93,12 @@ class ModelState:
         direction : (..., 3), unit vector of positive rotation, base frame
         point : (..., 3), mm, on the axis
         """
-        if self.axes:
-            return self.axes.direction[joint - 1], self.axes.point_mm[joint - 1]
-        T = self.at(ZERO_POSE)[..., joint - 1, :, :]
-        return T[..., :3, 2] * self.direction[..., joint - 1, None], T[..., :3, 3] * MM
-
-
-@dataclass(frozen=True, eq=False)
-class AxisLines:
-    """Six axis lines: ``direction`` (6, 3), unit vectors of positive rotation; ``point_mm`` (6, 3), on each."""
-
-    direction: Reals
-    point_mm: Reals
+        row, sign = joint - 1, 1.0
+        if self.coupling is not None:
+            row = int(np.flatnonzero(self.coupling[:, joint - 1])[0])
+            sign = np.sign(self.coupling[row, joint - 1])
+        T = self.at(ZERO_POSE)[..., row, :, :]
+        return T[..., :3, 2] * sign * self.direction[..., row, None], T[..., :3, 3] * MM
 
 
 @dataclass(frozen=True)

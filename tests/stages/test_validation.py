@@ -21,7 +21,7 @@ from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
 from er3a.finding import fact, is_one
 from er3a.identifiability.reactions import CheckCounts, CheckTally, bases_of
-from er3a.kinematics.forward import frames
+from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.round_trips import batch_round_trips
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import (
@@ -51,8 +51,7 @@ from er3a.pipeline.stages.validation.model import (
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.page.report import report
 from er3a.pipeline.study import RobotEntry, Study, load_study
-from er3a.references.circle_points import circle_points, fit_circle
-from er3a.references.predict import predict
+from er3a.references.predict import predict, state_of
 from er3a.references.quantities import AxisAngle, AxisDistance, Limit, Speed
 from er3a.references.reference import Reference, ReferenceSet
 from er3a.references.subjects import (
@@ -629,24 +628,24 @@ def test_a_tool_in_the_robots_file_does_not_matter(study, folders, tmp_path):
         assert (tmp_path / "out" / table).read_bytes() == (folders["er3_600"] / table).read_bytes()
 
 
-def test_circles_show_the_axes_that_the_frames_have(random):
-    """An independent look: any arm's fitted axes are its frames' z axes, to 1e-9 of a length and an angle."""
+def test_points_turn_about_the_axes_that_are_stated(random):
+    """Motion, not the table: turning a joint leaves its axis where it is, and moves other points right-handed."""
     for convention in ("standard", "modified"):
-        arm = random_arm(random, convention)
-        found = circle_points(arm)
-        T = frames(arm.replace(tool=np.eye(4)), np.zeros(6))
-        np.testing.assert_allclose(found.axes.direction, T[:6, :3, 2] * arm.direction[:, None], atol=1e-9)
-        gap = found.axes.point_mm - T[:6, :3, 3] * 1000
-        across = np.cross(gap, T[:6, :3, 2])
-        assert np.linalg.norm(across, axis=1).max() < 1e-6
-        assert found.radius_mm.min() >= 100
-        assert found.roundness_mm.max() < 1e-8
+        arm = random_arm(random, convention).replace(tool=np.eye(4))
+        state, before, angle = state_of(arm, ()), forward(arm, np.zeros(6)), 0.1
+        for joint in range(6):
+            direction, point = state.axis(joint + 1)
+            turned = Rotation.from_rotvec(angle * direction).as_matrix()
+            after = forward(arm, angle * np.eye(6)[joint])
+            np.testing.assert_allclose(after[:3, :3], turned @ before[:3, :3], atol=1e-12)
+            there = point / 1000 + turned @ (before[:3, 3] - point / 1000)
+            np.testing.assert_allclose(after[:3, 3], there, atol=1e-12)
 
 
 def test_each_stated_axis_stands_beside_the_nearest_point_of_the_models():
     """The model's lines are its frames' z axes, and the right table misses none of those that documents state."""
     arm = load_robot("er3a_c60")
-    found = compute_module.axes_table(circle_points(arm), [load_references("er3a_c60")])
+    found = compute_module.axes_table(arm, [load_references("er3a_c60")])
     T = frames(arm.replace(tool=np.eye(4)), np.zeros(6))[found.joint - 1]
     assert np.linalg.norm(np.cross(found.model_point_mm - 1000 * T[:, :3, 3], T[:, :3, 2]), axis=1).max() < 1e-6
     across = found.model_point_mm - found.point_mm
@@ -655,18 +654,6 @@ def test_each_stated_axis_stands_beside_the_nearest_point_of_the_models():
     assert len(found) == 12
     assert (found.distance_mm <= found.uncertainty_mm).all()
     assert (found.angle_deg <= found.uncertainty_deg).all()
-
-
-def test_a_circle_is_found_in_noisy_points(random):
-    angles = np.linspace(-1.0, 2.0, 200)
-    turn = Rotation.from_euler("xyz", [0.4, -0.9, 1.7]).as_matrix()
-    circle = np.column_stack([300 * np.cos(angles), 300 * np.sin(angles), np.zeros_like(angles)])
-    track = circle @ turn.T + [10, -20, 30] + random.normal(0, 0.01, (200, 3))
-    normal, centre, radius, roundness = fit_circle(track)
-    np.testing.assert_allclose(normal, turn[:, 2], atol=1e-4)
-    np.testing.assert_allclose(centre, [10, -20, 30], atol=0.02)
-    assert radius == pytest.approx(300, abs=0.02)
-    assert 0.005 < roundness < 0.1
 
 
 @pytest.mark.long

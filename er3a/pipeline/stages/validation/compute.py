@@ -36,7 +36,6 @@ from er3a.pipeline.stages.validation.checks import (
 from er3a.pipeline.stages.validation.entry import ValidationSettings
 from er3a.pipeline.study import Study
 from er3a.references import quantities
-from er3a.references.circle_points import CirclePoints, circle_points
 from er3a.references.predict import read, search, state_of
 from er3a.references.reference import Documents, ReferenceSet, quantities_of
 from er3a.references.rows import GROUPS, AxisRow, PositionRow
@@ -60,23 +59,22 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
     )
 
 
-def axes_table(circles: CirclePoints, sets: list[ReferenceSet]) -> model.Axes:
+def axes_table(robot: Robot, sets: list[ReferenceSet]) -> model.Axes:
     """Each stated axis line against the model's.
 
     Parameters
     ----------
-    circles : what the model's points turn about, in the base frame
+    robot : its tool does not count
 
     Returns
     -------
-    rows : directions, mm and deg; the model's point is that of its axis nearest to the stated one
+    rows : directions, mm and deg, in the base frame; the model's point is that of its axis nearest to the stated one
     """
-    rows = []
+    rows, state = [], state_of(robot, ())
     for references in sets:
         for row in references.of(AxisRow):
-            found = circles.axes.point_mm[row.joint - 1]
+            direction, found = state.axis(row.joint)
             stated = found if row.point_mm is None else np.array(row.point_mm)
-            direction = circles.axes.direction[row.joint - 1]
             nearest = quantities.nearest_on_line(direction, found, stated)
             angle = float(quantities.angle_between(direction, np.array(row.direction), row.signed))
             distance = float(np.linalg.norm(nearest - stated))
@@ -128,7 +126,7 @@ ALWAYS_SEARCHED = (
 
 
 def _checked(
-    robot: Robot, sets: list[ReferenceSet], values: Mapping[quantities.Quantity, float], circles: CirclePoints
+    robot: Robot, sets: list[ReferenceSet], values: Mapping[quantities.Quantity, float]
 ) -> tuple[list[model.Check], list[model.Conflict]]:
     """Checks of the table alone and against each set, and what the sets contradict each other about.
 
@@ -137,7 +135,7 @@ def _checked(
     checks, conflicts = table_checks(robot), list[model.Conflict]()
     for references in sets:
         asked = quantities_of(references.checkable)
-        state = state_of(robot, asked, extremes=values, axes=circles.axes)
+        state = state_of(robot, asked, extremes=values)
         bases = (
             bases_of(robot, references.checkable, references.documents)
             if is_turning(robot)
@@ -187,13 +185,12 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     values: dict[quantities.Quantity, float] = {
         quantity: search(robot, quantity, settings.reach_starts)[0] for quantity in wanted
     }
-    circles = circle_points(robot)
-    checks, conflicts = _checked(robot, sets, values, circles)
+    checks, conflicts = _checked(robot, sets, values)
     checks += _without_reference(robot, values, checks)
     trip_checks, trips = round_trip_checks(robot, settings.round_trips, study.seed)
     checks += trip_checks
 
-    axes, poses = axes_table(circles, sets), key_poses_table(robot, sets)
+    axes, poses = axes_table(robot, sets), key_poses_table(robot, sets)
     diagnosed = [diagnosis_of(robot, references) for references in sets if turning]
     diagnoses = tuple(_set_diagnosis(robot, *pair) for pair in zip(sets, diagnosed))
     found = {each.reference_set: each for each in diagnoses}
