@@ -1,60 +1,39 @@
-"""The voxel grid: cubic cells over a box that contains the tool point at all joint angles."""
+"""The side section about axis 1, in cells: it holds the tool point at all joint angles."""
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from er3a.errors import InputError
 from er3a.geometry.transforms import translation
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Integers, Reals
+from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 
-BYTES_PER_CELL = 64
-"""Peak over sampling and gathering: counts, first blocks, masks, labels and their copies."""
 SECTION_REFINEMENT = 4  # the section has two dimensions, so finer cells still hold enough samples
 _MARGIN = 2e-5  # the sampling loop works in single precision
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Cells in the base frame, and finer ones in the side section about axis 1.
+    """Cells in the side section about axis 1.
 
     Attributes
     ----------
-    origin : (3,), m, lowest corner; cell : m, edge of the cubic cells; shape : cells along x, y, z
+    cell : m, edge of the cells that the study asks for; those of the section are ``SECTION_REFINEMENT`` times finer
     axis_point, axis : (3,), m and unit vector, the line of joint 1; the section's height z is measured from the point
     section_origin : (2,), m, lowest (rho, z); section_cell : m; section_shape : cells along rho (from the axis) and z
     """
 
-    origin: Reals
     cell: float
-    shape: tuple[int, int, int]
     axis_point: Reals
     axis: Reals
     section_origin: Reals
     section_cell: float
     section_shape: tuple[int, int]
-
-    def centres(self, indices: ArrayLike) -> Reals:
-        """Centres of cells of the voxel grid.
-
-        Parameters
-        ----------
-        indices : (N, 3), cells along x, y, z, from 0
-
-        Returns
-        -------
-        centres : (N, 3), m, in the base frame
-        """
-        return self.origin + (np.asarray(indices) + 0.5) * self.cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,34 +100,25 @@ def tool_bound(robot: Robot) -> Bound:
 
 
 def make_grid(robot: Robot, cells_across: int) -> Grid:
-    """The voxel grid and the section's cells for a robot.
+    """The section's cells for a robot.
 
     Parameters
     ----------
-    robot : its tool point stays within the grid at all joint values
-    cells_across : cells along the longest side of the tool point's bounding box
+    robot : its tool point stays within the section at all joint values
+    cells_across : cells along the longest side of the tool point's bounding box, by which the section's are refined
 
     Returns
     -------
-    grid : cubic cells in the base frame, and ``SECTION_REFINEMENT`` times finer ones in the section
-
-    Raises
-    ------
-    InputError
-        if the grid would not fit into half of this machine's memory; the message says how fine is possible
+    grid : ``SECTION_REFINEMENT`` times finer cells in the section
     """
     bound = tool_bound(robot)
     reach = max(bound.radius, 1e-6)
     half = (bound.offset * np.sqrt(np.maximum(0.0, 1 - bound.axis**2)) + reach) * (1 + _MARGIN)
-    centre = bound.axis_point + bound.height * bound.axis
-    _check_memory(half, cells_across)
-    cell, shape = float(2 * half.max() / cells_across), _shape(half, cells_across)
+    cell = float(2 * half.max() / cells_across)
     fine = cell / SECTION_REFINEMENT
     section = ((bound.offset + reach) * (1 + _MARGIN), 2 * reach * (1 + _MARGIN))
     return Grid(
-        origin=centre - shape * cell / 2,
         cell=cell,
-        shape=(int(shape[0]), int(shape[1]), int(shape[2])),
         axis_point=bound.axis_point,
         axis=bound.axis,
         section_origin=np.array([0.0, bound.height - section[1] / 2]),
@@ -171,41 +141,3 @@ def shoulder_of(robot: Robot, grid: Grid) -> Reals:
     """
     joint_2 = forward(robot, np.zeros(robot.joints), frame=1)[:3, 3]
     return grid.axis_point + ((joint_2 - grid.axis_point) @ grid.axis) * grid.axis
-
-
-def memory_budget() -> int:
-    """Memory that a grid may take: half of what the machine has.
-
-    Returns
-    -------
-    budget : bytes; the other half is left to the rest of the process and to other jobs
-    """
-    if sys.platform == "win32":
-        import psutil
-
-        return int(psutil.virtual_memory().total // 2)
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2
-
-
-def _shape(half: Reals, cells_across: int) -> Integers:
-    """Cells along each side of a box with the given half sides."""
-    cells = np.ceil(cells_across * half / half.max() * (1 - _MARGIN / 10))
-    shape: Integers = np.minimum(cells, cells_across).astype(np.int64)
-    return shape
-
-
-def _check_memory(half: Reals, cells_across: int) -> None:
-    """Refuse a grid that would not fit into memory, with the finest that would."""
-    budget = memory_budget()
-    needed = int(_shape(half, cells_across).prod()) * BYTES_PER_CELL
-    if needed <= budget:
-        return
-    possible = int(cells_across * (budget / needed) ** (1 / 3)) + 1
-    while int(_shape(half, possible).prod()) * BYTES_PER_CELL > budget:
-        possible -= 1
-    raise InputError(
-        None,
-        "workspace.cells_across",
-        f"{cells_across} cells across need {needed / 2**30:.1f} GiB, this machine can spare {budget / 2**30:.1f} GiB",
-        f"Write {possible} or less",
-    )

@@ -6,7 +6,7 @@ about x, and three additions; joints whose axis the point lies on cost nothing. 
 angle's quarter, doubled twice, so that loops over a chunk of samples become vector instructions.
 
 The numbers are of single precision: points are off by some micrometres per metre of reach, as much as the steps of the
-random joint angles and far less than a cell. What is kept of single samples (extremes, cloud, witnesses) is drawn again
+random joint angles and far less than a cell. What is kept of single samples (the cloud) is drawn again
 and computed in double precision.
 """
 
@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.numerics.arrays import Flags, Reals, Singles
 from er3a.numerics.jit import inner_kernel
@@ -35,7 +34,7 @@ ROWS = (UNIT_ROWS + 3) * CHUNK
 
 
 class PointChain(NamedTuple):
-    """Plain numbers for kernels, of single precision but for the base.
+    """Plain numbers for kernels, of single precision.
 
     Attributes
     ----------
@@ -43,7 +42,6 @@ class PointChain(NamedTuple):
     point : (3,), m, the point in the frame that turns with that joint
     first, span : (m,), turns: angle about z at the lower limit, and the range
     links : (m, 5), cosine and sine of the turn about x from each joint's frame to the one before, and the step, m
-    base : (3, 4), from the frame before joint 1 to the base frame, of double precision
     sliding : (m,) bool; slide : (m, 2), m, of rows that slide: the shift at the lower limit, and the range
     mix : (m, n), from a sample's random numbers to the rows' own, of arms with a coupling; else without rows
     sums : (c, n + 2), of each limit of a sum of joints: what a sample's random numbers are multiplied by, and between
@@ -55,7 +53,6 @@ class PointChain(NamedTuple):
     first: Singles
     span: Singles
     links: Singles
-    base: Reals
     sliding: Flags
     slide: Singles
     mix: Singles
@@ -103,7 +100,7 @@ def point_chain(robot: Robot) -> PointChain:
     parts = point, first, span, steps, slide, mix, _sums(robot)
     single = [np.array(part, dtype=np.float32) for part in parts]
     point_, first_, span_, links_, slide_, mix_, sums = single
-    return PointChain(last, point_, first_, span_, links_, links[0, :3].copy(), robot.sliding, slide_, mix_, sums)
+    return PointChain(last, point_, first_, span_, links_, robot.sliding, slide_, mix_, sums)
 
 
 def _sums(robot: Robot) -> Reals:
@@ -183,7 +180,7 @@ def points_about_axis_1(chain: PointChain, rows: Singles) -> None:
     -----
     With a coupling, the random numbers are replaced by the values of the table's rows.
     """
-    last, point, first, span, links, _, sliding, slide, mix, _ = chain
+    last, point, first, span, links, sliding, slide, mix, _ = chain
     if mix.shape[0] > 0:
         _mix_rows(mix, rows)
     rows[X : X + CHUNK], rows[Y : Y + CHUNK], rows[Z : Z + CHUNK] = point[0], point[1], point[2]
@@ -235,27 +232,3 @@ def within_sums(sums: Singles, rows: Singles, inside: Flags) -> None:
             for j in range(joints):
                 total += sums[row, j] * rows[j * CHUNK + i]
             inside[i] = inside[i] and total >= sums[row, joints] and total <= sums[row, joints + 1]
-
-
-@inner_kernel
-def point_in_base(chain: PointChain, rows: Singles, i: int) -> Vector:
-    """A point of a chunk in the base frame: joint 1 turns it, then comes the constant base. Kernel.
-
-    Parameters
-    ----------
-    chain : see :func:`point_chain`
-    rows : as :func:`points_about_axis_1` leaves them
-    i : number within the chunk
-
-    Returns
-    -------
-    point : three numbers, m
-    """
-    c, s = cos_sin_turns(chain[2][0] + rows[i] * chain[3][0])
-    base = chain[5]
-    x, y, z = c * rows[X + i] - s * rows[Y + i], s * rows[X + i] + c * rows[Y + i], rows[Z + i]
-    return (
-        base[0, 0] * x + base[0, 1] * y + base[0, 2] * z + base[0, 3],
-        base[1, 0] * x + base[1, 1] * y + base[1, 2] * z + base[1, 3],
-        base[2, 0] * x + base[2, 1] * y + base[2, 2] * z + base[2, 3],
-    )

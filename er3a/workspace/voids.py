@@ -1,4 +1,4 @@
-"""Voids inside the hull, that the proof finds empty: enclosed ones, and open pockets."""
+"""Voids that the proof finds empty: enclosed ones, and open pockets inside the convex hull of what is reached."""
 
 from __future__ import annotations
 
@@ -180,27 +180,8 @@ VoidKind = Literal["enclosed", "open"]
 _FLAT, _AT_ONCE = 1e-9, 8192  # thickness, in parts of the length, of a flat hull; points looked at together
 
 
-@dataclass(frozen=True, eq=False)
-class Hull:
-    """A watertight mesh in an order that depends on the points alone.
-
-    Attributes
-    ----------
-    vertices : (V, 3), m, sorted by x, y, z; of : (V,), which of the given points each one is
-    triangles : (F, 3), vertex numbers, counter-clockwise from outside
-    planes : (P, 4), of the faces: outward normals, and what is added to the product with a point, m
-    volume : m^3; 0 where the points lie in a plane (then there are no triangles)
-    """
-
-    vertices: Reals
-    of: Integers
-    triangles: Integers
-    planes: Reals
-    volume: float
-
-
-def convex_hull(points: Reals) -> Hull:
-    """Convex hull of points.
+def is_flat(points: Reals) -> bool:
+    """Whether points lie in a plane.
 
     Parameters
     ----------
@@ -208,43 +189,29 @@ def convex_hull(points: Reals) -> Hull:
 
     Returns
     -------
-    hull : in an order that depends on the points alone, not on theirs; flat ones have no triangles
+    flat : True also of fewer than four points
     """
-    points, of = np.unique(points, axis=0, return_index=True)
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if len(points) < 4 or spread[2] <= _FLAT * spread[0]:
-        return Hull(points, of, np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), 0.0)
-    found = scipy.spatial.ConvexHull(points)
-    kept = np.sort(found.vertices)
-    triangles = _ordered(points[kept], np.searchsorted(kept, found.simplices))
-    return Hull(points[kept], of[kept], triangles, found.equations, float(found.volume))
+    return len(points) < 4 or bool(spread[2] <= _FLAT * spread[0])
 
 
-def _ordered(vertices: Reals, triangles: Integers) -> Integers:
-    """Triangles facing outwards, each beginning with its lowest vertex, sorted."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), a - vertices.mean(axis=0)) < 0
-    triangles = np.where(inwards[:, None], triangles[:, ::-1], triangles)
-    first = triangles.argmin(axis=1)
-    triangles = np.take_along_axis(triangles, (first[:, None] + np.arange(3)) % 3, axis=1)
-    return triangles[np.lexsort(triangles.T[::-1])]
-
-
-def inside_hull(hull: Hull, points: Reals) -> Flags:
-    """Which points lie in a hull.
+def inside_hull(corners: Reals, points: Reals) -> Flags:
+    """Which points lie in the convex hull of others.
 
     Parameters
     ----------
+    corners : (N, 3), m
     points : (n, 3), m
 
     Returns
     -------
     inside : (n,) bool, the surface excluded; none in a flat hull
     """
-    if not len(hull.planes):
+    if is_flat(corners):
         return np.zeros(len(points), dtype=bool)
+    planes = scipy.spatial.ConvexHull(corners).equations
     parts = np.array_split(points, len(points) // _AT_ONCE + 1)
-    return np.concatenate([(part @ hull.planes[:, :3].T + hull.planes[:, 3] < 0).all(axis=1) for part in parts])
+    return np.concatenate([(part @ planes[:, :3].T + planes[:, 3] < 0).all(axis=1) for part in parts])
 
 
 POCKET_BLOCKS, TURNS = 64, 180  # across the section and around, on which pockets are searched
@@ -254,7 +221,7 @@ _SPECK_M3 = 1e-9  # 1 mm^3: smaller voids are not listed
 
 @dataclass(frozen=True, eq=False)
 class Void:
-    """A void inside the hull, in the base frame.
+    """A void, in the base frame.
 
     Attributes
     ----------
@@ -277,13 +244,12 @@ class Void:
     triangles: Integers
 
 
-def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> list[Void]:
-    """Voids that the proof finds inside the hull of the reach: enclosed ones, and open pockets.
+def proven_voids(robot: Robot, proven: Proven, shoulder: Reals) -> list[Void]:
+    """Voids that the proof finds: enclosed ones, and open pockets in the hull of the blocks that may be reached.
 
     Parameters
     ----------
     proven : of the robot
-    hull : of sampled tool points, m, base frame
     shoulder : (3,), m, base frame, the point of axis 1 at the height of joint 2
 
     Returns
@@ -297,8 +263,9 @@ def proven_voids(robot: Robot, proven: Proven, hull: Hull, shoulder: Reals) -> l
         if cavity.lower > _SPECK_M3
     ]
     blocks = _pocket_blocks(proven, outside)
-    inside = blocks.empty > 0.5
-    inside[inside] = inside_hull(hull, proven.in_base(blocks.points()[inside]))
+    inside, places = blocks.empty > 0.5, blocks.points()
+    corners = places[~inside & ~scipy.ndimage.binary_erosion(~inside)]  # those within have no part in the hull
+    inside[inside] = inside_hull(corners, places[inside])
     for mask in pockets(blocks, inside):
         found.append(_void("open", robot, proven, _as_cavity(blocks, mask), shoulder, (blocks, mask)))
     return sorted(found, key=lambda void: -void.lower)

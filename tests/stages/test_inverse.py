@@ -53,7 +53,7 @@ def make_study(**robots: dict) -> Study:
             "seed": 7,
             "robots": entries | robots,
             "validation": {"round_trips": 1, "reach_starts": 1},
-            "workspace": {"samples": 1, "blocks": 1, "cells_across": 8, "hull_directions": 1000, "cloud_points": 1},
+            "workspace": {"samples": 1, "blocks": 1, "cells_across": 8, "cloud_points": 1},
             "trajectory": {
                 "checks_per_sample": 1,
                 "near_wrist_deg": 5.0,

@@ -7,15 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from er3a.errors import InputError
 from er3a.files.robot_library import load_robot
 from er3a.geometry.transforms import transform
-from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.forward import forward
-from er3a.sampling import grid as grid_module
 from er3a.sampling.grid import make_grid, tool_bound
 from er3a.sampling.random_joints import Draw, direction_numbers, philox4x32
-from tests.stages.workspace_arms import SEED, extreme_points, tally_of
+from tests.stages.workspace_arms import SEED, tally_of
 
 # --- random numbers ---
 
@@ -90,25 +87,17 @@ def odd_robots():
 def test_the_loop_counts_what_forward_gives(robot, sampling):
     """The loop works in single precision, so a sample next to a border may fall to the other side of it."""
     samples, blocks = 9_001, 3
-    grid, draw, tally = tally_of(robot, samples, blocks, 20, sampling=sampling)
+    grid, draw, counts = tally_of(robot, samples, blocks, 20, sampling=sampling)
     block = np.repeat(np.arange(blocks), draw.sizes)
     number = np.concatenate([np.arange(size) for size in draw.sizes])
     points = forward(robot, draw.joints(robot, block, number))[:, :3, 3]
-    edges = [grid.origin[i] + np.arange(grid.shape[i] + 1) * grid.cell for i in range(3)]
-    assert np.abs(np.histogramdd(points, edges)[0] - tally.counts).sum() <= 4
-    assert tally.counts.sum() == tally.side.sum() == samples
-    assert ((np.histogramdd(points[block == 0], edges)[0] > 0) != (tally.first_block == 0)).sum() <= 4
-
+    assert counts.sum() == samples
     along = (points - grid.axis_point) @ grid.axis
     rho = np.linalg.norm(points - grid.axis_point - along[:, None] * grid.axis, axis=1)
     section_edges = [
         grid.section_origin[i] + np.arange(grid.section_shape[i] + 1) * grid.section_cell for i in range(2)
     ]
-    assert np.abs(np.histogram2d(rho, along, section_edges)[0] - tally.section).sum() <= 8
-
-    reached = (points @ fibonacci_sphere(200).T).max(axis=0)
-    found = np.einsum("di,di->d", extreme_points(robot, draw, tally.extremes), fibonacci_sphere(200))
-    assert np.abs(found - reached).max() < 1e-5
+    assert np.abs(np.histogram2d(rho, along, section_edges)[0] - counts).sum() <= 8
 
 
 lengths = st.lists(st.floats(-1, 1), min_size=6, max_size=6)
@@ -117,7 +106,7 @@ angles = st.lists(st.floats(-3.2, 3.2), min_size=6, max_size=6)
 
 @pytest.mark.long
 @given(a=lengths, d=lengths, alpha=angles, q=angles, tool=st.tuples(lengths, angles), modified=st.booleans())
-def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
+def test_no_tool_point_leaves_the_section(a, d, alpha, q, tool, modified):
     robot = load_robot("er3_600").replace(
         convention="modified" if modified else "standard",
         a=a,
@@ -127,25 +116,14 @@ def test_no_tool_point_leaves_the_grid(a, d, alpha, q, tool, modified):
         base=transform(tool[0][3:], tool[1][3:]),
     )
     grid, point = make_grid(robot, 16), forward(robot, np.array(q))[:3, 3]
-    index = (point - grid.origin) / grid.cell
-    assert np.all(index >= 0)
-    assert np.all(index < grid.shape)
-    assert max(grid.shape) == 16
     from_axis = np.linalg.norm(np.cross(point - grid.axis_point, grid.axis))
+    place = np.array([from_axis, (point - grid.axis_point) @ grid.axis])
+    index = (place - grid.section_origin) / grid.section_cell
+    assert np.all(index >= 0)
+    assert np.all(index < grid.section_shape)
     assert from_axis <= tool_bound(robot).reach * (1 + 1e-9)
 
 
 def test_the_bound_is_tight_where_the_arm_can_stretch():
     assert tool_bound(load_robot("er3_600")).reach == pytest.approx(0.5928 + 0.0785, abs=5e-5)
     assert tool_bound(load_robot("er3a_c60_article")).reach == pytest.approx(0.65 + 0.65161 + 0.1256, abs=1e-12)
-
-
-def test_a_grid_too_fine_says_how_fine_is_possible(monkeypatch):
-    robot = load_robot("er3_600")  # its grid is a cube
-    monkeypatch.setattr(grid_module, "memory_budget", lambda: 200**3 * grid_module.BYTES_PER_CELL)
-    with pytest.raises(
-        InputError, match=r"workspace.cells_across: 1000 cells across need .* GiB.*Write 200 or less"
-    ) as error:
-        make_grid(robot, 1000)
-    possible = int(str(error.value).split("Write ")[1].split()[0])
-    assert max(make_grid(robot, possible).shape) == possible

@@ -8,12 +8,11 @@ import numpy as np
 import yaml
 
 from er3a.files.robot_library import ROBOTS
-from er3a.kinematics.forward import forward
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import make_grid
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.tally import Extremes, tally_blocks
+from er3a.sampling.tally import tally_blocks
 
 SEED = 20261120
 
@@ -21,7 +20,7 @@ SEED = 20261120
 def make_study(files: dict[str, Path] | None = None, **workspace) -> Study:
     entry = {"targets": "targets.yaml", "paths": "paths.yaml"}
     robots = {name: {**entry, "file": str(file)} for name, file in (files or {}).items()} or {"er3_600": entry}
-    small = {"samples": 60_001, "blocks": 7, "cells_across": 16, "hull_directions": 1000, "cloud_points": 500}
+    small = {"samples": 60_001, "blocks": 7, "cells_across": 16, "cloud_points": 500}
     small["proof_cells"] = 400
     return Study.model_validate(
         {
@@ -78,10 +77,6 @@ def two_link_arm(lower: list[float], upper: list[float]) -> Robot:
     )
 
 
-def tally_of(robot: Robot, samples: int, blocks: int, across: int, directions: int = 200, sampling: str = "uniform"):
+def tally_of(robot: Robot, samples: int, blocks: int, across: int, sampling: str = "uniform"):
     grid, draw = make_grid(robot, across), Draw(SEED, samples, blocks, sampling)
-    return grid, draw, tally_blocks(robot, grid, draw, range(blocks), directions)
-
-
-def extreme_points(robot: Robot, draw: Draw, extremes: Extremes) -> np.ndarray:
-    return forward(robot, draw.joints(robot, extremes.block, extremes.sample))[:, :3, 3]
+    return grid, draw, tally_blocks(robot, grid, draw, range(blocks))

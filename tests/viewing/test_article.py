@@ -37,7 +37,7 @@ STAGES = ("validation", "workspace", "trajectory")
 IN_THE_SMALL_STUDY = [*(("er3a_c60", stage) for stage in STAGES), ("er3a_c60_article", "workspace")]
 SMALL = {"round_trips": 200, "reach_starts": 4, "map_cells": 20, "samples": 100_000, "blocks": 4, "cells_across": 16}
 SMALL |= {"cloud_points": 1000, "proof_cells": 2000, "directions": 40, "rolls": 2}
-SMALL |= {"checks_per_sample": 5, "hull_directions": 1000}
+SMALL |= {"checks_per_sample": 5}
 TABLE = np.array([[0, -90, 169.77], [650, 0, 0], [0, -90, 0], [0, 90, 651.61], [0, -90, 0], [0, 0, 125.6]])
 
 

@@ -18,7 +18,6 @@ KEY_FIGURES = words(
         "enclosed_voids_lower": "enclosed voids, at least",
         "volume_lower": "reached volume, at least",
         "volume_upper": "reached volume, at most",
-        "hull_volume": "convex hull of the samples: holds voids and dents, misses the rim",
         "least_reach": "least distance from axis 1",
         "samples": "samples",
     }

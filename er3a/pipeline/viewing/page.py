@@ -216,7 +216,6 @@ class ShownFigure:
 
 NUMERICS = {  # key figures that answer no question of a verdict
     "characteristic_length",
-    "hull_volume",
     "power_balance",
     "round_trip_joint_error",
     "samples",

@@ -1,1 +1,1 @@
-"""The reach of the tool point: a Monte Carlo cloud, its hull, touched cells and voids."""
+"""The reach of the tool point: a Monte Carlo cloud, touched cells and voids."""

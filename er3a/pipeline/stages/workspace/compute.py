@@ -1,4 +1,4 @@
-"""Workspace: count samples, and compute hull, volumes and voids."""
+"""Workspace: count samples, and compute volumes and voids."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from er3a.collision.shapes import shapes_assumed
 from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import translation
 from er3a.kinematics.forward import forward
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.scope import Coverage, Open, coverages
@@ -25,15 +25,14 @@ from er3a.pipeline.stages.workspace.entry import CapabilitySettings, WorkspaceSe
 from er3a.pipeline.stages.workspace.sample import draw_of, sampled
 from er3a.pipeline.stages.workspace.tool_capability import ToolCapability, tool_capability
 from er3a.pipeline.study import Study
-from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid, make_grid, shoulder_of
-from er3a.sampling.tally import ReachExtremes, Tally, search_reach, section_cells
+from er3a.sampling.tally import ReachExtremes, search_reach, section_cells
 from er3a.workspace.proven import SETTLED, Proven, prove_robot
-from er3a.workspace.voids import Hull, Void, convex_hull, pocket_block, proven_voids
+from er3a.workspace.voids import Void, is_flat, pocket_block, proven_voids
 
 
-def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict[Finding]:
+def judge(voids: Sequence[Void], undecided: float, *, flat: bool = False) -> Verdict[Finding]:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole
@@ -41,10 +40,10 @@ def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdic
 
     Parameters
     ----------
-    hull_volume : m^3
     undecided : ratio of the volume that the proof leaves undecided
+    flat : whether all that is reached lies in a plane
     """
-    if hull_volume == 0:
+    if flat:
         return Verdict("caution", fact("workspace.flat"))
     enclosed = [void for void in voids if void.kind == "enclosed"]
     unexpected = [void for void in enclosed if not void.holds_shoulder]
@@ -66,18 +65,11 @@ def _size_and_place(void: Void) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """The samples of a study and what follows from them alone; ``q_extreme``, ``q_cloud`` are (n, 6), rad."""
+    """The samples of a study: counts in the section's cells, and joints (n, 6), rad, of those that are kept."""
 
     grid: Grid
-    tally: Tally
-    q_extreme: Reals
+    counts: Integers
     q_cloud: Reals
-    hull: Hull
-
-    @property
-    def q_kept(self) -> Reals:
-        """All samples whose joint angles are kept."""
-        return np.concatenate([self.q_extreme, self.q_cloud])
 
 
 def compute(study: Study, name: str) -> model.WorkspaceResults:
@@ -90,23 +82,20 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
     """
     robot = study.robot(name)
     samples = _samples(study, robot)
-    grid, hull = samples.grid, samples.hull
+    grid = samples.grid
     settings, motion = study.section(WorkspaceSettings), study.section(TrajectorySettings)
     proven = prove_robot(robot, settings.proof_cells, study.seed)
-    voids = proven_voids(robot, proven, hull, shoulder_of(robot, grid))
+    voids = proven_voids(robot, proven, shoulder_of(robot, grid))
     scene = study.scene(name, "capability")
     assumed = shapes_assumed(robot, study.assumed_margin(name), {})
     margin = study.assumed_margin(name) if assumed else motion.penetration_tolerance_mm / 1000
     asked = study.section(CapabilitySettings)
     tool = tool_capability(robot, asked, grid.cell, scene, margin=margin, proven=proven)
     vertices, triangles = model.void_surfaces(voids)
-    corners = model.HullVertices(hull.vertices, shown(robot, samples.q_extreme[hull.of]))
     return model.WorkspaceResults(
         summary=_summary(study, robot, samples, proven, voids, tool, scene=scene, assumed=assumed),
-        section=model.SectionCells.of(section_cells(samples.tally, grid)),
+        section=model.SectionCells.of(section_cells(samples.counts, grid)),
         cloud=model.cloud(robot, samples.q_cloud),
-        hull_vertices=corners.of_joints(robot.slides),
-        hull_triangles=model.HullTriangles(hull.triangles),
         proof=model.proof(proven),
         border=model.border(proven),
         void_vertices=vertices,
@@ -119,11 +108,8 @@ def compute(study: Study, name: str) -> model.WorkspaceResults:
 def _samples(study: Study, robot: Robot) -> _Samples:
     settings = study.section(WorkspaceSettings)
     grid, draw = make_grid(robot, settings.cells_across), draw_of(study)
-    tally = sampled(study, robot, grid, range(settings.blocks))
-    q_extreme = draw.joints(robot, tally.extremes.block, tally.extremes.sample)
-    hull = convex_hull(forward(robot, q_extreme)[:, :3, 3])
-    q_cloud = draw.opening_joints(robot, settings.cloud_points)
-    return _Samples(grid, tally, q_extreme, q_cloud, hull)
+    counts = sampled(study, robot, grid, range(settings.blocks))
+    return _Samples(grid, counts, draw.opening_joints(robot, settings.cloud_points))
 
 
 def _summary(
@@ -137,25 +123,25 @@ def _summary(
     scene: Scene | None,
     assumed: Finding | None,
 ) -> model.WorkspaceSummary:
-    settings, grid, hull = study.section(WorkspaceSettings), samples.grid, samples.hull
-    judged = judge(hull.volume, voids, proven.proof.width)
+    settings, grid = study.section(WorkspaceSettings), samples.grid
+    points = forward(robot, samples.q_cloud)[:, :3, 3]
+    judged = judge(voids, proven.proof.width, flat=is_flat(points))
     examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
-    reach = search_reach(robot, grid, samples.q_kept)
+    reach = search_reach(robot, grid, samples.q_cloud)
     return model.WorkspaceSummary(
         verdict=judged.with_assumed_shapes(assumed if examined else None),
-        figures=_figures(reach, voids, volume, hull, settings.samples),
+        figures=_figures(reach, voids, volume, settings.samples),
         samples=settings.samples,
         sampling=settings.sampling,
         volume_m3=volume,
         proof=model.ProofSummary(
             len(proven.proof.cells),
             proven.proof.width,
-            len(samples.q_kept),
-            proven.count_in_empty(forward(robot, samples.q_kept)[:, :3, 3]),
+            len(points),
+            proven.count_in_empty(points),
             _bars(proven),
         ),
-        hull=model.HullSummary(hull.volume),
         reach_m=reach,
         axis=model.AxisSummary(
             model.triple(grid.axis_point), model.triple(grid.axis), model.triple(shoulder_of(robot, grid))
@@ -209,16 +195,13 @@ def _bars(proven: Proven) -> model.Bars | None:
     return model.Bars(proven.proof.bar, model.frame_of(proven.R, proven.origin)) if proven.proof.bar else None
 
 
-def _figures(
-    reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, hull: Hull, samples: int
-) -> tuple[Figure, ...]:
+def _figures(reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, samples: int) -> tuple[Figure, ...]:
     enclosed = [void.lower for void in voids if void.kind == "enclosed"]
     return (
         Figure("greatest_reach", reach.furthest_from_axis * 1000, "mm"),
         Figure("enclosed_voids_lower", 1000 * sum(enclosed), "L"),
         Figure("volume_lower", volume.lower, "m³"),
         Figure("volume_upper", volume.upper, "m³"),
-        Figure("hull_volume", hull.volume, "m³"),
         Figure("least_reach", reach.nearest_to_axis * 1000, "mm"),
         Figure("samples", samples, ""),
     )

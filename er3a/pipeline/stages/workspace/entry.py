@@ -20,14 +20,13 @@ class WorkspaceSettings(StrictModel):
 
     ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
     chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
-    the hull is taken over the extreme samples in ``hull_directions`` directions, the recording shows ``cloud_points``.
+    the recording shows ``cloud_points``.
     The proof looks at four cells of the section for each of ``proof_cells``.
     """
 
     samples: Annotated[int, Field(ge=1, le=100_000_000_000)]
     blocks: Annotated[int, Field(ge=1, le=100_000)]
     cells_across: Annotated[int, Field(ge=8, le=1024)]
-    hull_directions: Annotated[int, Field(ge=1000, le=100_000)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
     proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
     sampling: Literal["uniform", "sobol"] = "uniform"

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.collision.pairs import Pair
-from er3a.finding import Finding
+from er3a.finding import Finding, is_one
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary, Verdict
-from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
+from er3a.pipeline.tables import Table, Texts, column, lists, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import ReachExtremes
@@ -42,19 +42,6 @@ class Cloud(Table):
 
     point_m: Reals = vector("{}_m", "tool point in the base frame")
     manipulability_m3: Reals = column("|det J|")
-
-
-class HullVertices(Table):
-    """Corners of the convex hull."""
-
-    point_m: Reals = vector("{}_m", "tool point in the base frame")
-    q_deg: Reals = per_joint("joint angle that reaches the corner")
-
-
-class HullTriangles(Table):
-    """Faces of the convex hull, counter-clockwise from outside."""
-
-    corners: Integers = vector("{}", "row of the corner among the hull's vertices", parts="abc")
 
 
 class ProofCells(Table):
@@ -188,13 +175,6 @@ class ProofSummary:
 
 
 @dataclass(frozen=True)
-class HullSummary:
-    """Convex hull of the extreme samples."""
-
-    volume_m3: float
-
-
-@dataclass(frozen=True)
 class AxisSummary:
     """Axis 1 in the base frame: a point from which heights count, its direction, its point at joint 2's height."""
 
@@ -205,7 +185,7 @@ class AxisSummary:
 
 @dataclass(frozen=True)
 class VoidSummary:
-    """A void inside the hull; see :class:`er3a.workspace.voids.Void`."""
+    """A void; see :class:`er3a.workspace.voids.Void`."""
 
     kind: VoidKind
     volume_m3: Bounds
@@ -383,7 +363,6 @@ class WorkspaceSummary(Summary):
     sampling: Sampling
     volume_m3: Bounds
     proof: ProofSummary
-    hull: HullSummary
     reach_m: ReachExtremes
     axis: AxisSummary
     section_cell_m: float
@@ -391,6 +370,11 @@ class WorkspaceSummary(Summary):
     pocket_block_m: float
     capability: CapabilitySummary | Finding
     placement: Placement | None
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all that is reached lies in a plane."""
+        return is_one(self.verdict.finding, "workspace.flat")
 
     @property
     def enclosed_voids(self) -> list[VoidSummary]:
@@ -403,8 +387,6 @@ class WorkspaceResults(Results[WorkspaceSummary]):
 
     section: SectionCells
     cloud: Cloud
-    hull_vertices: HullVertices
-    hull_triangles: HullTriangles
     proof: ProofCells
     border: Border
     void_vertices: VoidVertices

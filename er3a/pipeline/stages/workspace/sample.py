@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from er3a.numerics.arrays import Integers
 from er3a.pipeline.progress import shown_work
 from er3a.pipeline.stages.workspace.entry import WorkspaceSettings
 from er3a.pipeline.study import Study
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.sampling.random_joints import Draw
-from er3a.sampling.tally import Tally, tally_blocks
+from er3a.sampling.tally import tally_blocks
 
 
 def draw_of(study: Study) -> Draw:
@@ -22,8 +23,8 @@ def draw_of(study: Study) -> Draw:
     return Draw(study.seed, settings.samples, settings.blocks, settings.sampling)
 
 
-def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
-    """The tally of some blocks of the study's samples, with progress on standard error.
+def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Integers:
+    """Counts of some blocks of the study's samples, with progress on standard error.
 
     Parameters
     ----------
@@ -32,9 +33,9 @@ def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Tally:
 
     Returns
     -------
-    tally : of these blocks alone
+    counts : samples of these blocks in each cell of the section
     """
     draw = draw_of(study)
     total = int(draw.sizes[blocks.start : blocks.stop].sum())
     with shown_work(f"{robot.name}: drawing {total:,} samples"):
-        return tally_blocks(robot, grid, draw, blocks, study.section(WorkspaceSettings).hull_directions)
+        return tally_blocks(robot, grid, draw, blocks)

@@ -1,4 +1,4 @@
-"""Workspace recording: the cloud cut open around the arm, and the voids inside the hull."""
+"""Workspace recording: the cloud cut open around the arm, and the voids within the outline of the section."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
 
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
+ALONG = 0.99  # of an axis that points along y nearly
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
 _COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 
 
 NOTE = """# Workspace of {title}
-**Look first** at the voids inside the hull, below: enclosed ones in magenta, open pockets in orange.
+**Look first** at the voids, below: enclosed ones in magenta, open pockets in orange, the border of the reach in grey.
 
 {findings}
 
@@ -42,10 +43,10 @@ def record(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         NOTE,
         views={
             "Cloud, near half cut away": ["cloud/far/**", "tray/**", "scene/**"],
-            "Voids inside the hull": ["hull/**", "voids/**"],
+            "Voids": ["border/**", "voids/**"],
         },
         scene=study.scene(stored.robot, "capability"),
-        shapes=_cloud(results) | _hull(results) | dict(_voids(results)) | _tray(placing_of(study, stored)),
+        shapes=_cloud(results) | _border(results) | dict(_voids(results)) | _tray(placing_of(study, stored)),
         points=[results.cloud.point_m],
     )
 
@@ -77,10 +78,17 @@ def _cloud(results: model.WorkspaceResults) -> dict[str, Logged]:
     }
 
 
-def _hull(results: model.WorkspaceResults) -> dict[str, Logged]:
-    vertices, triangles = results.hull_vertices.point_m, results.hull_triangles.corners
-    edges = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    return {"hull": rr.LineStrips3D(list(vertices[edges]), colors=[(*rgb(MUTED), 90)], radii=rr.Radius.ui_points(0.4))}
+def _border(results: model.WorkspaceResults) -> dict[str, Logged]:
+    """The outline of the section, on both sides of axis 1, in the plane across the base's y axis."""
+    border, axis = results.border, results.summary.axis
+    up = np.array(axis.direction)
+    across = np.cross([0.0, 1.0, 0.0], up) if abs(up[1]) < ALONG else np.array([1.0, 0.0, 0.0])
+    lines = [
+        axis.point_m + side * border.rho_m[own, None] * across / np.linalg.norm(across) + border.z_m[own, None] * up
+        for own in (border.arc == number for number in np.unique(border.arc))
+        for side in (1, -1)
+    ]
+    return {"border": rr.LineStrips3D(lines, colors=[(*rgb(MUTED), 200)], radii=rr.Radius.ui_points(1))}
 
 
 def _voids(results: model.WorkspaceResults) -> Iterator[tuple[str, Logged]]:

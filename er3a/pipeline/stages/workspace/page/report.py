@@ -55,7 +55,7 @@ def _labelled(
     robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None
 ) -> Markup | None:
     """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
-    if results.summary.proof.bars or results.summary.hull.volume_m3 <= 0:
+    if results.summary.proof.bars or results.summary.is_flat:
         return None
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
