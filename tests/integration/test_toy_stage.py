@@ -37,7 +37,6 @@ from er3a.pipeline.tables import Table, column
 
 class ToySummary(Summary):
     """Nothing more."""
-    verdict: Verdict[Finding]
 
 class Lengths(Table):
     """Each length."""

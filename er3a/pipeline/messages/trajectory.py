@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import is_one
@@ -15,7 +15,7 @@ from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
 from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import RateCause, rate_ratio
+from er3a.planning.motion_faults import rate_ratio
 from er3a.planning.names import StrategyName
 
 KEY_FIGURES = words(
@@ -184,11 +184,11 @@ def _(jump: model.Jump) -> str:
     return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
 
 
-def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
+def _when(stretch: model.Stretch) -> str:
     return sentence("path.stretch", start=stretch.t0_s, end=stretch.t1_s)
 
 
-def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
+def cause_text(part: model.Stretch) -> str:
     """Why a stretch of a path is listed."""
     return _with_worst(part, say(part.cause))
 
@@ -208,7 +208,7 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
     order of time, what only follows from others last. What is undecided counts only where it comes before all that is
     not."""
     fast = [[part for part in path.too_fast if part.cause.basis == each] for each in ("documented", "assumed")]
-    grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    grave: list[Sequence[model.Stretch]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
     found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
     edge = _edge(path)
@@ -246,13 +246,13 @@ def cause_of(path: model.PathSummary) -> str:
     return sentence("path.edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
 
 
-def _beside(event: model.Singularity, part: model.Stretch[RateCause]) -> bool:
+def _beside(event: model.Singularity, part: model.Stretch) -> bool:
     return part.t0_s - ADJOINING <= event.until_s and event.t_s <= part.t1_s + ADJOINING
 
 
-def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]]:
+def adjoined(stretches: Sequence[model.Stretch]) -> list[model.Stretch]:
     """Stretches in order of time, those of one cause that adjoin as one."""
-    found: list[model.Stretch[Any]] = []
+    found: list[model.Stretch] = []
     for part in sorted(stretches, key=lambda part: part.t0_s):
         k = next((k for k, each in enumerate(found) if each.cause == part.cause), None)
         if k is not None and part.t0_s <= found[k].t1_s + ADJOINING:
@@ -262,7 +262,7 @@ def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]
     return sorted(found, key=lambda part: part.t0_s)
 
 
-def _run(stretches: Sequence[model.Stretch[RateCause]]) -> tuple[list[model.Stretch[RateCause]], float | None]:
+def _run(stretches: Sequence[model.Stretch]) -> tuple[list[model.Stretch], float | None]:
     """The first of stretches with those that adjoin, and when (s) the next one begins."""
     first, *later = sorted(stretches, key=lambda part: part.t0_s)
     run = [first]
@@ -273,19 +273,19 @@ def _run(stretches: Sequence[model.Stretch[RateCause]]) -> tuple[list[model.Stre
     return run, None
 
 
-def _end_of(run: Sequence[model.Stretch[RateCause]]) -> float:
+def _end_of(run: Sequence[model.Stretch]) -> float:
     return max(part.t1_s for part in run)
 
 
-def _worst_of_kinds(run: Sequence[model.Stretch[RateCause]]) -> list[model.Stretch[RateCause]]:
+def _worst_of_kinds(run: Sequence[model.Stretch]) -> list[model.Stretch]:
     """Of each kind of limit the stretch that exceeds it most, speeds first."""
-    kinds: dict[str, list[model.Stretch[RateCause]]] = {}
+    kinds: dict[str, list[model.Stretch]] = {}
     for part in sorted(run, key=lambda part: not is_one(part.cause, "too_fast")):
         kinds.setdefault(f"{part.cause.code} {part.cause.limit.unit}", []).append(part)
     return [max(alike, key=lambda part: rate_ratio(part.cause)) for alike in kinds.values()]
 
 
-def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf) -> str:
+def _rates(stretches: Sequence[model.Stretch], edge: float = math.inf) -> str:
     """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst.
 
     ``edge``: when (s) the path leaves the reach; towards it speeds have no bound.
@@ -301,14 +301,14 @@ def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf
     return sentence("path.rates", end=end, rates=sentence("rates", joints=named, worst=worst), again=again)
 
 
-def _with_worst(part: model.Stretch[Any], cause: str) -> str:
+def _with_worst(part: model.Stretch, cause: str) -> str:
     """A cause, and when it is worst on a stretch that is not but a moment."""
     if part.worst_s is None or not _lasts(part):
         return cause
     return sentence("path.worst", cause=cause, t=f"{part.worst_s:.4g}")
 
 
-def _lasts(part: model.Stretch[Any]) -> bool:
+def _lasts(part: model.Stretch) -> bool:
     return part.t1_s - part.t0_s >= MOMENT
 
 

@@ -356,7 +356,7 @@ def _verdict(
     wrong: Finding | None,
     found: Finding,
     home: Finding | None,
-) -> Verdict[Finding]:
+) -> Verdict:
     if pairs.always.any():
         return Verdict(
             "fail", fact("collision.never_free", pairs=tuple(pairs.between[pairs.always]), assumed=found.shapes_assumed)

@@ -39,8 +39,6 @@ from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
 
-DynamicsVerdict = Verdict[Finding]
-
 
 def drive_uses(
     robot: Robot, paths: tuple[model.PathLoad, ...], holding: tuple[model.HoldingTorque, ...]
@@ -166,7 +164,7 @@ def verdict_of(
     masses: model.MassesUsed | None,
     *,
     skipped: tuple[str, ...] = (),
-) -> DynamicsVerdict:
+) -> Verdict:
     """The stage's answer, by what is asked for against what is allowed.
 
     Parameters

@@ -15,7 +15,7 @@ from er3a.dynamics.plausibility import MassFinding
 from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict
@@ -281,7 +281,6 @@ class DynamicsSummary(Summary):
 
     needs = ("torque", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]

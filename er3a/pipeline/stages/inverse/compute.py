@@ -474,7 +474,7 @@ def _is_certain(method: Method) -> bool:
 
 def _verdict(
     targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict[Finding]:
+) -> Verdict:
     position, orientation = worst
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:

@@ -386,7 +386,7 @@ def _singularity(event: SingularEvent) -> model.Singularity:
     )
 
 
-def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> tuple[model.Stretch[model.CauseT], ...]:
+def _stretches(motion: Motion, intervals: Iterable[Interval[Finding]]) -> tuple[model.Stretch, ...]:
     """Intervals in time and on the tool point's way."""
     found = []
     for interval in intervals:
@@ -564,9 +564,7 @@ def _checks(
     )
 
 
-def _verdict(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: Finding | None
-) -> Verdict[Finding]:
+def _verdict(paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: Finding | None) -> Verdict:
     if unmet := unmet_expectations([*paths, *skipped], "safe"):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.meant_safe]

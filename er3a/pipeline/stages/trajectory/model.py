@@ -7,21 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import Literal
 
 from er3a.collision.pairs import Pair
-from er3a.finding import AnyFinding, Finding
+from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.motion_faults import LimitCause, RateCause
 from er3a.planning.names import FAULTS, PathVerdict, StrategyName
 from er3a.planning.way_around import NoWayAround
 
@@ -33,8 +32,6 @@ FASTEST: Literal["fastest"] = "fastest"
 AT_EDGE, AROUND_EDGE = 0.001, 0.1
 """Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
 joints may be too fast because of it."""
-
-CauseT = TypeVar("CauseT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class Stretch(Generic[CauseT]):
+class Stretch:
     """A stretch of a path, in time and along its way, on which something is wrong; and when it is worst, where that has
     a value."""
 
@@ -111,7 +108,7 @@ class Stretch(Generic[CauseT]):
     t1_s: float
     s0_m: float
     s1_m: float
-    cause: CauseT
+    cause: Finding
     worst_s: float | None = None
 
 
@@ -246,16 +243,16 @@ class PathSummary:
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[Finding], ...]
-    out_of_limits: tuple[Stretch[LimitCause], ...]
-    too_fast: tuple[Stretch[RateCause], ...]
-    undecided: tuple[Stretch[Finding], ...]
+    unreachable: tuple[Stretch, ...]
+    out_of_limits: tuple[Stretch, ...]
+    too_fast: tuple[Stretch, ...]
+    undecided: tuple[Stretch, ...]
     jumps: tuple[Jump, ...]
     max_joint_speed_deg_s: tuple[float, ...] | None
     max_joint_speed_ratio: float | None
     max_joint_acceleration_ratio: float | None
     joint_speed_bounded: bool
-    collisions: tuple[Stretch[Finding], ...]
+    collisions: tuple[Stretch, ...]
     clearance: MinClearance | None
     not_planned: NoWayAround | None
     fastest_s: float | None
@@ -287,7 +284,7 @@ class PathSummary:
     def outcomes(self) -> tuple[PathVerdict, ...]:
         """All that it came to, as :func:`in_order` names it."""
         known = [part for part in self.too_fast if part.cause.basis != "assumed"]
-        faults: dict[PathVerdict, Sequence[Stretch[Any]]] = {
+        faults: dict[PathVerdict, Sequence[Stretch]] = {
             "unreachable": self.unreachable,
             "leaves limits": self.out_of_limits,
             "collides": self.collisions,
@@ -398,7 +395,6 @@ class TrajectorySummary(Summary):
 
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     characteristic_length_m: float
     near: NearThresholds
     joint_limits: LimitsUsed

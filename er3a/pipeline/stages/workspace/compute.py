@@ -33,7 +33,7 @@ from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Hull, Void, convex_hull, pocket_block, proven_voids
 
 
-def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict[Finding]:
+def judge(hull_volume: float, voids: Sequence[Void], undecided: float) -> Verdict:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole

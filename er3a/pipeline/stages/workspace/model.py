@@ -14,7 +14,7 @@ from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, lists, per_joint, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
@@ -378,7 +378,6 @@ class WorkspaceSummary(Summary):
 
     needs = ("reach", "limits", "self_collision")
 
-    verdict: Verdict[Finding]
     samples: int
     sampling: Sampling
     volume_m3: Bounds
