@@ -17,7 +17,6 @@ from er3a.finding import Finding, fact
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
@@ -97,12 +96,6 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
     assert f"{chord:.2g} times its distance" in quarter
     weak = FOUND.but(parts=(FOUND.parts[0].but(settled=5), *FOUND.parts[1:]))
     assert "If an open or weak entry is wrong" in how_far_off(weak)[1]  # one more is not settled, and has no name here
-
-
-def test_a_verdict_says_what_it_is_not_to_be_taken_for():
-    torque = fact("dynamics.no_limits", torques=(), missing_links=(), doubts=0, grade=None)
-    assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
-    assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
 
 
 def test_of_a_table_that_nothing_settles_each_page_says_so_first(tmp_path):

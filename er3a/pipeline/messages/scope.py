@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from er3a.collision.pairs import BASE, link_label
-from er3a.finding import AnyFinding
 from er3a.pipeline.language import own_title, tr, words
 from er3a.pipeline.messages.pages import GROUP_NAMES
-from er3a.pipeline.messages.say import FORMATS, bracketed, joined, say, sentence, texts, word
+from er3a.pipeline.messages.say import FORMATS, bracketed, joined, sentence, texts, word
 from er3a.pipeline.scope import Check, Coverage, Open
 
 CHECKS: Mapping[Check, str] = words(
@@ -89,7 +88,11 @@ ASSUMED: Mapping[str, str] = words(
         "rated_torques": "rated torques are unknown",
         "rotor_inertias": "rotors have no inertia",
         "friction": "joints have no friction",
-        "wrist_limits": "wrist limits are unknown",
+        "wrist_moments": "allowed moments at the wrist are unknown",
+        "wrist_inertias": "allowed inertias at the wrist are unknown",
+        "rated_payload": "the rated payload is unknown",
+        "drives_guess": "the drives' limits, which the robot's file guesses",
+        "wrist_guess": "the wrist's limits, which the robot's file guesses",
         "load": "tool and payload weigh nothing",
         "open_space": "nothing stands around the arm",
         "mounting": "the base stands upright",
@@ -107,10 +110,6 @@ ASSUMED: Mapping[str, str] = words(
 TEXTS = texts(
     {
         "link": "[base{base:?}][{base:!}link {number}]",
-        "reserved.dynamics.no_limits": (
-            "What is not known comes on top of these torques, whose ± is that of the known masses alone: don't choose "
-            "motors by them."
-        ),
         "not_checked": "Not checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
         "coverage": "[all{all:?}][none{none:?}][{part:?}{covered} of {of}]",
@@ -132,9 +131,6 @@ TEXTS = texts(
 
 MAX_NAMED = 6  # in a sentence; the table names all
 _words: dict[str, tuple[str, Mapping[str, str]]] = {}
-RESERVED: Mapping[str, tuple[str, ...]] = {
-    "dynamics.no_limits": ("link_masses", "load", "friction"),
-}
 
 
 def names_in_words(reason: str, code: str, words: Mapping[Any, str]) -> None:
@@ -184,12 +180,6 @@ def missed_text(found: Coverage) -> str:
 def never_text(stage: str) -> str:
     """What a stage never checks; empty for a stage of others, which says it on its page."""
     return sentence(key) if (key := f"never.{stage}") in TEXTS else ""
-
-
-def say_reserved(finding: AnyFinding, assumed: Iterable[Open]) -> str:
-    """A verdict's finding, and what it is not to be taken for where its stage assumed something."""
-    reserved = any(each.reason in RESERVED.get(finding.code, ()) for each in assumed)
-    return joined([say(finding), sentence(f"reserved.{finding.code}") if reserved else ""], " ")
 
 
 FORMATS["missed"] = missed_text

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import get_args
+from typing import Literal
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def drive_uses(
     return tuple(found)
 
 
-def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[Finding, ...]:
+def unknowns(robot: Robot, of_load: Sequence[model.LoadPart | Literal["load"]]) -> tuple[Open, ...]:
     """What the files leave open of masses, drives and wrist.
 
     Parameters
@@ -82,46 +82,36 @@ def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[Finding, ...]
 
     Returns
     -------
-    open : each kind of value once, with its joints or links; without numbers if it concerns all
+    open : each kind of value once, with its joints or links; without names if it concerns none of these
     """
-    drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
-    links = tuple(link for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link)))
-    open_joints: dict[model.Need, tuple[int, ...]] = {
-        "masses": links,
-        "peak": _open(drives.peak),
-        "rated": _open(drives.rated),
-        "armature": _open(drives.armature),
+    drives, wrist = drives_of(robot), robot.masses.wrist
+    links = [str(link) for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link))]
+    last = {joint for joint in range(1, robot.joints + 1)[-3:] if not robot.slides[joint - 1]}
+    joints: dict[str, Iterable[int]] = {
+        "peak_torques": _open(drives.peak),
+        "rated_torques": _open(drives.rated),
+        "rotor_inertias": _open(drives.armature),
         "friction": _open(drives.coulomb + drives.viscous),
+        "wrist_moments": last - {joint for joint, _ in (wrist.moment if wrist else ())},
+        "wrist_inertias": last - {joint for joint, _ in (wrist.inertia if wrist else ())},
     }
-    found = [
-        fact(
-            "dynamics.unknown",
-            what=what,
-            numbers=() if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers,
-        )
-        for what, numbers in open_joints.items()
-        if numbers
-    ]
-    last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
-    if wrist is None or not np.isfinite(wrist.payload):
-        found.append(fact("dynamics.unknown", what="payload", numbers=()))
-    asked: tuple[tuple[model.Need, set[int]], ...] = (
-        ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
-        ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
-    )
-    found += [fact("dynamics.unknown", what=what, numbers=tuple(sorted(missing))) for what, missing in asked if missing]
-    groups: tuple[tuple[model.Need, str], ...] = (("drives_guess", "drives"), ("wrist_guess", "wrist_load"))
-    found += [
-        fact("dynamics.unknown", what=what, numbers=()) for what, group in groups if _is_guess(robot.sources.get(group))
-    ]
-    return (*found, *(fact("dynamics.unknown", what=each, numbers=()) for each in of_load))
+    whole = {
+        "rated_payload": wrist is None or not np.isfinite(wrist.payload),
+        "drives_guess": _is_guess(robot.sources.get("drives")),
+        "wrist_guess": _is_guess(robot.sources.get("wrist_load")),
+        "load": bool(of_load),
+    }
+    found = {"link_masses": links} | {reason: [f"J{joint}" for joint in sorted(of)] for reason, of in joints.items()}
+    named = [Open(reason, tuple(names)) for reason, names in found.items() if names]
+    parts = {"load": tuple(part for part in of_load if part != "load")}
+    return (*named, *(Open(reason, parts.get(reason, ())) for reason, holds in whole.items() if holds))
 
 
 def _is_guess(source: Source | LoadFields | None) -> bool:
     return source is not None and source.grade == "inferred"
 
 
-def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
+def open_of_load(study: Study, name: str) -> tuple[model.LoadPart | Literal["load"], ...]:
     """What the study does not say of tool and payload, or guesses.
 
     Parameters
@@ -160,7 +150,7 @@ def verdict_of(
     holding: tuple[model.HoldingTorque, ...],
     uses: tuple[model.Use, ...],
     findings: tuple[MassFinding, ...],
-    unknown: tuple[Finding, ...],
+    unknown: tuple[Open, ...],
     masses: model.MassesUsed | None,
     *,
     skipped: tuple[str, ...] = (),
@@ -186,11 +176,11 @@ def verdict_of(
     shown = {"missing_links": missing, "doubts": doubts, "grade": grade}
     if not uses:
         if not holding:
-            return Verdict("no_reference", fact("dynamics.no_data", needs=unknown))
+            return Verdict("no_reference", fact("dynamics.no_data"))
         return Verdict("no_reference", _no_limits([path.summary for path in paths], holding).but(**shown))
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
-    needs = tuple(each.what for each in unknown)
+    needs = tuple(each.reason for each in unknown)
     nothing_runs = not any(path.summary.counts for path in paths)
     not_run = (
         *skipped,
@@ -541,7 +531,6 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
         findings=findings,
-        unknown=unknown,
         payload_centre_mm=tuple(settings.payload_centre_mm),
         payload_gyration_mm=settings.payload_gyration_mm,
         paths=summaries,
@@ -554,7 +543,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),
             *(() if study.scene(name, "trajectory") or not paths else (Open("open_space"),)),
-            *_assumed(robot, unknown),
+            *unknown,
         ),
     )
     followed = [path.rows for path in paths if path.demand]
@@ -621,42 +610,6 @@ def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: Dyn
     gaps += [Open("paths_not_run", not_run)] if not_run else []
     asked: dict[Check, tuple[int, int]] = {"torque": of, "limits": counts, **dict.fromkeys(OF_MOTIONS, counts)}
     return coverages(asked, (each for each in gaps if each.reason in GAPS))
-
-
-def _assumed(
-    robot: Robot,
-    unknown: tuple[Finding, ...],
-) -> tuple[Open, ...]:
-    """What the files leave open, and paths that count for nothing."""
-    subjects: dict[model.Need, tuple[str, ...]] = {
-        "masses": ("link_masses",),
-        "peak": ("peak_torques",),
-        "rated": ("rated_torques",),
-        "armature": ("rotor_inertias",),
-        "friction": ("friction",),
-        "drives_guess": ("peak_torques", "rated_torques"),
-        "wrist_moment": ("wrist_limits",),
-        "wrist_inertia": ("wrist_limits",),
-        "wrist_guess": ("wrist_limits",),
-        "payload": ("wrist_limits",),
-        "load": ("load",),
-    }
-    names: dict[str, set[int]] = {}
-    parts = [each.what for each in unknown if each.what in get_args(model.LoadPart)]
-    for each in unknown:
-        if each.what in parts:
-            continue
-        everything = range(1, (robot.rows if each.what == "masses" else robot.joints) + 1)
-        whole = each.what in ("load", "payload", "wrist_guess")
-        for subject in subjects[each.what]:
-            names.setdefault(subject, set()).update(() if whole else each.numbers or everything)
-    found = [
-        Open(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
-        for subject, numbers in names.items()
-    ]
-    if parts:
-        found.append(Open("load", tuple(parts)))
-    return tuple(found)
 
 
 ON_EARTH = (9.76, 9.84)  # m/s^2, from the equator's mountains to the poles

@@ -12,7 +12,6 @@ from typing import Literal, get_args
 
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
-from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary
@@ -27,14 +26,7 @@ TORQUE, FORCE = get_args(Unit)
 EITHER = N_("N m or N")
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 Quantity = Literal["peak", "rms", "holding"] | WristQuantity
-Guess = Literal["drives_guess", "wrist_guess", "load_guess"]
-"""What is compared, and settles nothing, because its source is a guess."""
 LoadPart = Literal["tool", "carried", "load_centre", "load_inertia", "load_guess"]
-Need = (
-    Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
-    | LoadPart
-    | Guess
-)
 
 
 @dataclass(frozen=True)
@@ -284,7 +276,6 @@ class DynamicsSummary(Summary):
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]
-    unknown: tuple[Finding, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
     paths: tuple[PathLoad, ...]
