@@ -7,7 +7,8 @@ A stage's ``model.py`` declares a summary and its results::
         farthest_mm: float
 
     @dataclass(frozen=True)
-    class ReachResults(Results[ReachSummary]):
+    class ReachResults(Results):
+        summary: ReachSummary
         points: Points  # a Table, written as points.parquet
 
 ``compute`` returns the results; views use what :func:`read_results` returns. The summary's verdict is a finding with a
@@ -21,7 +22,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
+from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import ValidationError
 
@@ -148,16 +149,15 @@ class Summary:
         object.__setattr__(self, "verdict", self.verdict.covering_less(missed))
 
 
-SummaryT = TypeVar("SummaryT", bound=Summary)
-ResultsT = TypeVar("ResultsT", bound="Results[Any]")
+ResultsT = TypeVar("ResultsT", bound="Results")
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
-class Results(ByValue, Generic[SummaryT]):
-    """A stage's results: its summary, and the tables that a subclass, a frozen dataclass like this one, adds."""
+class Results(ByValue):
+    """A stage's results: a subclass, a frozen dataclass like this one, says which summary, and adds tables."""
 
-    summary: SummaryT
+    summary: Summary
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, eq=False)(cls)
@@ -211,12 +211,12 @@ class Stored(ByValue, Generic[ResultsT]):
         return folder if folder and is_computed(folder) else None
 
 
-class AbsentResults(Results[Summary]):
+class AbsentResults(Results):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
 def write_results(
-    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], read: tuple[Input, ...] | None = None
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results, read: tuple[Input, ...] | None = None
 ) -> None:
     """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
 
@@ -504,24 +504,6 @@ def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
     return tuple(Input(file.as_posix(), sha256(file), {}) for file in files if file.is_file())
 
 
-def summary_type(kind: type[Results[Any]]) -> type[Summary]:
-    """The class of the summary of a stage's results.
-
-    Parameters
-    ----------
-    kind : the stage's class of results, which names its summary as a type argument
-
-    Raises
-    ------
-    TypeError
-        if it names none
-    """
-    for base in kind.__orig_bases__:  # type: ignore[attr-defined]
-        if get_origin(base) is Results:
-            return get_args(base)[0]
-    raise TypeError(f"{kind.__name__} does not say what its summary is")
-
-
 def _verdict_record(verdict: Verdict) -> dict[str, Any]:
     more = {key: plain(value) for key in BESIDE if (value := getattr(verdict, key))}
     return {"status": verdict.status, **plain(verdict.finding), **more}
@@ -531,7 +513,7 @@ def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:
     return {key: verdict[key] for key in ("code", "params", "basis") if key in verdict}
 
 
-def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
+def _parsed(path: Path, stored: dict[str, Any], kind: type[Results]) -> tuple[Any, Provenance]:
     own = {key: value for key, value in stored.items() if key not in ("format_version", "robot", "stage", "provenance")}
     verdict = own.get("verdict")
     try:
@@ -539,7 +521,7 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
             finding = _stored_finding(verdict)
             more = {key: verdict[key] for key in BESIDE if key in verdict}
             own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
-        of_stage: Any = summary_type(kind)
+        of_stage: Any = get_type_hints(kind)["summary"]
         return adapter(of_stage).validate_python(own), adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]

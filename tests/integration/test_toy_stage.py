@@ -42,8 +42,10 @@ class Lengths(Table):
     """Each length."""
     a_m: Reals = column("length of a link")
 
-class ToyResults(Results[ToySummary]):
+class ToyResults(Results):
     """With a table."""
+
+    summary: ToySummary
     lengths: Lengths
 
 RESULTS = ToyResults

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ import typer
 
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
+from er3a.finding import plain
 from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
@@ -333,11 +334,7 @@ def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]
 def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:
     """A comparison as JSON; for a folder, the best match with a ranking of all."""
     name, found = ranked[0]
-    record = {
-        key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
-        for key, value in vars(found).items()
-    }
-    del record["corrected"], record["alignment"]
+    record = {key: plain(value) for key, value in vars(found).items() if key not in ("corrected", "alignment")}
     if not folder:
         return record
     keys = "verdict", "different_entries", "as_printed_mm", "aligned_mm"

@@ -42,8 +42,7 @@ STATES: dict[PairState, str] = words(
 TEXTS = texts(
     {
         "pair": "{bodies:body and }",
-        "why.allowed": "Decided in the robot or scene file: {reason:own}",
-        "why.watched": "Decided in the robot or scene file: {reason:own}",
+        "why.decided": "Decided in the robot or scene file: {reason:own}",
         "why.undecided": "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.",
         "why.overlaps": (
             "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the shapes. "
@@ -134,4 +133,5 @@ def why(state: PairState, **parts: Any) -> str:
     parts : ``radius``, mm, of what is left out around a joint; ``witness``, joint values with their units at which the
         pair collides, empty where there are none; ``boxes`` of joint values looked at; ``reason`` that somebody wrote
     """
-    return sentence(f"why.{state if f'why.{state}' in TEXTS else 'meets'}", count=TRIED, **parts)
+    kind = "decided" if state in ("allowed", "watched") else state if f"why.{state}" in TEXTS else "meets"
+    return sentence(f"why.{kind}", count=TRIED, **parts)

@@ -17,7 +17,7 @@ from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
-from er3a.robots.robot import Grade, Robot
+from er3a.robots.robot import Robot
 
 QUANTITIES: dict[model.Quantity, str] = words(
     {
@@ -60,14 +60,6 @@ KEY_FIGURES = words(
         "power_balance": "Power balance, greatest error",
     }
 )
-GRADED: dict[Grade, str] = words(
-    {
-        "cad": "taken from a CAD model",
-        "export": "exported from a CAD model",
-        "claim": "claimed by others",
-        "inferred": "inferred (orders of magnitude only)",
-    }
-)
 BINDING: dict[Binding, str] = words({"peak": "peak", "rms": "RMS", "speed": "speed"})
 WHY: dict[NoBody, str] = words(
     {
@@ -96,7 +88,7 @@ TEXTS = texts(
         "dynamics.rest": (
             "[Paths that may not be run, not counted: "
             "{not_run:, }.][ Links without mass in the file, counted as massless: {missing_links:, }.][{doubts:?} "
-            "Doubts about the masses: {doubts}.][ Masses {grade:dynamics.graded_as}: torques are as uncertain.]"
+            "Doubts about the masses: {doubts}.][ Grade of the masses: {grade:data}; torques are as uncertain.]"
         ),
         "missing_link": "link {link}: no mass given; {singular:dynamics.massless}",
         "point_mass": "link {link}: mass without inertia",
@@ -126,7 +118,6 @@ TEXTS = texts(
 WORDS.update(
     words(
         {
-            "dynamics.graded_as": GRADED,
             "dynamics.why": WHY,
             "dynamics.path": {None: "holding still"},
             "dynamics.masses": {True: "masses are uncertain", False: "not everything was examined"},

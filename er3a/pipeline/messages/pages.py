@@ -32,7 +32,7 @@ GRADE_NAMES = words(
 GROUP_NAMES = words(
     {  # of a robot file
         "dh": "D-H table",
-        "zero": "zero pose and directions",
+        "zero": "zeros and directions",
         "limits": "limits",
         "speeds": "joint speeds",
         "coupling": "coupling",

@@ -7,8 +7,8 @@ from typing import Any
 
 from er3a.collision.pairs import BASE, link_label
 from er3a.pipeline.language import own_title, tr, words
-from er3a.pipeline.messages.pages import GROUP_NAMES
-from er3a.pipeline.messages.say import FORMATS, bracketed, joined, sentence, texts, word
+from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES
+from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, sentence, texts, word
 from er3a.pipeline.scope import Check, Coverage, Open
 
 CHECKS: Mapping[Check, str] = words(
@@ -19,7 +19,7 @@ CHECKS: Mapping[Check, str] = words(
         "reach": "reach",
         "rates": "speeds and accelerations",
         "singularity": "singularities",
-        "self_collision": "collisions with itself",
+        "self_collision": "self-collision",
         "scene_collision": "collisions with the scene",
         "torque": "torques",
         "camera": "camera",
@@ -46,7 +46,7 @@ GAP_WORDS: Mapping[str, str] = words(
         "no_scene": "no scene is given",
         "base_inside": "the base lies inside solids",
         "inside_solid": "places inside solids",
-        "gripper": "the gripper has no shape (`carried` in the scene)",
+        "gripper": "the tool has no shape (`carried` in the scene)",
         "gravity": "gravity is set to {amount:g} m/s²",
         "paths_not_run": "paths that may not be run",
         "program_loads": "loads that programs name",
@@ -72,10 +72,10 @@ ASSUMED: Mapping[str, str] = words(
         "guessed_pairs": "pairs of links for which guessed shapes are too coarse",
         "base_contacts": "the base is mounted on these solids",
         "start_branches": "the solution to start with",
-        "arm_angles": "the arm angle",
+        "arm_angles": "arm angle",
         "solutions_complete": "the solutions found are all",
         "program_starts": "where programs start from",
-        "program_load": "programs name loads",
+        "program_load": "loads that programs name",
         "outer_axes": "axes beside the arm's rest",
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
@@ -183,6 +183,7 @@ def never_text(stage: str) -> str:
 
 
 FORMATS["missed"] = missed_text
+WORDS["data"] = GRADE_NAMES
 
 
 def not_checked(missed: tuple[Coverage, ...]) -> str:

@@ -12,7 +12,7 @@ from er3a.finding import is_one
 from er3a.pipeline.language import as_text, with_unit, words
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
+from er3a.pipeline.messages.planning import STRATEGIES
 from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import rate_ratio
@@ -39,17 +39,6 @@ KINDS: dict[model.PathKind, str] = words(
         "sequence": "lines and arcs in sequence",
         "table": "path from a table",
         "plan": "planned motion",
-    }
-)
-STRATEGIES: dict[StrategyName, str] = words(
-    {
-        "slow": "slow down on the path",
-        "branch": "another IK solution first",
-        "via_shift": "via point, tool point shifted",
-        "via_tilt": "via point, tool tilted",
-        "detour": "joint move across the region",
-        "stop": "stop before it, with an alarm",
-        "planned": "planned motion of the joints",
     }
 )
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
@@ -144,7 +133,7 @@ def event_distance(event: model.Singularity) -> str:
 
 def strategy_word(name: StrategyName) -> str:
     """A strategy's name."""
-    return word("trajectory.strategy", STRATEGIES, name)
+    return word("strategy", STRATEGIES, name)
 
 
 def path_text(path: model.PathSummary) -> str:
@@ -391,7 +380,7 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
         joint = max(swings, key=swings.__getitem__)
         tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
     clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
-    way = word("advice", ADVICE, tried.name)
+    way = strategy_word(tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)
         way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)

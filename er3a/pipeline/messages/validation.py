@@ -12,7 +12,6 @@ from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
 from er3a.identifiability.statements import ToolOff
 from er3a.pipeline.language import distinct, tr, with_unit, words
-from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, quoted
 from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
@@ -34,8 +33,8 @@ SELF_CHECKS = words(
 )
 KEY_FIGURES = words(
     {
-        "independent_checks": "Independent checks passed",
-        "consistency_checks": "Consistency checks passed",
+        "independent_checks": "independent checks pass",
+        "consistency_checks": "consistency checks pass",
         "zero_pose_flange_error": "Zero pose: flange off the documents by",
         "farthest_axis": "Joint axes: largest distance from the documents",
         "most_tilted_axis": "Joint axes: largest angle to the documents",
@@ -127,7 +126,6 @@ TEXTS = texts(
 WORDS.update(
     words(
         {
-            "data": GRADE_NAMES,
             "part_entries": PART_ENTRIES,
             "self_check": SELF_CHECKS,
             "check_kind": CHECK_KINDS,

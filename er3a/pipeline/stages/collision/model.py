@@ -148,9 +148,10 @@ class PathClearances(Table):
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")
 
 
-class CollisionResults(Results[CollisionSummary]):
+class CollisionResults(Results):
     """The stage's results."""
 
+    summary: CollisionSummary
     matrix: MatrixRows
     pairs: PairShares
     places: PlaceRows

@@ -17,14 +17,13 @@ from er3a.dynamics.plausibility import MassFinding, has_mass, mass_findings
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.finding import Finding, fact, is_one
-from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.scope import GAPS, OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, outcomes_of
+from er3a.pipeline.stages.trajectory.judgement import Judge, Judgement
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
@@ -33,7 +32,6 @@ from er3a.pipeline.stages.trajectory.motion import (
     study_motions,
 )
 from er3a.pipeline.study import Study
-from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
@@ -277,50 +275,24 @@ class PathTorques:
     imbalance: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class PathJudge:
-    """Says which paths may be run, as the trajectory stage does."""
-
-    robot: Robot
-    surroundings: Surroundings
-    near: NearSingular
-    limits: JointLimits
-
-    def judged(self, motion: Motion) -> tuple[tuple[PathVerdict, ...], bool]:
-        """What a motion came to, as the trajectory stage judges it, and whether it may be run.
-
-        Parameters
-        ----------
-        motion : of the arm, with its times
-
-        Returns
-        -------
-        outcomes : the first fault first
-        may_run : whether none of these forbids it, and joint speeds have a bound
-        """
-        found = judge(self.robot, motion, self.near, self.limits)
-        outcomes = outcomes_of(found, measured(self.surroundings, motion), float(motion.built.duration))
-        return outcomes, set(outcomes).isdisjoint(NOT_TO_BE_RUN) and found.speed_bounded
-
-
 def path_torques(
-    arm: LoadedArm, motion: Motion, judged: tuple[tuple[PathVerdict, ...], bool], samples: int, wrist: tuple[int, ...]
+    arm: LoadedArm, motion: Motion, judged: Judgement, samples: int, wrist: tuple[int, ...]
 ) -> PathTorques:
     """Torques of a path: its table at evenly spread times; peaks and means also where the path was solved and checked,
     and within pieces of it that are shorter than their steps.
 
     Parameters
     ----------
-    judged : what it came to, and whether it may be run
+    judged : what it came to
     wrist : joints whose moments by the load are wanted
     """
-    entry, n, (outcomes, runs) = motion.entry, arm.robot.joints, judged
+    entry, n = motion.entry, arm.robot.joints
     asked = set(entry.expected) <= {"safe"}
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
-        absent = model.PathLoad(entry.name, entry.title, outcomes, False, False, *nothing)
+        absent = model.PathLoad(entry.name, entry.title, judged.outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
@@ -336,8 +308,8 @@ def path_torques(
     summary = model.PathLoad(
         name=entry.name,
         title=entry.title,
-        outcomes=outcomes,
-        counts=runs,
+        outcomes=judged.outcomes,
+        counts=judged.may_run,
         complete=True,
         duration_s=float(t[-1]),
         joints=_joint_loads(arm.robot, t, parts, tolerance, needed),
@@ -629,15 +601,15 @@ def _paths(
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
-    surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
-    judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
+    tolerance = trajectory.penetration_tolerance_mm / 1000
+    judge = Judge(bodies.robot, bodies, tolerance, near_singular(trajectory), arm.limits)
     found, skipped, rest = [], [], list[Open]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
         rest += each.open if each.meant_safe else ()
         if each.motion is None:
             skipped.append(each.name)
         else:
-            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+            found.append(path_torques(arm, each.motion, judge.judged(each.motion), settings.samples, wrist))
             if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
                 rest.append(Open("program_loads", (each.name,)))
     return found, tuple(skipped), by_reason(rest)

@@ -301,9 +301,10 @@ class TorqueRows(Table):
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
-class DynamicsResults(Results[DynamicsSummary]):
+class DynamicsResults(Results):
     """Summary and tables of the stage."""
 
+    summary: DynamicsSummary
     torques: TorqueRows
 
 

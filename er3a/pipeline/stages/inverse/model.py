@@ -211,9 +211,10 @@ class RankingRows(Table):
     between: Texts = column("of the rule clearance, what is nearest to what")
 
 
-class InverseResults(Results[InverseSummary]):
+class InverseResults(Results):
     """The stage's results."""
 
+    summary: InverseSummary
     solutions: SolutionRows
     rankings: RankingRows
 

@@ -140,9 +140,10 @@ class ProgramMotion(Table):
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 
-class ProgramsResults(Results[ProgramsSummary]):
+class ProgramsResults(Results):
     """Summary and tables of the stage."""
 
+    summary: ProgramsSummary
     lines: Lines
     instructions: Instructions
     motion: ProgramMotion

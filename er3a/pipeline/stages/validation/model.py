@@ -393,9 +393,10 @@ class KeyPoses(Table):
     deviation_mm: Reals = column("distance of the two points")
 
 
-class ValidationResults(Results[ValidationSummary]):
+class ValidationResults(Results):
     """The stage's results."""
 
+    summary: ValidationSummary
     checks: Checks
     axes: Axes
     key_poses: KeyPoses

@@ -217,9 +217,10 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-class VisionResults(Results[VisionSummary]):
+class VisionResults(Results):
     """The stage's results; without a calibration the tables are empty."""
 
+    summary: VisionSummary
     samples: SampleRows
     ways: PathRows
     corners: CornerRows

@@ -397,9 +397,10 @@ class WorkspaceSummary(Summary):
         return [void for void in self.voids if void.kind == "enclosed"]
 
 
-class WorkspaceResults(Results[WorkspaceSummary]):
+class WorkspaceResults(Results):
     """The stage's results; each table is written under its attribute's name."""
 
+    summary: WorkspaceSummary
     section: SectionCells
     cloud: Cloud
     hull_vertices: HullVertices
