@@ -114,7 +114,7 @@ def open_of_load(study: Study, name: str) -> tuple[model.LoadPart | Literal["loa
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------
@@ -463,7 +463,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------

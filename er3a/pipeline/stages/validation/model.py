@@ -410,7 +410,7 @@ def model_of(study: Study, name: str) -> Robot:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Raises
     ------
