@@ -38,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 10
+FORMAT_VERSION = 11
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
@@ -527,7 +527,7 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results]) -> tuple[An
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise ResultError(path, f"damaged ({where}: {first['msg']})") from None
-    except KeyError as error:
+    except (KeyError, TypeError) as error:
         raise ResultError(path, f"damaged (verdict without {error})") from None
 
 

@@ -6,7 +6,7 @@ import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import SINGULAR_POSES, limited
-from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
+from er3a.pipeline.messages.say import WORDS, joined, texts
 
 KEY_FIGURES = words(
     {
@@ -57,9 +57,6 @@ TEXTS = texts(
     }
 )
 WORDS["inverse.collisions"] = words({True: "collisions", False: "self-collision"})
-
-
-same_text("inverse.targets", "inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
 
 
 def limits_in_short(found: Finding) -> str:

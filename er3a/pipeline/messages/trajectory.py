@@ -13,7 +13,7 @@ from er3a.pipeline.language import as_text, with_unit, words
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
 from er3a.pipeline.messages.planning import STRATEGIES
-from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
+from er3a.pipeline.messages.say import joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
 from er3a.planning.motion_faults import rate_ratio
 from er3a.planning.names import StrategyName
@@ -55,13 +55,11 @@ PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 TEXTS = texts(
     {
         "trajectory.paths": (
-            "[{paths:?}{safe} of {paths} paths pass.][ Unreachable: {unreachable:, }.][ None found: {none_found:, "
-            "}.][ Leave limits: {leaves_limits:, }.][ Collide: {collides:, }.][ Too fast: {too_fast:, }.][ "
-            "Singular: {singular:, }.][ Too fast for the assumed limits: {too_fast_if_assumed:, }.][ Undecided: "
-            "{undecided:, }.][ Near-singular: {near_singular:, }.][ Not followed to the end: {not_followed:, }.][ "
-            "Doubt or fault in the program: {of_program:, }.][{near_assumed:?} Within the margin of assumed "
-            "shapes: {near_assumed}.][ Expected to fail, and did: {demonstrations:, }.]"
+            "[{paths:?}{safe} of {paths} paths pass.][ Not safe: {faults:; }.][ Not followed to the end: "
+            "{not_followed:, }.][ Doubt or fault in the program: {of_program:, }.][{near_assumed:?} Within the margin "
+            "of assumed shapes: {near_assumed}.][ Expected to fail, and did: {demonstrations:, }.]"
         ),
+        "paths_of": "{outcome:outcome}: {names:, }",
         "dependent_axes": "axes {axes:, } dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
         "path.shown": "the figure shows the straight joint move",
@@ -105,9 +103,6 @@ TEXTS = texts(
         "advice.time": "[{takes:.2f} s instead of {programmed:.2f} s][same time{takes:!}]",
     }
 )
-
-
-same_text("trajectory.paths", "trajectory.safe", "trajectory.some_unsafe", "trajectory.none_safe")
 
 
 def kind_word(kind: model.PathKind) -> str:

@@ -43,7 +43,7 @@ from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import PATH_VERDICTS, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
@@ -574,31 +574,25 @@ def _verdict(paths: list[model.PathSummary], skipped: list[model.PathNotFollowed
     asked = [path for path in paths if path.meant_safe]
     unfollowed = [path for path in skipped if not path.expect]
 
-    def named(verdict: PathVerdict) -> tuple[str, ...]:
-        return tuple(path.name for path in asked if path.verdict == verdict)
-
+    by_verdict: dict[PathVerdict, list[str]] = {}
+    for path in asked:
+        by_verdict.setdefault(path.verdict, []).append(path.name)
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
-    code = "trajectory.safe" if safe == count else "trajectory.some_unsafe" if safe else "trajectory.none_safe"
     failed = any(path.fails for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = (
-        pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
+    failed |= not by_verdict.get("safe")
+    status: Status = pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed else "caution"
+    found = [each for each in PATH_VERDICTS if each != "safe" and each in by_verdict]
+    of_program = tuple(path.name for path in asked if path.verdict == "safe" and path.of_program)
+    counts = fact(
+        "trajectory.paths",
+        paths=count,
+        safe=safe,
+        faults=tuple(fact("paths_of", outcome=each, names=tuple(by_verdict[each])) for each in found),
+        not_followed=tuple(path.name for path in unfollowed),
+        of_program=of_program,
+        near_assumed=len(by_verdict.get("safe", ())) - safe - len(of_program),
+        demonstrations=demonstrations([*paths, *skipped], "safe"),
     )
-    judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
-    unsafe = {
-        "unreachable": named("unreachable"),
-        "none_found": named("none found"),
-        "leaves_limits": named("leaves limits"),
-        "collides": named("collides"),
-        "too_fast": named("too fast"),
-        "singular": named("singular"),
-        "too_fast_if_assumed": named("too fast for the assumed limits"),
-        "undecided": named("undecided"),
-        "near_singular": named("near-singular"),
-        "not_followed": tuple(path.name for path in unfollowed),
-        "of_program": tuple(path.name for path in asked if path.verdict == "safe" and path.of_program),
-    }
-    near, shown = count - safe - sum(map(len, unsafe.values())), demonstrations(judged, "safe")
-    counts = fact(code, paths=count, safe=safe, near_assumed=near, demonstrations=shown, **unsafe)
     return Verdict(status, counts)
 
 
