@@ -107,24 +107,29 @@ ASSUMED: Mapping[str, str] = words(
 )
 """What is assumed, by its reason."""
 
+NEVER: Mapping[str, str] = words(
+    {
+        "validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
+        "workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
+        "inverse": "Never checked: the motions from one target to the next.",
+        "trajectory": (
+            "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
+        ),
+        "collision": "Never checked: real shapes; links where a joint joins them; what lies between samples.",
+        "dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
+        "vision": "Never checked: the detector, the part in the gripper, and torques.",
+        "programs": (
+            "Never checked: torques, the way back to a program's start, and how a controller rounds and ramps."
+        ),
+    }
+)
+"""What each stage never checks."""
 TEXTS = texts(
     {
         "link": "[base{base:?}][{base:!}link {number}]",
         "not_checked": "Not checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
         "coverage": "[all{all:?}][none{none:?}][{part:?}{covered} of {of}]",
-        "never.validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
-        "never.workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
-        "never.inverse": "Never checked: the motions from one target to the next.",
-        "never.trajectory": (
-            "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
-        ),
-        "never.collision": "Never checked: real shapes; links where a joint joins them; what lies between samples.",
-        "never.dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
-        "never.vision": "Never checked: the detector, the part in the gripper, and torques.",
-        "never.programs": (
-            "Never checked: torques, the way back to a program's start, and how a controller rounds and ramps."
-        ),
     }
 )
 
@@ -179,7 +184,7 @@ def missed_text(found: Coverage) -> str:
 
 def never_text(stage: str) -> str:
     """What a stage never checks; empty for a stage of others, which says it on its page."""
-    return sentence(key) if (key := f"never.{stage}") in TEXTS else ""
+    return tr(NEVER[stage]) if stage in NEVER else ""
 
 
 FORMATS["missed"] = missed_text
