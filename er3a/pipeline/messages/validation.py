@@ -234,13 +234,9 @@ def shortened(names: Sequence[str]) -> str:
 
 @says("contradiction")
 def _(found: Finding) -> str:
+    stated = tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
     more = [sentence("more", count=found.more)] if found.more else []
-    return say_as(found, subjects=joined([bracketed(say(found.subject), stated_text(found)), *more], ", "))
-
-
-def stated_text(found: Finding) -> str:
-    """The values that references state about one number."""
-    return tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
+    return say_as(found, subjects=joined([bracketed(say(found.subject), stated), *more], ", "))
 
 
 @says("validation.contradicted", "validation.another_arm")
