@@ -54,8 +54,8 @@ LOCALE := er3a/pipeline/messages/locale
 
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
 	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg -k tr --no-location --sort-by-file --omit-header \
-		--no-wrap -o $(LOCALE)/er3a.pot .
-	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) --no-wrap --ignore-obsolete \
+		--width=100000 -o $(LOCALE)/er3a.pot .
+	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) --width=100000 --ignore-obsolete \
 		--ignore-pot-creation-date
 	rm $(LOCALE)/er3a.pot
 

@@ -51,7 +51,7 @@ class Finding:
     def __post_init__(self) -> None:
         if taken := {"code", "params", "basis", "but"} & self.params.keys():
             raise TypeError(f"no parameter of a finding can be called {min(taken)}: it could not be read")
-        object.__setattr__(self, "params", ReadOnly({name: _revived(value) for name, value in self.params.items()}))
+        object.__setattr__(self, "params", ReadOnly({name: revived(value) for name, value in self.params.items()}))
 
     def __hash__(self) -> int:
         return hash((self.code, *map(crude_hash, self.params.values())))
@@ -123,19 +123,24 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _revived(value: Any) -> Any:
-    """A parameter out of what JSON has of it."""
+def revived(value: Any) -> Any:
+    """A parameter, or a finding, out of what JSON has of it.
+
+    Parameters
+    ----------
+    value : as :func:`plain` makes it; one that is no longer plain is kept
+    """
     if isinstance(value, list | tuple):
-        return tuple(_revived(part) for part in value)
+        return tuple(revived(part) for part in value)
     if not isinstance(value, dict):
         return value
     if value.keys() == {"value", "unit"}:
         return Amount(**value)
     if (kind := KINDS.get(value.get("code", ""))) is not None:
-        return kind(**{name: _revived(part) for name, part in value.items()})
+        return kind(**{name: revived(part) for name, part in value.items()})
     if "code" in value:
         return Finding(**value)
-    return {name: _revived(part) for name, part in value.items()}
+    return {name: revived(part) for name, part in value.items()}
 
 
 def turned_or_moved(value: float, slides: bool, per: str = "") -> Amount:

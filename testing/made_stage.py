@@ -41,9 +41,10 @@ class Rows(Table):
     point_mm: Reals = vector("{}_mm", "where")
 
 
-class MadeResults(Results[MadeSummary]):
+class MadeResults(Results):
     """A summary and a table."""
 
+    summary: MadeSummary
     rows: Rows
 
 

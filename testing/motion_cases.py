@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from er3a.collision.along import ClearanceAlong
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Cylinder, Plane, Sphere
 from er3a.collision.shapes import arm_shapes
@@ -16,7 +18,7 @@ from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, NearSingular
-from er3a.pipeline.stages.trajectory.judgement import Judgement, judge
+from er3a.pipeline.stages.trajectory.judgement import Judge, Judgement
 from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.names import PathVerdict
@@ -139,12 +141,16 @@ def _written(spec):
             for key, value in spec.items()}  # fmt: skip
 
 
+NO_BODIES: Any = None
+NOTHING_MET = ClearanceAlong(np.empty(0), np.empty(0), (), (), 0)
+
+
 def judged(robot, written, samples, limits: JointLimits) -> tuple[Motion, Judgement]:
-    """What the stage says of a path, at so many samples."""
+    """What the stage says of a path by the joints alone, at so many samples."""
     whole = {"name": "x", "title": "x", "samples": samples, **written}
     entry = parse(PathFile, {"kind": "paths", "paths": [whole]}, None).paths[0]
     motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {})
-    return motion, judge(robot, motion, NEAR, limits)
+    return motion, Judge(robot, NO_BODIES, 0.0, NEAR, limits).judged(motion, NOTHING_MET)
 
 
 def looked_at(robot, spec, points: int) -> Truth:

@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from er3a.comparison.compare import Uncompared, beside_the_table
-from er3a.errors import InputError
 from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.printed_table import table_text
 from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
 from er3a.formats.urdf import import_urdf, urdf_table
 from er3a.formats.urdf_tree import plain_urdf, tip_after
 from er3a.robots.robot import Convention, Robot, robot_name
-
-READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
 
 
 @dataclass(frozen=True)
@@ -82,24 +79,3 @@ def read_arm(
         return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
     robot = load_robot(source)
     return ReadArm(robot, True, beside=beside_the_table(robot))
-
-
-def read_arms(folder: Path, **options: str | int | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
-    """All arms in a folder, by file name, and the files that were not read, with the reason.
-
-    Raises
-    ------
-    InputError
-        if the folder holds none
-    """
-    found, left_out = dict[str, ReadArm](), list[str]()
-    for path in sorted(folder.iterdir()):
-        if path.suffix not in READ or not path.is_file():
-            continue
-        try:
-            found[path.name] = read_arm(str(path), **options)  # type: ignore[arg-type]
-        except InputError as error:
-            left_out.append(str(error))
-    if not found:
-        raise InputError(folder, None, "the folder holds no arm", f"Put files in it that end in {', '.join(READ)}")
-    return found, tuple(left_out)

@@ -158,7 +158,7 @@ def check_file(path: Path) -> str:
     if path.is_dir():
         return check_file(path / "config" / "config.yaml")
     if path.suffix == ".csv" or path.name == DOCUMENTS:
-        return _check_csv(path)
+        return _check_table(path)
     if path.suffix.lower() in SUFFIXES and path.suffix != ".csv":
         read_program(path)
         return PROGRAM
@@ -203,21 +203,11 @@ def _is_outside(folder: Path) -> bool:
     return not Path.cwd().is_relative_to(folder)
 
 
-def _check_csv(path: Path) -> str:
-    """What a CSV is, by the folder that it stands in, its name or its columns."""
-    if path.parent.name == "targets":
-        read_targets(path)
-        return "targets"
-    if path.parent.name == "paths":
-        read_path_table(path)
-        return "a path"
+def _check_table(path: Path) -> str:
+    """What a CSV is, by its name or its columns."""
     if path.name == DOCUMENTS:
         load_documents(path)
         return "documents of references"
-    return _check_table(path)
-
-
-def _check_table(path: Path) -> str:
     header = [] if path.stem in FORMATS else read_header(path)
     if {"target_x_mm", "seen_x_mm"} & set(header):
         return check_samples(path)

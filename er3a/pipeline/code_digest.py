@@ -12,7 +12,17 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = "messages", "viewing", "player", "teach", "page", "overview", "article", "commands", "new_study"
-FILES = "check", "cli", "dictionary", "program_reports", "run_study", "verdicts", "working_folder"
+FILES = (
+    "check",
+    "cli",
+    "dictionary",
+    "path_programs",
+    "program_reports",
+    "run_study",
+    "sarif",
+    "verdicts",
+    "working_folder",
+)
 VIEWS = frozenset((*FOLDERS, *(f"{name}.py" for name in FILES)))
 """Folders and files of ``pipeline/`` on which no number rests: computing imports none of them (import-linter)."""
 _KINDS = (".py", ".j2", ".css", ".js", ".mjs")

@@ -1,18 +1,11 @@
-"""Results of a program check as lines, JSON or SARIF.
-
-References
-----------
-.. [1] Static Analysis Results Interchange Format (SARIF) Version 2.1.0, OASIS Standard, 2020.
-"""
+"""Results of a program check as lines, JSON or SARIF."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,30 +13,20 @@ from urllib.parse import quote
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies
-from er3a.collision.pairs import PENETRATION_TOLERANCE
-from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.errors import DoubtfulUnit, InputError
-from er3a.files.kept_files import from_here
-from er3a.files.path_file import load_paths
 from er3a.files.units import noted_doubts
-from er3a.finding import Finding, fact, is_one
-from er3a.kinematics.singularity import USUAL_NEAR
+from er3a.finding import fact, is_one
 from er3a.pipeline.language import as_text
 from er3a.pipeline.messages.programs import cycle_text, remedy
 from er3a.pipeline.messages.say import excerpt, say
 from er3a.pipeline.messages.scope import gap_text, not_checked
 from er3a.pipeline.progress import TimeOverError, time_limit
 from er3a.pipeline.results import plain
+from er3a.pipeline.sarif import WORDS, Reported, fingerprints, sarif_log, shown
 from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
 from er3a.pipeline.scope import Check as Checked
 from er3a.pipeline.stages.covered import covered_units, gaps_of_program
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, min_clearance
-from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
-from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
-from er3a.planning.names import PATH_VERDICTS, PathVerdict
-from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import (
     CHECKS,
     NOT_FOLLOWED,
@@ -52,20 +35,13 @@ from er3a.program_check.check_program import (
     LocatedFinding,
     MotionVerdict,
     ProgramCheck,
-    assumed_limits,
     check_program,
 )
 from er3a.program_check.program_check_findings import RANKS, Level, worst_of
 from er3a.programs.instructions import Place
-from er3a.programs.languages import WITHOUT_JOINTS, not_written, read_program
-from er3a.programs.program_names import LanguageName
-from er3a.programs.writing import program_name
+from er3a.programs.languages import read_program
 from er3a.robots.robot import Robot
-from er3a.version import __version__
 
-BASE = "%SRCROOT%"
-SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
-WORDS: dict[Level, str] = {"fail": "error", "caution": "warning", "note": "note", "pass": "pass"}
 DAY_S = 86_400.0
 MOST_ROWS = 10  # that are printed of a program's findings unless all are asked for
 MOST_TEXTS = 4  # of what is not followed for one reason
@@ -147,28 +123,12 @@ def checked_file(
     return CheckedFile(file, check, missed=(*found, *covered_units(1, [*doubts, *own]).gaps))
 
 
-def accepted(baseline: Path) -> frozenset[str]:
-    """Fingerprints of findings in a SARIF log that were accepted.
-
-    Raises
-    ------
-    InputError
-        for a file that is no SARIF log
-    """
-    try:
-        log = json.loads(baseline.read_text(encoding="utf-8"))
-        results = [each for run in log["runs"] for each in run["results"]]
-        return frozenset(each["partialFingerprints"][FINGERPRINT] for each in results)
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(baseline, None, "is no SARIF log", "Give what --sarif has written") from None
-
-
 def without(checked: CheckedFile, silenced: frozenset[str]) -> CheckedFile:
     """A check without the findings that were accepted.
 
     Parameters
     ----------
-    silenced : fingerprints, as :func:`accepted` reads them
+    silenced : fingerprints, as :func:`er3a.pipeline.sarif.accepted` reads them
 
     Returns
     -------
@@ -176,8 +136,8 @@ def without(checked: CheckedFile, silenced: frozenset[str]) -> CheckedFile:
     """
     if checked.check is None or not silenced:
         return checked
-    prints = (each["partialFingerprints"][FINGERPRINT] for each in sarif_of([checked])["runs"][0]["results"])
-    kept = tuple(each for each, mark in zip(checked.check.findings, prints) if mark not in silenced)
+    marks = fingerprints(sarif_of([checked]))
+    kept = tuple(each for each, mark in zip(checked.check.findings, marks) if mark not in silenced)
     level = worst_of(each.level for each in kept)
     return replace(checked, check=replace(checked.check, findings=kept, level=level))
 
@@ -239,23 +199,6 @@ def _verdict_line(verdict: MotionVerdict) -> str:
 def _where(place: Place) -> str:
     element = f" ({place.element})" if place.element else ""
     return f"{shown(place.file)}:{place.line}{element}" if place.line else shown(place.file)
-
-
-def shown(file: Path | None) -> str:
-    """A path as it is printed.
-
-    Parameters
-    ----------
-    file : None for a program made in Python
-
-    Returns
-    -------
-    text : from the folder that the command runs in, where the file is below it; else as it was given
-    """
-    if file is None:
-        return "program"
-    near = from_here(file)
-    return str(file) if near.startswith("..") else near
 
 
 def scope_line(checked: CheckedFile) -> str:
@@ -332,7 +275,7 @@ def missed_line(missed: tuple[Open, ...]) -> str:
     -------
     line : one sentence; empty where nothing is missing
     """
-    return not_checked(missed_checks(missed)) if missed else ""
+    return not_checked(missed_checks(missed))
 
 
 def missed_checks(missed: tuple[Open, ...]) -> tuple[Coverage, ...]:
@@ -400,6 +343,10 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
     return [finite(each) for each in found]
 
 
+def _uri(file: Path | None) -> str:
+    return quote(shown(file).replace(os.sep, "/"))
+
+
 def _place_record(place: Place) -> dict[str, Any]:
     return {"file": _uri(place.file), "line": place.line, "element": place.element}
 
@@ -447,11 +394,8 @@ def _verdict_record(verdict: MotionVerdict) -> dict[str, Any]:
     return {**_place_record(verdict.place), "called_at": line if line != verdict.place.line else None, **record}
 
 
-FINGERPRINT = "primaryLocationLineHash"
-
-
 def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
-    """Findings as a SARIF log [1]_, which code hosts and editors read.
+    """Findings as a SARIF log, which code hosts and editors read.
 
     Parameters
     ----------
@@ -459,86 +403,19 @@ def sarif_of(checked: Sequence[CheckedFile]) -> dict[str, Any]:
 
     Returns
     -------
-    log : one run; paths relative to the folder that the command runs in. Fingerprints do not change with line numbers.
+    log : one run; what was not checked, and on what shapes collisions rest, as its notifications
     """
-    results = []
-    seen: dict[str, int] = {}
+    found, notes = [], []
     for each in checked:
         lines = each.check.execution.program.lines if each.check else ()
         for one in each.findings:
             times = f" ({one.times} times)" if one.times > 1 else ""
-            results.append(_result(one, say(one.finding) + times, _line_text(one.place, each.file, lines), seen))
-    return _log("er3a check-program", results, _notifications(checked))
-
-
-def sarif_of_rules(found: Sequence[tuple[LocatedFinding, str]]) -> dict[str, Any]:
-    """Rules that URDFs break as a SARIF log, as :func:`sarif_of` makes one of programs' findings.
-
-    Parameters
-    ----------
-    found : each with its text
-    """
-    seen: dict[str, int] = {}
-    return _log("er3a check", [_result(one, text, "", seen) for one, text in found], [])
-
-
-def _log(name: str, results: list[dict[str, Any]], notifications: list[dict[str, Any]]) -> dict[str, Any]:
-    """A log of one run of a tool."""
-    rules = sorted({each["ruleId"] for each in results})
-    driver = {
-        "name": name,
-        "version": __version__,
-        "rules": [{"id": code, "shortDescription": {"text": code.replace("_", " ")}} for code in rules],
-    }
-    run = {
-        "tool": {"driver": driver},
-        "originalUriBaseIds": {BASE: {"description": {"text": "The folder that the command was run in."}}},
-        "columnKind": "unicodeCodePoints",
-        "results": results,
-        "invocations": [{"executionSuccessful": True, "toolExecutionNotifications": notifications}],
-    }
-    return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
-
-
-def _notifications(checked: Sequence[CheckedFile]) -> list[dict[str, Any]]:
-    """What was not checked, and on what shapes collisions rest, as the log's notifications."""
-    found = []
-    for each in checked:
-        top = Place(each.file)
-        found += [(one.reason, gap_text(one), top) for one in each.missed]
-        found += [("not_checked", NEEDED[one], top) for one in NEEDED if each.lacks([one])]
-        if each.check and each.check.shapes:
-            found.append((each.check.shapes.code, say(each.check.shapes), top))
-    return [
-        {"level": "warning", "descriptor": {"id": code}, "message": {"text": text}, "locations": [_location(place)]}
-        for code, text, place in found
-    ]
-
-
-def _result(one: LocatedFinding, text: str, line_text: str, seen: dict[str, int]) -> dict[str, Any]:
-    code, place = one.finding.code, one.place
-    parts = (code, _uri_from_here(place.file), place.element, line_text)
-    print_of = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    number = seen[print_of] = seen.get(print_of, 0) + 1
-    found: dict[str, Any] = {
-        "ruleId": code,
-        "level": WORDS[one.level],
-        "message": {"text": text},
-        "locations": [_location(place)],
-        "partialFingerprints": {FINGERPRINT: f"{print_of}:{number}"},
-    }
-    if one.calls:
-        found["relatedLocations"] = [{**_location(call), "message": {"text": "called from here"}} for call in one.calls]
-    return found
-
-
-def _location(place: Place) -> dict[str, Any]:
-    artifact = {"uri": _uri_from_here(place.file), "uriBaseId": BASE}
-    physical = {"artifactLocation": artifact, "region": {"startLine": max(place.line, 1)}}
-    if not place.element:
-        return {"physicalLocation": physical}
-    logical = [{"fullyQualifiedName": place.element, "kind": "element"}]
-    return {"physicalLocation": physical, "logicalLocations": logical}
+            found.append(Reported(one, say(one.finding) + times, _line_text(one.place, each.file, lines)))
+        notes += [(each.file, one.reason, gap_text(one)) for one in each.missed]
+        notes += [(each.file, "not_checked", text) for one, text in NEEDED.items() if each.lacks([one])]
+        if each.check and (shapes := each.check.shapes):
+            notes.append((each.file, shapes.code, say(shapes)))
+    return sarif_log("er3a check-program", found, notes)
 
 
 def _line_text(place: Place, file: Path, lines: tuple[str, ...]) -> str:
@@ -546,73 +423,3 @@ def _line_text(place: Place, file: Path, lines: tuple[str, ...]) -> str:
     if place.file != file or not 0 < place.line <= len(lines) or place.element:
         return ""
     return "".join(lines[place.line - 1].split())
-
-
-def _uri(file: Path | None) -> str:
-    return quote(shown(file).replace(os.sep, "/"))
-
-
-def _uri_from_here(file: Path | None) -> str:
-    """A path from the folder that the command runs in, upwards too where the file lies beside it."""
-    return quote(from_here(file or "program").replace(os.sep, "/"))
-
-
-CHECKS_PER_SAMPLE = 5
-SEED = 0  # of the planner
-
-
-@dataclass(frozen=True)
-class PathProgram:
-    """A path as a program.
-
-    Attributes
-    ----------
-    files : texts by name; None where it was refused
-    """
-
-    name: str
-    verdict: PathVerdict
-    files: Mapping[str, str] | None
-    findings: tuple[Finding, ...] = ()
-    open: tuple[Open, ...] = ()
-
-
-def programs_of(
-    file: Path, robot: Robot, language: LanguageName, scene: Scene | None, only: Sequence[str] | None, unsafe: bool
-) -> Iterator[PathProgram]:
-    """The paths of a file one after another, by the thresholds of a check of programs.
-
-    Raises
-    ------
-    InputError
-        for a path file that can't be used, a name that it does not have, an arm that the language can't move by joints
-    """
-    if reason := not_written(language, robot):
-        raise InputError(None, None, reason, WITHOUT_JOINTS)
-    surroundings = Surroundings(Bodies(robot, scene), PENETRATION_TOLERANCE)
-    task = PlanningTask(robot, surroundings.bodies, PENETRATION_TOLERANCE, assumed_limits(robot, CheckOptions()), SEED)
-    listed = load_paths(file).paths
-    missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
-    if missing is not None:
-        raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, USUAL_NEAR, CHECKS_PER_SAMPLE):
-        if only and each.listed not in only:
-            continue
-        if each.refused:
-            raise each.refused
-        if each.motion is None:
-            yield PathProgram(each.name, each.outcome_unfollowed, None)
-            continue
-        verdict = judge(robot, each.motion, USUAL_NEAR, task.limits).verdict
-        along = measured(surroundings, each.motion)
-        if along.contacts:
-            verdict = min((verdict, "collides"), key=PATH_VERDICTS.index)
-        rest = tuple(left for left in each.open if left.reason not in CHOSEN)
-        elsewhere = language != "csv" and any(left.reason == "points_missed" for left in rest)
-        if ((verdict != "safe" or elsewhere) and not unsafe) or not np.isfinite(each.motion.q[0]).all():
-            yield PathProgram(each.name, verdict, None, open=rest)
-            continue
-        near = near_assumed_shapes(robot, each.name, min_clearance(along), CheckOptions.assumed_margin)
-        files, findings = written(robot, each.motion, verdict, language, near, task.limits.speed)
-        name = program_name(each.name, LONGEST_NAME)
-        yield PathProgram(each.name, verdict, {name + suffix: text for suffix, text in files.items()}, findings, rest)

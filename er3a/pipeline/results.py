@@ -4,11 +4,11 @@ A stage's ``model.py`` declares a summary and its results::
 
     @dataclass(frozen=True)
     class ReachSummary(Summary):
-        verdict: Verdict[Reached | NotReached]
         farthest_mm: float
 
     @dataclass(frozen=True)
-    class ReachResults(Results[ReachSummary]):
+    class ReachResults(Results):
+        summary: ReachSummary
         points: Points  # a Table, written as points.parquet
 
 ``compute`` returns the results; views use what :func:`read_results` returns. The summary's verdict is a finding with a
@@ -22,16 +22,15 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_args, get_origin
+from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_type_hints
 
 from pydantic import ValidationError
 
-from er3a.by_value import KINDS, ByValue
+from er3a.by_value import ByValue
 from er3a.errors import ResultError
 from er3a.files.annotations import grades_in
 from er3a.files.kept_files import read_bytes, sha256, shown_path, write_atomically, write_text
-from er3a.finding import AnyFinding, Finding, fact, plain
-from er3a.finding import Finding as Found
+from er3a.finding import Finding, fact, plain
 from er3a.pipeline.code_digest import numbers_digest
 from er3a.pipeline.language import N_
 from er3a.pipeline.scope import Check, Coverage, Open
@@ -39,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 10
+FORMAT_VERSION = 11
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
@@ -52,29 +51,28 @@ CHECKSUMS = "SHA256SUMS"
 
 Status = Literal["pass", "caution", "fail", "no_reference", "not_computed"]
 Foundation = Literal[Status, "unsettled"]  # a caution about a table of which independent documents settle no entry
-FindingT = TypeVar("FindingT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
-class Verdict(Generic[FindingT]):
+class Verdict:
     """A stage's answer: pass, caution (usable, with something to know), fail, or no_reference, and what it found.
 
     ``shapes``: on what assumed shapes of the arm it rests. ``missed``: the checks that do not cover all that was asked.
     """
 
     status: Status
-    finding: FindingT
+    finding: Finding
     shapes: Finding | None = None
     missed: tuple[Coverage, ...] = ()
 
     @property
-    def findings(self) -> tuple[FindingT | Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """What it found, what was not checked (``not_checked``: no verdict passes with it), and what was assumed."""
         named = tuple(each for each in self.missed if each.gaps)
         missed = (fact("not_checked", checks=named),) if named and self.status == "caution" else ()
         return (self.finding, *missed, *((self.shapes,) if self.shapes else ()))
 
-    def covering_less(self, missed: tuple[Coverage, ...]) -> Verdict[FindingT]:
+    def covering_less(self, missed: tuple[Coverage, ...]) -> Verdict:
         """The verdict where checks do not cover all that was asked.
 
         Parameters
@@ -87,7 +85,7 @@ class Verdict(Generic[FindingT]):
         """
         return self._lowered(bool(missed), missed=missed)
 
-    def with_assumed_shapes(self, shapes: Finding | None) -> Verdict[FindingT]:
+    def with_assumed_shapes(self, shapes: Finding | None) -> Verdict:
         """The verdict where shapes of the arm are assumed.
 
         Parameters
@@ -100,7 +98,7 @@ class Verdict(Generic[FindingT]):
         """
         return self._lowered(bool(shapes and shapes.near), shapes=shapes)
 
-    def _lowered(self, doubtful: bool, **beside: Any) -> Verdict[FindingT]:
+    def _lowered(self, doubtful: bool, **beside: Any) -> Verdict:
         return replace(self, status="caution" if doubtful and self.status == "pass" else self.status, **beside)
 
 
@@ -136,7 +134,7 @@ class Summary:
 
     needs: ClassVar[tuple[Check, ...]] = ()
 
-    verdict: Verdict[Any]
+    verdict: Verdict
     figures: tuple[Figure, ...]
     checked: tuple[Coverage, ...] = field(default=(), kw_only=True)
     assumed: tuple[Open, ...] = field(default=(), kw_only=True)
@@ -151,16 +149,15 @@ class Summary:
         object.__setattr__(self, "verdict", self.verdict.covering_less(missed))
 
 
-SummaryT = TypeVar("SummaryT", bound=Summary)
-ResultsT = TypeVar("ResultsT", bound="Results[Any]")
+ResultsT = TypeVar("ResultsT", bound="Results")
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
-class Results(ByValue, Generic[SummaryT]):
-    """A stage's results: its summary, and the tables that a subclass, a frozen dataclass like this one, adds."""
+class Results(ByValue):
+    """A stage's results: a subclass, a frozen dataclass like this one, says which summary, and adds tables."""
 
-    summary: SummaryT
+    summary: Summary
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True, eq=False)(cls)
@@ -214,12 +211,12 @@ class Stored(ByValue, Generic[ResultsT]):
         return folder if folder and is_computed(folder) else None
 
 
-class AbsentResults(Results[Summary]):
+class AbsentResults(Results):
     """In place of the results of a stage that was not computed; its verdict is a finding that says why."""
 
 
 def write_results(
-    folder: Path, study: Study, robot: str, stage: Stage, results: Results[Any], read: tuple[Input, ...] | None = None
+    folder: Path, study: Study, robot: str, stage: Stage, results: Results, read: tuple[Input, ...] | None = None
 ) -> None:
     """Write a stage's tables, summary and checksums into a folder; tables without rows if it was not computed.
 
@@ -269,7 +266,7 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
         name: read_foundation(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
     if record["verdict"]["status"] == "not_computed":
-        absent = AbsentResults(Summary(Verdict("not_computed", Found(**_stored_finding(record["verdict"]))), ()))
+        absent = AbsentResults(Summary(Verdict("not_computed", Finding(**_stored_finding(record["verdict"]))), ()))
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
     return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
@@ -306,7 +303,7 @@ def read_results(folder: Path, kind: type[ResultsT]) -> Stored[ResultsT]:
         _compare(file, content, sums)
         try:
             tables[name] = table.read(content)
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultError(file, f"damaged ({' '.join(str(error).split())})") from None
     return Stored(record["robot"], record["stage"], provenance, kind(summary=summary, **tables))
 
@@ -364,7 +361,7 @@ def read_foundation(folder: Path) -> Foundation:
         as :func:`read_stage`
     """
     record = _record(folder)
-    parts = record["verdict"].get("params", {}).get("parts", ())
+    parts = [part["params"] for part in record["verdict"].get("params", {}).get("parts", ())]
     unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
     status: Status = record["verdict"]["status"]
     return "unsettled" if status == "caution" and unsettled else status
@@ -388,7 +385,7 @@ def read_scope(folder: Path, stage: Stage) -> Summary:
     """
     record = _record(folder)
     if record["verdict"]["status"] == "not_computed":
-        return Summary(Verdict("not_computed", Found(**_stored_finding(record["verdict"]))), ())
+        return Summary(Verdict("not_computed", Finding(**_stored_finding(record["verdict"]))), ())
     summary: Summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
     return summary
 
@@ -507,39 +504,16 @@ def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
     return tuple(Input(file.as_posix(), sha256(file), {}) for file in files if file.is_file())
 
 
-def summary_type(kind: type[Results[Any]]) -> type[Summary]:
-    """The class of the summary of a stage's results.
-
-    Parameters
-    ----------
-    kind : the stage's class of results, which names its summary as a type argument
-
-    Raises
-    ------
-    TypeError
-        if it names none
-    """
-    for base in kind.__orig_bases__:  # type: ignore[attr-defined]
-        if get_origin(base) is Results:
-            return get_args(base)[0]
-    raise TypeError(f"{kind.__name__} does not say what its summary is")
-
-
-def _verdict_record(verdict: Verdict[Any]) -> dict[str, Any]:
-    found = plain(verdict.finding)
-    code = found.pop("code")
-    params = found.get("params", {}) if isinstance(verdict.finding, Found) else found
+def _verdict_record(verdict: Verdict) -> dict[str, Any]:
     more = {key: plain(value) for key in BESIDE if (value := getattr(verdict, key))}
-    return {"status": verdict.status, "code": code, "params": params, **more}
+    return {"status": verdict.status, **plain(verdict.finding), **more}
 
 
 def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """A verdict's finding as its class takes it: a coded value's own fields, or a finding's code and parameters."""
-    code, params = verdict["code"], verdict["params"]
-    return params | {"code": code} if code in KINDS else {"code": code, "params": params}
+    return {key: verdict[key] for key in ("code", "params", "basis") if key in verdict}
 
 
-def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tuple[Any, Provenance]:
+def _parsed(path: Path, stored: dict[str, Any], kind: type[Results]) -> tuple[Any, Provenance]:
     own = {key: value for key, value in stored.items() if key not in ("format_version", "robot", "stage", "provenance")}
     verdict = own.get("verdict")
     try:
@@ -547,13 +521,13 @@ def _parsed(path: Path, stored: dict[str, Any], kind: type[Results[Any]]) -> tup
             finding = _stored_finding(verdict)
             more = {key: verdict[key] for key in BESIDE if key in verdict}
             own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
-        of_stage: Any = summary_type(kind)
+        of_stage: Any = get_type_hints(kind)["summary"]
         return adapter(of_stage).validate_python(own), adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise ResultError(path, f"damaged ({where}: {first['msg']})") from None
-    except KeyError as error:
+    except (KeyError, TypeError) as error:
         raise ResultError(path, f"damaged (verdict without {error})") from None
 
 

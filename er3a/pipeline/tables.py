@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from er3a.by_value import ByValue
-from er3a.finding import plain
+from er3a.finding import plain, revived
 from er3a.numerics.si_units import filled, split_unit, unit_text
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Column:
     Attributes
     ----------
     pattern : name in the file; with ``{}`` for a group: what replaces it is in ``parts``, or counts from 1
-    kind : of a column of findings, which ones they can be
+    coded : whether it holds findings
     lists : whether each row holds a list of real numbers
     heading : what it is called at an axis or over a table, in few words; empty where the meaning serves
     """
@@ -57,7 +57,7 @@ class Column:
     unit: str
     dtype: np.dtype
     parts: tuple[str, ...] | None = None
-    kind: Any = None
+    coded: bool = False
     lists: bool = False
     heading: str = ""
 
@@ -122,15 +122,14 @@ def column(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -
     return _declared(name, meaning, unit, heading=heading)
 
 
-def findings(meaning: str, kind: Any) -> Any:
+def findings(meaning: str) -> Any:
     """Declare a column of findings, or None, which is kept as JSON texts.
 
     Parameters
     ----------
     meaning : for the dictionary of results
-    kind : union of the classes of findings that it can hold
     """
-    return _declared("", meaning, kind=kind)
+    return _declared("", meaning, coded=True)
 
 
 def per_joint(meaning: str, unit: str = "", *, name: str = "", heading: str = "") -> Any:
@@ -341,7 +340,7 @@ class Table(ByValue):
             array = getattr(self, name)
             parts = array.T if spec.is_group else [array]
             for part_name, part in zip(spec.names(len(parts), self.slides), parts):
-                yield part_name, _coded(part) if spec.kind else part, spec
+                yield part_name, _coded(part) if spec.coded else part, spec
 
     def write(self, file: Path) -> None:
         """Write a Parquet file, with unit and meaning of each column; equal tables give equal bytes.
@@ -380,8 +379,8 @@ class Table(ByValue):
                 raise KeyError(spec.pattern)
             parts = [_array(stored.values(part, spec), replace(spec, pattern="")) for part in names]
             arrays[name] = np.stack(parts, axis=1).astype(spec.dtype) if spec.is_group else parts[0]
-            if spec.kind:
-                arrays[name] = [_decoded(spec.kind, text) for text in parts[0]]
+            if spec.coded:
+                arrays[name] = [_decoded(text) for text in parts[0]]
         found = cls(**arrays)
         if slides:
             object.__setattr__(found, "slides", slides)
@@ -407,8 +406,8 @@ def _coded(findings: NDArray[Any]) -> NDArray[Any]:
 
 
 @cache
-def _decoded(kind: Any, text: str | None) -> Any:
-    return None if text is None else adapter(kind).validate_json(text)
+def _decoded(text: str | None) -> Any:
+    return None if text is None else revived(json.loads(text))
 
 
 @cache

@@ -17,7 +17,7 @@ from typing import Literal
 from er3a.files.kept_files import write_atomically
 from er3a.pipeline import language
 from er3a.pipeline.messages.say import joined, say_all, sentence
-from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text, say_reserved
+from er3a.pipeline.messages.scope import assumed_text, covered_text, missed_text
 from er3a.pipeline.results import Status, changed_since, is_computed, read_scope, read_status
 from er3a.pipeline.scope import Coverage
 from er3a.pipeline.stages.registry import STAGES
@@ -112,8 +112,7 @@ def _stage_verdict(study: Study, results: Path, robot: str, name: str) -> StageV
     summary = read_scope(folder, stage)
     verdict = summary.verdict
     shown = len(getattr(verdict.finding, "demonstrations", ()))
-    first, *others = verdict.findings
-    text = joined([say_reserved(first, summary.assumed), say_all(others)], " ")
+    text = say_all(verdict.findings)
     outdated = changed_since(folder, study, robot, name)
     if outdated:
         text = sentence("stage.outdated", names=joined(outdated, ", "), text=text)

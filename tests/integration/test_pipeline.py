@@ -82,7 +82,7 @@ def test_a_page_s_foot_names_inputs_with_grades_and_the_command_that_makes_it_ag
     foot = html.unescape(page.read_text(encoding="utf-8").partition('class="provenance"')[2])
     reach = small_study.folder / "data/manual_refs/er3_600/reach.csv"
     assert hashlib.sha256(reach.read_bytes()).hexdigest() in foot
-    assert "official (D-H table, limits, joint speeds, wrist load, weight), inferred (zero pose and directions" in foot
+    assert "official (D-H table, limits, joint speeds, wrist load, weight), inferred (zeros and directions" in foot
     command = re.search(r"<code>make run STUDY=config/small.yaml ARGS=(\S+)</code>", foot)
     assert command[1] == "reports/er3_600/validation.html"
     page.rename(tmp_path / "kept.html")

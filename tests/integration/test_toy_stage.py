@@ -37,14 +37,15 @@ from er3a.pipeline.tables import Table, column
 
 class ToySummary(Summary):
     """Nothing more."""
-    verdict: Verdict[Finding]
 
 class Lengths(Table):
     """Each length."""
     a_m: Reals = column("length of a link")
 
-class ToyResults(Results[ToySummary]):
+class ToyResults(Results):
     """With a table."""
+
+    summary: ToySummary
     lengths: Lengths
 
 RESULTS = ToyResults

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 from er3a.finding import fact
 from er3a.pipeline import (
     cli,  # noqa: F401
-    program_reports,
+    path_programs,
 )
 from er3a.pipeline.commands.options import app
-from er3a.pipeline.program_reports import PathProgram
+from er3a.pipeline.path_programs import PathProgram
 from er3a.pipeline.scope import Open
 from er3a.programs.languages import read_program
 from er3a.programs.machine import execute
@@ -262,7 +262,7 @@ def test_a_program_is_written_as_the_paths_of_its_stretches(tmp_path):
 )
 def test_a_program_that_loses_a_motion_ends_with_1(tmp_path, monkeypatch, findings, missed, reason):
     made = PathProgram("line", "safe", {"line.src": "DEF line( )\nEND\n"}, findings, missed)
-    monkeypatch.setattr(program_reports, "programs_of", lambda *_: iter([made]))
+    monkeypatch.setattr(path_programs, "programs_of", lambda *_: iter([made]))
     words = ("program", "write", "data/paths/er3a_c60.yaml", "--robot", "er3a_c60", "--language", "krl")
     done = run(*words, "--output", str(tmp_path))
     assert (tmp_path / "line.src").is_file()

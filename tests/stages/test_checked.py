@@ -36,8 +36,8 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import MIN_SINGULAR_VALUE
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.pipeline import language
-from er3a.pipeline.messages.say import say, say_all, sentence
-from er3a.pipeline.messages.scope import TEXTS, assumed_text, check_name, gap_text
+from er3a.pipeline.messages.say import say, say_all
+from er3a.pipeline.messages.scope import ASSUMED, assumed_text, check_name, gap_text, never_text
 from er3a.pipeline.new_study.arms import arm_of
 from er3a.pipeline.new_study.write import write_study
 from er3a.pipeline.results import (
@@ -1013,8 +1013,8 @@ def test_stages_make_the_checks_that_their_questions_need(small_study):
 def test_checks_gaps_and_assumptions_have_words(lang):
     with language.using(lang):
         texts = [gap_text(Open(reason, ("a",), 3.0)) for reason in GAPS]
-        texts += [assumed_text(Open(key.removeprefix("assumed."), (), 3.0)) for key in TEXTS if key[:8] == "assumed."]
-        texts += [check_name(check) for check in CHECKS] + [sentence(f"never.{stage}") for stage in STAGES]
+        texts += [assumed_text(Open(reason, (), 3.0)) for reason in ASSUMED]
+        texts += [check_name(check) for check in CHECKS] + [never_text(stage) for stage in STAGES]
     assert all(texts)
     assert all(len(text.split()) <= 26 for text in texts)
     assert lang == "en" or not any(

@@ -22,6 +22,7 @@ from er3a.finding import fact, is_one
 from er3a.pipeline.messages import dynamics
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored, read_results
+from er3a.pipeline.scope import Open
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.dynamics.compute import PathTorques, open_of_load, unknowns, verdict_of
 from er3a.pipeline.stages.dynamics.model import (
@@ -117,7 +118,7 @@ def test_a_robot_without_masses_has_no_data(tmp_path):
     assert left["link_masses"] == tuple("123456")
     assert {"peak_torques", "load"} <= left.keys()
     assert say(verdict).startswith("Torques need data")
-    assert "payload" not in {each.what for each in found.results.summary.unknown}  # the manual has it
+    assert "rated_payload" not in left  # the manual has it
     assert len(found.results.torques) == 0
     for view, name in ((report, "page.html"), (record, "recording.rrd")):
         view(study, found, tmp_path / name)
@@ -148,9 +149,9 @@ def test_without_limits_torques_are_told_and_nothing_is_judged(bare):
     assert (bare.status, verdict.code) == ("no_reference", "dynamics.no_limits")
     assert verdict.missing_links == (6,)
     assert verdict.grade == "export"
-    assert "exported from a CAD model" in say(verdict)
     assert summary.findings == (fact("missing_link", link=6, singular=True),)
-    assert {each.what for each in summary.unknown} >= {"masses", "peak", "rated", "friction", "wrist_moment", "load"}
+    asked = {"link_masses", "peak_torques", "rated_torques", "friction", "wrist_moments", "load"}
+    assert {each.reason for each in summary.assumed} >= asked
     assert summary.uses == ()
     assert all(path.payload is path.speed_scale is None for path in summary.paths)
     assert summary.power_imbalance < 1e-6
@@ -220,10 +221,8 @@ def test_what_a_study_does_not_say_of_tool_payload_and_links_is_open(full, tmp_p
     nothing = replace(robot.masses.body(3), mass=0.0, inertia=(0.0,) * 6)
     links = tuple(replace(each, body=nothing) if each.link == 3 else each for each in robot.masses.links)
     without = robot.replace(masses=replace(robot.masses, links=links))
-    assert unknowns(without, ("load",)) == (
-        fact("dynamics.unknown", what="masses", numbers=(3,)),
-        fact("dynamics.unknown", what="load", numbers=()),
-    )
+    assert unknowns(without, ("load",)) == (Open("link_masses", ("3",)), Open("load"))
+    assert unknowns(robot, ("tool",)) == (Open("load", ("tool",)),)
 
 
 @pytest.mark.long
@@ -238,10 +237,10 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
     assert (full[1].status, found.status, summary.verdict.finding.unknown) == ("pass", "caution", (need,))
     left = {each.reason: each.names for each in summary.assumed}
     if group == "drives":
-        assert len(left["peak_torques"]) == len(left["rated_torques"]) == 6
+        assert left["drives_guess"] == ()
         assert "rests on guesses: the drives' limits" in dynamics.payload_text(summary, full[0].robot("er3a_c60"))
     else:
-        assert left["wrist_limits"] == ()
+        assert left["wrist_guess"] == ()
 
 
 def test_limits_that_no_path_was_held_against_are_no_pass(full):
@@ -290,7 +289,7 @@ def test_what_the_files_leave_open_is_named_and_no_pass(tmp_path, bare, full):
     verdict = found.results.summary.verdict.finding
     assert (found.status, verdict.code, verdict.unknown) == ("caution", "dynamics.marginal", ("friction",))
     assert "not everything was examined" in say(verdict)
-    assert "friction of the joints" in say(verdict)
+    assert Open("friction", ("J4",)) in found.results.summary.assumed
 
 
 @pytest.mark.long
@@ -534,14 +533,11 @@ def test_the_payload_is_one_line_with_what_limits_it_and_what_is_not_known(full)
     by = {"rms": "RMS", "peak": "peak"}[least.payload.by]
     limit = f"At most {down:.2f} kg, limited by torques: J{least.payload.joint} ({by}), {least.name}."
     assert lead.startswith(limit)
-    assert ("not known" in lead) == bool(summary.unknown)
+    assert "not known" not in lead
     unknown = replace(
         summary,
         paths=(),
-        unknown=(
-            fact("dynamics.unknown", what="masses", numbers=(6,)),
-            fact("dynamics.unknown", what="peak", numbers=()),
-        ),
+        assumed=(Open("link_masses", ("6",)), Open("peak_torques"), Open("mounting")),
     )
     lead = dynamics.payload_text(unknown, robot)
     assert lead.startswith("Quantities not known: 2. Mount nothing until the manufacturer gives the rated payload.")

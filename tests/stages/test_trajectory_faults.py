@@ -30,13 +30,12 @@ from er3a.pipeline.messages.trajectory import (
     switch_text,
 )
 from er3a.pipeline.overview.index import write_index
-from er3a.pipeline.program_reports import programs_of
+from er3a.pipeline.path_programs import programs_of
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
-from er3a.pipeline.stages.dynamics.compute import PathJudge
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, advised_end
+from er3a.pipeline.stages.trajectory.judgement import Judge, advised_end, in_order
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
 from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
 from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
@@ -246,9 +245,10 @@ def test_all_that_a_path_came_to_is_named_everywhere_in_the_order_of_time(tmp_pa
     alone = replace(path, expect=("leaves limits",))  # of a file that does not expect the collision
     (fault,) = faults(replace(results, summary=replace(results.summary, paths=(alone,))))
     assert (fault.meant, fault.expected) == (False, "as expected; not expected: collides")
-    late = replace(path, collisions=(replace(path.collisions[0], t0_s=path.out_of_limits[0].t0_s + 0.1),))
-    assert late.outcomes == ("leaves limits", "collides")
-    assert replace(path, collisions=()).outcomes == ("leaves limits",)
+    out = [(part.t0_s, part.t1_s) for part in path.out_of_limits]
+    spans = {"unreachable": [], "leaves limits": out, "collides": [(out[0][0] + 0.1, out[0][1])], "too fast": []}
+    assert in_order("leaves limits", spans, path.duration_s) == ("leaves limits", "collides")
+    assert in_order("leaves limits", spans | {"collides": []}, path.duration_s) == ("leaves limits",)
 
 
 @pytest.mark.long
@@ -278,10 +278,10 @@ def test_too_fast_beside_what_is_expected_is_another_outcome_unless_it_follows_f
         assert is_met(replace(path, expect=came_to))
     study, robot = study_of(tmp_path, name, **changes), load_robot("er3_600")
     trajectory = study.section(TrajectorySettings)
-    surroundings = Surroundings(Bodies(robot, study.scene("er3_600", "trajectory")), 0.001)
-    judge_of = PathJudge(robot, surroundings, near_singular(trajectory), limits_in(robot, trajectory))
+    bodies = Bodies(robot, study.scene("er3_600", "trajectory"))
+    judge = Judge(robot, bodies, 0.001, near_singular(trajectory), limits_in(robot, trajectory))
     (each,) = study_motions(study, "er3_600", trajectory.checks_per_sample)
-    assert judge_of.judged(each.motion)[0] == came_to  # the stage of dynamics says the same
+    assert judge.judged(each.motion).outcomes == came_to  # the stage of dynamics says the same
 
 
 def test_a_line_that_only_another_branch_can_end_is_singular():

@@ -19,7 +19,7 @@ import er3a.pipeline.messages.validation
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_file import Placement
 from er3a.files.robot_library import ROBOTS, load_robot
-from er3a.finding import fact, is_one
+from er3a.finding import Amount, fact, is_one
 from er3a.identifiability.reactions import CheckCounts, CheckTally, bases_of
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.round_trips import batch_round_trips
@@ -37,11 +37,6 @@ from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
-    AnotherArm,
-    Contradicted,
-    DefinedOtherwise,
-    LeftOpen,
-    NothingToCompare,
     SelfCheck,
     SetSummary,
     ValidationResults,
@@ -125,26 +120,27 @@ def page_of(study: Study, stored: Stored[ValidationResults], folder: Path) -> st
 @pytest.mark.parametrize(
     ("name", "status", "kind"),
     [
-        pytest.param("er3a_c60", "caution", LeftOpen, marks=pytest.mark.long),
-        ("er3a_c60_article", "fail", AnotherArm),
-        pytest.param("er3_600", "caution", LeftOpen, marks=pytest.mark.long),
+        pytest.param("er3a_c60", "caution", "left_open", marks=pytest.mark.long),
+        ("er3a_c60_article", "fail", "another_arm"),
+        pytest.param("er3_600", "caution", "left_open", marks=pytest.mark.long),
     ],
 )
 def test_verdicts_on_the_three_robots(summaries, name, status, kind):
     verdict = summaries[name].verdict
     assert verdict.status == status
-    assert isinstance(verdict.finding, kind)
+    assert is_one(verdict.finding, f"validation.{kind}")
 
 
 @pytest.mark.long
 def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries):
     found = summaries["er3_600"].verdict.finding
-    assert isinstance(found, LeftOpen)
+    assert is_one(found, "validation.left_open")
     (directions,) = [part for part in found.parts if part.part == "zero_and_directions"]
     assert {"direction1", "direction4", "direction5", "direction6"} <= set(directions.open)
-    assert found.off.mm > 100
-    assert (found.counts.independent.passed, found.counts.independent.failed) == (10, 0)
-    assert found.counts.consistency.total > found.counts.independent.total
+    assert found.off_mm > 100
+    independent, consistency = found.counts
+    assert (independent.passed, independent.total) == (10, 10)
+    assert consistency.total > independent.total
     assert found.next_measurement.entry in directions.open
     kinds = {(check.subject, check.source): check.kind for check in summaries["er3_600"].checks if check.source}
     assert {kind for (subject, _), kind in kinds.items() if isinstance(subject, DrawingCorner)} == {"independent"}
@@ -221,18 +217,18 @@ def test_what_is_read_is_written_as_the_same_bytes(study, folders, stored, tmp_p
 @pytest.mark.parametrize(
     ("edit", "missed", "finding"),
     [
-        (lambda c: c["dh"]["rows"][0].update(d_mm=368.5), AxisPosition(2, "z"), DefinedOtherwise),
-        (lambda c: c["dh"]["rows"][5].update(d_mm=79.5), PointAtPose("zero pose", "flange", "x"), DefinedOtherwise),
-        (lambda c: c["zero"]["rows"][2].update(direction=1), DrawingCorner(85, 185, "z"), DefinedOtherwise),
-        (lambda c: c["limits"]["rows"][2].update(upper_deg=175), JointLimit(3, "upper"), Contradicted),
-        (lambda c: c["limits"]["rows"][1].update(upper_deg=31), PoseExcess("transport pose"), Contradicted),
-        (lambda c: c["speeds"]["rows"][0].update(speed_deg_s=4), JointSpeed(1), Contradicted),
+        (lambda c: c["dh"]["rows"][0].update(d_mm=368.5), AxisPosition(2, "z"), "defined_otherwise"),
+        (lambda c: c["dh"]["rows"][5].update(d_mm=79.5), PointAtPose("zero pose", "flange", "x"), "defined_otherwise"),
+        (lambda c: c["zero"]["rows"][2].update(direction=1), DrawingCorner(85, 185, "z"), "defined_otherwise"),
+        (lambda c: c["limits"]["rows"][2].update(upper_deg=175), JointLimit(3, "upper"), "contradicted"),
+        (lambda c: c["limits"]["rows"][1].update(upper_deg=31), PoseExcess("transport pose"), "contradicted"),
+        (lambda c: c["speeds"]["rows"][0].update(speed_deg_s=4), JointSpeed(1), "contradicted"),
     ],
 )
 def test_one_wrong_number_fails_where_it_shows(study, tmp_path, edit, missed, finding):
     results = computed(edited_robot(study, tmp_path, edit), tmp_path / "out").results
     assert results.summary.verdict.status == "fail"
-    assert isinstance(results.summary.verdict.finding, finding)
+    assert is_one(results.summary.verdict.finding, f"validation.{finding}")
     assert missed in with_status(results, "fail")
 
 
@@ -253,7 +249,7 @@ def test_a_robot_without_references_and_speeds(study, tmp_path):
     bare = edited_robot(study, tmp_path, edit)
     stored = computed(bare, tmp_path / "out")
     assert stored.results.summary.verdict.status == "no_reference"
-    assert isinstance(stored.results.summary.verdict.finding, NothingToCompare)
+    assert is_one(stored.results.summary.verdict.finding, "validation.no_reference")
     assert "names no reference set" in page_of(bare, stored, tmp_path)
 
 
@@ -285,7 +281,7 @@ def test_a_table_with_crossed_limits_fails_its_internal_checks(summaries):
     ]
     verdict = verdict_of(checks, [], summary.sets, {}, None)
     assert verdict.status == "fail"
-    assert (verdict.finding.check, verdict.finding.measured) == (name, 2.0)
+    assert (verdict.finding.check, verdict.finding.measured) == (name, Amount(2.0, ""))
     told = "The model fails its internal checks: joints whose lower limit is above the upper one 2."
     assert say(verdict.finding) == told
 
@@ -565,7 +561,7 @@ def test_a_named_fault_is_in_the_verdict_and_on_the_page(study, tmp_path):
     wrong = edited_robot(study, tmp_path, lambda c: c["zero"]["rows"][1].update(offset_deg=0))
     stored = computed(wrong, tmp_path / "out")
     found = stored.results.summary.verdict.finding
-    assert isinstance(found, DefinedOtherwise)
+    assert is_one(found, "validation.defined_otherwise")
     assert found.diagnosis.faults == (MISSING_OFFSET,)
     assert "offset 2 is 0 deg, −90 deg fits" in say(found)
     page = page_of(wrong, stored, tmp_path)
@@ -588,7 +584,7 @@ def test_the_corrected_file_that_a_page_advises_is_not_contradicted(study, tmp_p
     """Zeros, directions and base defined otherwise: the file of the page, as it stands there."""
     wrong = edited_robot(study, tmp_path, other_conventions)
     stored = computed(wrong, tmp_path / "out")
-    assert isinstance(stored.results.summary.verdict.finding, DefinedOtherwise)
+    assert is_one(stored.results.summary.verdict.finding, "validation.defined_otherwise")
     report(wrong, stored, tmp_path / "page.html")
     again = carried_out(wrong, (tmp_path / "page.html").read_text(encoding="utf-8"), tmp_path)
     assert again.results.summary.verdict.status != "fail"
@@ -607,7 +603,7 @@ def test_any_number_of_conventions_is_no_other_arm(study, tmp_path):
     other = edited_robot(study, tmp_path, other_conventions)
     stored = computed(other, tmp_path / "out")
     found = stored.results.summary.verdict.finding
-    assert isinstance(found, DefinedOtherwise)
+    assert is_one(found, "validation.defined_otherwise")
     summary = stored.results.summary
     assert not any(each.another_arm for each in summary.sets)
     also = tuple(replace(each, another_arm=True) for each in summary.sets)

@@ -13,20 +13,15 @@ import pytest
 import er3a.pipeline.messages.dynamics  # noqa: F401
 from er3a.collision.bodies import Bodies
 from er3a.files.robot_library import load_robot
-from er3a.finding import fact
-from er3a.identifiability.entry_evidence import Tolerance
-from er3a.identifiability.reactions import CheckCounts, CheckTally
-from er3a.identifiability.statements import ToolOff
+from er3a.finding import Finding, fact
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.messages.pages import caveat
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.messages.scope import say_reserved
 from er3a.pipeline.messages.validation import condition, how_far_off, settled_parts, unconfirmed
 from er3a.pipeline.results import FORMAT_VERSION, plain, read_foundation, write_checksums
 from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.programs.model import ProgramMotion, ProgramsResults
 from er3a.pipeline.stages.trajectory.model import AvoidanceRows, PathChecks, TrajectoryResults
-from er3a.pipeline.stages.validation.model import LeftOpen, PartFound
 from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
@@ -35,21 +30,28 @@ from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
 from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 
-TALLY = CheckTally(24)
-TURNED = ToolOff(0.0, 180.0)
-FOUND = LeftOpen(
-    CheckCounts(TALLY, TALLY, CheckTally()),
-    0,
-    ("a set",),
-    (),
-    (),
-    (
-        PartFound("geometry", "open", 17, 6, 10, (), ("alpha6",), TURNED),
-        PartFound("zero_and_directions", "open", 12, 0, 5, (), ("offset6",), TURNED),
-        PartFound("limits", "weak", 12, 0, 0, (), (), ToolOff(0.0, 0.0)),
+
+def _part(part: str, entries: int, settled: int, up_to_signs: int, *open_: str) -> Finding:
+    counted = {"entries": entries, "settled": settled, "up_to_signs": up_to_signs}
+    return fact("part_found", part=part, **counted, contradicted=(), open=open_)
+
+
+FOUND = fact(
+    "validation.left_open",
+    counts=(fact("counted_checks", kind="independent", passed=24, total=24),),
+    conflicting=0,
+    why="uncontradicted",
+    claims=(),
+    own_text=(),
+    parts=(
+        _part("geometry", 17, 6, 10, "alpha6"),
+        _part("zero_and_directions", 12, 0, 5, "offset6"),
+        _part("limits", 12, 0, 0),
     ),
-    Tolerance(),
-    TURNED,
+    settled_mm=5.0,
+    settled_deg=0.5,
+    off_mm=0.0,
+    off_deg=180.0,
     at_least=False,
     unbounded=tuple(f"direction{k}" for k in range(1, 7)),
     next_measurement=fact(
@@ -66,18 +68,18 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
     for counted in ("5 mm and 0.5 deg", "16 of 17 lengths and twists (10 of", "5 of 12 zeros and directions (5 of"):
         assert counted in settled_parts(FOUND)
     assert names in condition(FOUND.parts, FOUND.unbounded)
-    nothing = tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts)
+    nothing = tuple(part.but(settled=0, up_to_signs=0) for part in FOUND.parts)
     assert unconfirmed(nothing, FOUND.unbounded) == ("all lengths and twists, all zeros and directions, all limits")
 
 
 def test_a_table_without_evidence_is_a_condition_and_a_confirmed_one_is_none():
     assert condition((), ()).startswith("Run no path or program on the arm until its table is confirmed")
     assert condition(FOUND.parts, (), "joint speeds").endswith(", joint speeds (assumed).")
-    assert condition([replace(part, settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
+    assert condition([part.but(settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
 
 
 def test_weak_entries_which_have_no_name_here_are_counted():
-    weak = replace(FOUND.parts[1], settled=5, up_to_signs=0, open=("offset6",))
+    weak = FOUND.parts[1].but(settled=5, up_to_signs=0)
     assert unconfirmed([weak], ()) == "offset 6, 6 more of the zeros and directions"
 
 
@@ -88,29 +90,23 @@ def test_a_turned_flange_moves_the_tip_of_a_tool():
         "If an open or weak entry (alpha 6, offset 6) is wrong, the tool is off by up to 0 mm and 180"
     )
     assert "off by up to 2 times its distance" in first
-    assert "run no Cartesian target with a tool" in first
-    (_, quarter) = how_far_off(replace(FOUND, off=ToolOff(0.0, 90.0)))
+    assert "Run no Cartesian target with a tool" in first
+    (_, quarter) = how_far_off(FOUND.but(off_deg=90.0))
     chord = np.linalg.norm(np.array([1.0, 0.0]) - [0.0, 1.0])  # of a quarter turn
     assert f"{chord:.2g} times its distance" in quarter
-    weak = replace(FOUND, parts=(replace(FOUND.parts[0], settled=5), *FOUND.parts[1:]))
+    weak = FOUND.but(parts=(FOUND.parts[0].but(settled=5), *FOUND.parts[1:]))
     assert "If an open or weak entry is wrong" in how_far_off(weak)[1]  # one more is not settled, and has no name here
 
 
-def test_a_verdict_says_what_it_is_not_to_be_taken_for():
-    torque = fact("dynamics.no_limits", torques=(), missing_links=(), doubts=0, grade=None)
-    assert say_reserved(torque, [Open("friction")]).endswith("known masses alone: don't choose motors by them.")
-    assert say_reserved(torque, [Open("own_speeds")]) == say(torque)
-
-
 def test_of_a_table_that_nothing_settles_each_page_says_so_first(tmp_path):
-    none = replace(FOUND, parts=tuple(replace(part, settled=0, up_to_signs=0) for part in FOUND.parts))
+    none = FOUND.but(why="unsettled", parts=tuple(part.but(settled=0, up_to_signs=0) for part in FOUND.parts))
     assert say(none) != say(FOUND)
     assert (_foundation(none, tmp_path), _foundation(FOUND, tmp_path)) == ("unsettled", "caution")
     assert caveat("unsettled").text.startswith("No entry of this D-H table is settled by an independent document")
 
 
-def _foundation(found: LeftOpen, folder: Path) -> str:
-    verdict = {"status": "caution", "params": plain(found)}
+def _foundation(found: Finding, folder: Path) -> str:
+    verdict = {"status": "caution", "params": plain(found.params)}
     head = {"format_version": FORMAT_VERSION, "robot": "r", "stage": "validation", "figures": []}
     (folder / "summary.json").write_text(json.dumps(head | {"verdict": verdict, "provenance": {}}), encoding="utf-8")
     write_checksums(folder)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ import typer
 
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM, Tolerances
 from er3a.errors import DoubtfulUnit, Er3aError
+from er3a.finding import plain
 from er3a.pipeline.commands.dh_options import Angles, Lengths
 from er3a.pipeline.commands.options import (
     ROBOT_FILES,
@@ -36,7 +37,6 @@ Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
 """An arm as it was read, and doubts about its units."""
 
 MAX_TOLERANCE = 1000.0  # mm, and deg
-MATCHES_SHOWN = 5  # of a folder
 NEAR = 1  # entries of geometry in which a table may differ from a known arm and still be near it
 NEAREST_SHOWN = 3  # known arms, if none is near
 TOOLS_EQUAL = 1e-9  # m, and of axes
@@ -69,8 +69,7 @@ def compare(
         list[str] | None,
         typer.Argument(
             metavar="B",
-            help="the arm to compare with: as A, or a folder of such files; several: who agrees with whom; "
-            "none: which known arm is A?",
+            help="the arm to compare with, as A; several: who agrees with whom; none: which known arm is A?",
         ),
     ] = None,
     *,
@@ -108,7 +107,7 @@ def compare(
 def compare_two(
     a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None, read: Read | None = None
 ) -> None:
-    """Compare an arm with another, or with all of a folder, and print what was found.
+    """Compare an arm with another, and print what was found.
 
     Parameters
     ----------
@@ -121,43 +120,33 @@ def compare_two(
     typer.Exit
         with code 1 if anything differs
     """
-    from er3a.comparison.compare import best_of
+    from er3a.comparison.compare import compare as compare_arms
     from er3a.files.robot_library import holds_table
-    from er3a.files.units import noted_doubts
     from er3a.robots.robot import to_modified, to_standard
 
-    folder = Path(b)
     first, found_before = read or _read(a, asked)
-    with noted_doubts() as doubtful:
-        # Names of columns are those of A, or of B if A is no table.
-        of_table = {"columns": (), "joints": first.robot.joints} if holds_table(a) else {}
-        others = _others(b, asked.xacro, asked.options | of_table)
-    doubtful = list({str(each): each for each in (*found_before, *doubtful)}.values())
+    # Names of columns are those of A, or of B if A is no table.
+    of_table = {"columns": (), "joints": first.robot.joints} if holds_table(a) else {}
+    second, found_then = _read(b, replace(asked, options=asked.options | of_table))
     arm = first.robot
-    if not first.printed and len(others) == 1 and (second := next(iter(others.values()))).printed:
+    if not first.printed and second.printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
-    robots = {name: other.robot for name, other in others.items()}
     tolerances = asked.tolerance_mm, asked.tolerance_deg
-    ranked = best_of(arm, robots, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1])
-    ranked = [(each, _beside(found, first, others[each])) for each, found in ranked]
-    name, found = ranked[0]
-    notes = _notes((a, first), (name, others[name]))
-    compared = {Path(a).name, Path(name).name}
-    doubts = [each for each in doubtful if not (folder.is_dir() and Path(each.file or "").name not in compared)]
-    doubts = _unsettled(doubts, found, Path(a) == (folder / name if folder.is_dir() else folder))
-    told = [str(each) for each in doubts]
+    found = _beside(
+        compare_arms(arm, second.robot, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1]), first, second
+    )
+    doubtful = list({str(each): each for each in (*found_before, *found_then)}.values())
+    doubts = [str(each) for each in _unsettled(doubtful, found, Path(a) == Path(b))]
     if found.verdict == "equal" and doubts:
         found = replace(found, verdict="in_doubt")
-        ranked[0] = name, found
+    notes = _notes((a, first), (b, second))
     for note in notes:
         print_note(note)
-    where = str(folder / name) if folder.is_dir() else name
-    pair = (a, arm), (where, others[name].robot)
-    written = _written(*pair, found, asked.output, asked.html, (*tolerances, told))
+    written = _written((a, arm), (b, second.robot), found, asked.output, asked.html, (*tolerances, doubts))
     if asked.as_json:
-        print_json(_record(ranked, folder.is_dir()) | {"notes": notes, "doubtful_units": told} | dict(known or {}))
+        print_json(_record(found) | {"notes": notes, "doubtful_units": doubts} | dict(known or {}))
     else:
-        _print(ranked, folder.is_dir(), told)
+        _print(found, doubts)
         for file in written:
             print(f"{file}: written")
     if found.verdict != "equal":
@@ -276,18 +265,6 @@ def _refuse_wrong(tolerances: dict[str, float], output: Path | None) -> None:
         raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
 
 
-def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
-    """The arm to compare with, or all of a folder by their files, with notes on those that are unreadable."""
-    from er3a.files.arm_file import read_arm, read_arms
-
-    if not Path(source).is_dir():
-        return {source: read_arm(source, xacro=xacro, **options)}
-    found, left_out = read_arms(Path(source), **options)
-    for problem in left_out:
-        print_note(problem)
-    return found
-
-
 def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool) -> list[DoubtfulUnit]:
     """Doubts that the comparison leaves: another arm that agrees, and is not in doubt, settles those of a table."""
     of_table = [each for each in doubts if each.key.startswith(OF_A_TABLE)]
@@ -317,29 +294,14 @@ def _notes(one: tuple[str, ReadArm], other: tuple[str, ReadArm]) -> list[str]:
     return notes
 
 
-def _print(ranked: list[tuple[str, Comparison]], folder: bool, doubts: list[str]) -> None:
-    """Print the best comparison, layer by layer; for a folder, first the best matches."""
+def _print(found: Comparison, doubts: list[str]) -> None:
+    """Print a comparison, layer by layer."""
     from er3a.pipeline.messages.comparison import doubt_rows, headline, layer_rows
 
-    if folder:
-        for other, each in ranked[:MATCHES_SHOWN]:
-            print(f"{other}: {headline(each)}")
-        print()
-    print(headline(ranked[0][1], doubts))
-    for layer, state, detail in (*doubt_rows(doubts), *layer_rows(ranked[0][1])):
+    print(headline(found, doubts))
+    for layer, state, detail in (*doubt_rows(doubts), *layer_rows(found)):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
 
 
-def _record(ranked: list[tuple[str, Comparison]], folder: bool) -> dict[str, Any]:
-    """A comparison as JSON; for a folder, the best match with a ranking of all."""
-    name, found = ranked[0]
-    record = {
-        key: asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
-        for key, value in vars(found).items()
-    }
-    del record["corrected"], record["alignment"]
-    if not folder:
-        return record
-    keys = "verdict", "different_entries", "as_printed_mm", "aligned_mm"
-    ranking = [{"arm": other} | {key: getattr(each, key) for key in keys} for other, each in ranked]
-    return record | {"best": name, "ranking": ranking}
+def _record(found: Comparison) -> dict[str, Any]:
+    return {key: plain(value) for key, value in vars(found).items() if key not in ("corrected", "alignment")}

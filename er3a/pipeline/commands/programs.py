@@ -78,8 +78,9 @@ def check_program(
     from er3a.files.robot_library import load_robot
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
-    from er3a.pipeline.program_reports import accepted, checked_file, json_of, sarif_of, without
+    from er3a.pipeline.program_reports import checked_file, json_of, sarif_of, without
     from er3a.pipeline.progress import shown_work, time_left
+    from er3a.pipeline.sarif import accepted
     from er3a.program_check.check_program import CheckOptions
     from er3a.program_check.program_check_findings import RANKS
     from er3a.programs.execution import RunLimits
@@ -164,7 +165,8 @@ def write(
     from er3a.files.scene_file import load_scene
     from er3a.files.units import noted_doubts
     from er3a.pipeline.messages.expectations import outcome_word
-    from er3a.pipeline.program_reports import missed_checks, missed_line, programs_of, shapes_line
+    from er3a.pipeline.path_programs import programs_of
+    from er3a.pipeline.program_reports import missed_checks, missed_line, shapes_line
     from er3a.pipeline.progress import shown_work
     from er3a.pipeline.scope import by_reason
     from er3a.pipeline.stages.covered import assumed_tool, covered_units, gaps_of_program

@@ -84,7 +84,7 @@ def check(
     """
     from er3a.files.units import noted_doubts
     from er3a.pipeline.check import PROGRAM, check_file, rules_broken
-    from er3a.pipeline.program_reports import WORDS, sarif_of_rules
+    from er3a.pipeline.sarif import WORDS, Reported, sarif_log
 
     found, worst, rules = list[dict[str, object]](), 0, []
     for file in files:
@@ -100,7 +100,7 @@ def check(
         more: dict[str, object] = {"doubtful_units": [str(each) for each in doubts]} if doubts else {}
         more |= {"not_examined": [WHAT_IT_DOES]} if kind == PROGRAM else {}
         broken = rules_broken(file, kind)
-        rules += broken
+        rules += [Reported(*each) for each in broken]
         named = [{"code": one.finding.code, "line": one.place.line, "text": text} for one, text in broken]
         more |= {"rules": named} if named else {}
         wrong = bool(doubts) or any(one.level == "fail" for one, _ in broken)
@@ -114,7 +114,7 @@ def check(
             only = f"; not examined: {WHAT_IT_DOES}" if kind == PROGRAM else ""
             print(f"{file}: {kind}, {state}{only}")
     if sarif is not None:
-        write_text(sarif, json.dumps(sarif_of_rules(rules), indent=1, ensure_ascii=False) + "\n")
+        write_text(sarif, json.dumps(sarif_log("er3a check", rules), indent=1, ensure_ascii=False) + "\n")
     if as_json:
         options.print_json(found)
     if worst:

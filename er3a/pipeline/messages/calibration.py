@@ -13,10 +13,16 @@ from er3a.calibration.calibrate import Beyond, Calibration, Estimate, TermEstima
 from er3a.calibration.cross_validation import TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
+from er3a.finding import plain
 from er3a.pipeline.language import as_text, tr, words
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
+RECORDED = (
+    *("level", "coordinates", "poses", "repeated", "freedom", "rms_before_mm", "rms_after_mm", "turned_before_deg"),
+    *("turned_after_deg", "scatter", "fits", "ratios", "idle", "left_out", "tried", "tried_for_file"),
+)
+OF_AN_ENTRY = ("name", "nominal", "correction", "half_width", "unit")
 MUCH_SCATTER, LITTLE_SCATTER = 2.0, 0.3
 CONTRADICTING = 3.0
 """Times the error at poses left out: positions held back that are farther off are not where the model puts them."""
@@ -273,28 +279,13 @@ def calibration_record(
     """
     return {
         "start": starting_table(robot),
-        "level": found.level,
-        "coordinates": found.coordinates,
-        "poses": found.poses,
-        "repeated": found.repeated,
-        "freedom": found.freedom,
+        **{name: plain(getattr(found, name)) for name in RECORDED},
         "wrong": say(found.wrong) if found.wrong else None,
-        "rms_before_mm": found.rms_before_mm,
-        "rms_after_mm": found.rms_after_mm,
-        "turned_before_deg": found.turned_before_deg,
-        "turned_after_deg": found.turned_after_deg,
-        "scatter": found.scatter,
         "standard_deviation_mm": found.deviation_mm,
-        "fits": found.fits,
         "entries": _entries(found.estimates),
         "held": [say(reason) for reason in found.held],
         "more": say(found.more) if found.more else None,
-        "ratios": [vars(each) for each in found.ratios],
-        "idle": [vars(each) for each in found.idle],
-        "set_aside": [{"row": each.row, "distance_mm": each.distance_mm} for each in found.outliers],
-        "left_out": vars(found.left_out) if found.left_out else None,
-        "tried": [vars(each) for each in found.tried],
-        "tried_for_file": [vars(each) for each in found.tried_for_file],
+        "set_aside": plain(found.outliers),
         "beyond": _beyond(found.beyond) if found.beyond else None,
         "held_back": _held_back(found, others) if others else None,
         "held_back_warning": " ".join(held_back_warning(found, fitted, others)) or None,
@@ -319,23 +310,14 @@ def _held_back(found: Calibration, others: Sequence[Measurement]) -> dict[str, o
 
 
 def _entries(estimates: Sequence[Estimate]) -> list[dict[str, object]]:
-    return [
-        {
-            "name": each.name,
-            "nominal": each.nominal,
-            "correction": each.correction,
-            "half_width": each.half_width,
-            "unit": each.unit,
-        }
-        for each in estimates
-    ]
+    return [{name: getattr(each, name) for name in OF_AN_ENTRY} for each in estimates]
 
 
 def _beyond(found: Beyond) -> dict[str, object]:
     return {
-        "terms": [vars(each) for each in found.terms],
+        "terms": plain(found.terms),
         "entries": _entries(found.estimates),
         "rms_mm": found.rms_mm,
         "standard_deviation_mm": found.deviation_mm,
-        "left_out": vars(found.left_out) if found.left_out else None,
+        "left_out": plain(found.left_out),
     }

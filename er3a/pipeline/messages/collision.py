@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from er3a.collision.matrix import PairState
@@ -42,8 +41,7 @@ STATES: dict[PairState, str] = words(
 TEXTS = texts(
     {
         "pair": "{bodies:body and }",
-        "why.allowed": "Decided in the robot or scene file: {reason:own}",
-        "why.watched": "Decided in the robot or scene file: {reason:own}",
+        "why.decided": "Decided in the robot or scene file: {reason:own}",
         "why.undecided": "Neither proven apart nor found to collide, in {boxes} ranges of joint values; checked.",
         "why.overlaps": (
             "Their shapes overlap in every joint vector tried ({count}), and no joint explains it: correct the shapes. "
@@ -59,8 +57,10 @@ TEXTS = texts(
         "pair_overlaps": "{pair} overlap by {depth_mm:.1f} mm",
         "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; to keep: {margin_mm:g} mm",
         "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs:3, }.",
-        "shapes_assumed": "{partial:shapes_missing}: real collisions may differ.[ {near}]",
-        "shapes_assumed.near": "Within {margin_mm:g} mm of assumed shapes: {names:, }.",
+        "shapes_assumed": (
+            "{partial:shapes_missing}: real collisions may differ."
+            "[ Within {margin_mm:g} mm of assumed shapes: {near:, }.]"
+        ),
         "collision.never_free": "No joint vector within the limits is free of collisions: {pairs:3, } always overlap.",
         "collision.shapes_overlap": (
             "Shapes in error: {pairs:3, } overlap in all {count} joint vectors tried. Correct their size, unit or "
@@ -103,16 +103,6 @@ def _(found: Finding) -> str:
     return sentence("pair", bodies=bodies_of(found))
 
 
-@says("shapes_assumed")
-def _(found: Finding) -> str:
-    return say_as(found, near=near_shapes(found.margin_mm, found.near))
-
-
-def near_shapes(margin_mm: float, names: Sequence[str]) -> str:
-    """What comes so near to assumed shapes that it is not settled; empty where nothing does."""
-    return sentence("shapes_assumed.near", margin_mm=margin_mm, names=names) if names else ""
-
-
 same_text("colliding", "colliding_path", "colliding_target")
 
 
@@ -134,4 +124,5 @@ def why(state: PairState, **parts: Any) -> str:
     parts : ``radius``, mm, of what is left out around a joint; ``witness``, joint values with their units at which the
         pair collides, empty where there are none; ``boxes`` of joint values looked at; ``reason`` that somebody wrote
     """
-    return sentence(f"why.{state if f'why.{state}' in TEXTS else 'meets'}", count=TRIED, **parts)
+    kind = "decided" if state in ("allowed", "watched") else state if f"why.{state}" in TEXTS else "meets"
+    return sentence(f"why.{kind}", count=TRIED, **parts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -16,6 +16,18 @@ from er3a.pipeline.messages.numbers import number
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
+RECORDED = (
+    *("verdict", "layers", "renamed", "factor", "joints", "digits_mm", "digits_deg", "noise", "held_out_mm", "alike"),
+    *("not_settled", "taken_up", "notes"),
+)
+OF_A_ROW = {
+    "line": "lines",
+    "before_mm": "before_mm",
+    "left_mm": "left_mm",
+    "before_deg": "before_deg",
+    "left_deg": "left_deg",
+    "fits": "fits",
+}
 SHOWN_ENTRIES, SHOWN_LINES = 4, 8
 FORMS = {
     "abc": "A, B, C: Rz(A) Ry(B) Rx(C)",
@@ -209,48 +221,34 @@ def confirmation_record(found: Confirmation, robot: str, nearest: str = "") -> d
     """
 
     def placed(place: Placed | None) -> dict[str, object] | None:
-        if place is None:
-            return None
-        widths = {"half_width_mm": place.half_width_mm, "half_width_deg": _finite(place.half_width_deg)}
-        return {"xyz_mm": place.xyz_mm.tolist(), "rpy_deg": place.rpy_deg.tolist(), **widths}
+        return (
+            None
+            if place is None
+            else {
+                "xyz_mm": place.xyz_mm.tolist(),
+                "rpy_deg": place.rpy_deg.tolist(),
+                "half_width_mm": place.half_width_mm,
+                "half_width_deg": place.half_width_deg if np.isfinite(place.half_width_deg) else None,
+            }
+        )
 
-    def entry(each: FoundEntry) -> dict[str, object]:
-        values = {"given": each.given, "found": each.found, "half_width": each.half_width}
-        return {
-            "name": each.entry.name,
-            "unit": each.entry.unit,
-            **{key: float(value) for key, value in values.items()},
-        }
+    def entries(found: Sequence[FoundEntry]) -> list[dict[str, object]]:
+        values = ("given", "found", "half_width")
+        of = ({"name": each.entry.name, "unit": each.entry.unit} for each in found)
+        return [named | {key: float(getattr(each, key)) for key in values} for named, each in zip(of, found)]
 
-    rows = zip(found.lines, found.before_mm, found.left_mm, found.before_deg, found.left_deg, found.fits)
-    keys = ("line", "before_mm", "left_mm", "before_deg", "left_deg", "fits")
+    rows = zip(*(getattr(found, name).tolist() for name in OF_A_ROW.values()))
     return {
         "robot": robot,
-        "verdict": found.verdict,
-        "layers": list(found.layers),
+        **{name: plain(getattr(found, name)) for name in RECORDED},
         "form": found.form or None,
-        "renamed": found.renamed,
-        "factor": found.factor,
-        "joints": plain(list(found.joints)),
         "base": placed(found.base),
         "tool": placed(found.tool),
-        "entries": [entry(each) for each in found.entries],
-        "small": [entry(each) for each in found.small],
+        "entries": entries(found.entries),
+        "small": entries(found.small),
         "nearest": nearest or None,
-        "digits_mm": found.digits_mm,
-        "digits_deg": found.digits_deg,
-        "noise": found.noise,
-        "held_out_mm": found.held_out_mm,
-        "alike": plain(list(found.alike)),
-        "not_settled": list(found.not_settled),
-        "taken_up": list(found.taken_up),
-        "notes": [list(note) for note in found.notes],
-        "rows": [{key: np.asarray(value).item() for key, value in zip(keys, row)} for row in rows],
+        "rows": [dict(zip(OF_A_ROW, row)) for row in rows],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 PLAN = (

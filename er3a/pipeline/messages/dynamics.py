@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from er3a.dynamics.margins import Binding
 from er3a.finding import Finding
 from er3a.pipeline.language import own_title, tr, words
 from er3a.pipeline.messages.numbers import at_least
-from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
-from er3a.pipeline.messages.scope import body_word, names_in_words
+from er3a.pipeline.messages.say import WORDS, bracketed, joined, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.scope import names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
-from er3a.robots.robot import Grade, Robot
+from er3a.robots.robot import Robot
 
 QUANTITIES: dict[model.Quantity, str] = words(
     {
@@ -29,27 +29,26 @@ QUANTITIES: dict[model.Quantity, str] = words(
         "inertia": "wrist inertia",
     }
 )
-NEEDS: dict[model.Need, str] = words(
+LOAD_PARTS = words(
     {
-        "masses": "mass, centre of mass and inertia of the links",
-        "peak": "peak torques of the drives",
-        "rated": "rated torques of the drives",
-        "armature": "rotor inertias and gear ratios",
-        "friction": "friction of the joints",
-        "wrist_moment": "allowed moments at the wrist",
-        "wrist_inertia": "allowed inertias at the wrist",
-        "payload": "rated payload",
-        "load": "mass, centre and inertia of tool and payload",
         "tool": "mass of the tool",
         "carried": "mass of what the tool carries",
         "load_centre": "centre of mass of tool or payload",
         "load_inertia": "inertia of tool or payload",
+    }
+)
+GUESSED = words(
+    {
         "drives_guess": "the drives' limits, which the robot's file guesses",
         "wrist_guess": "the wrist's limits, which the robot's file guesses",
         "load_guess": "the mass of tool or payload, which the study guesses",
     }
 )
-names_in_words("load", "dynamics.need", NEEDS)
+UNKNOWN = (
+    *("link_masses", "peak_torques", "rated_torques", "rotor_inertias", "friction"),
+    *("wrist_moments", "wrist_inertias", "rated_payload", "load"),
+)
+names_in_words("load", "dynamics.load_part", LOAD_PARTS | GUESSED)
 KEY_FIGURES = words(
     {
         "paths": "Paths that count",
@@ -59,14 +58,6 @@ KEY_FIGURES = words(
         "energy": "Greatest energy of a path that the model does not rule out",
         "utilisation": "Highest utilisation of a limit",
         "power_balance": "Power balance, greatest error",
-    }
-)
-GRADED: dict[Grade, str] = words(
-    {
-        "cad": "taken from a CAD model",
-        "export": "exported from a CAD model",
-        "claim": "claimed by others",
-        "inferred": "inferred (orders of magnitude only)",
     }
 )
 BINDING: dict[Binding, str] = words({"peak": "peak", "rms": "RMS", "speed": "speed"})
@@ -83,8 +74,11 @@ WHY: dict[NoBody, str] = words(
 TEXTS = texts(
     {
         "dynamics.use": "{what}: {asked:.3g} of {allowed:.3g} {unit} ({ratio:.0%})",
-        "dynamics.no_data": "Torques need data: {named:dynamics.need, }.",
-        "dynamics.no_limits": "Motors not judged: no drive's limits known. Greatest torque: {torques:; }.{rest}",
+        "dynamics.no_data": "Torques need data: mass, centre of mass and inertia of the links.",
+        "dynamics.no_limits": (
+            "Motors not judged: no drive's limits known. Greatest torque: {torques:; }. What is not known comes on "
+            "top: don't choose motors by it.{rest}"
+        ),
         "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
         "dynamics.fits": "Within all stated limits; highest utilisation: {tightest}.{rest}",
         "dynamics.marginal": (
@@ -92,9 +86,9 @@ TEXTS = texts(
         ),
         "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
         "dynamics.rest": (
-            "[Unknown, wholly or in part: {unknown:dynamics.need, }.][ Paths that may not be run, not counted: "
+            "[Paths that may not be run, not counted: "
             "{not_run:, }.][ Links without mass in the file, counted as massless: {missing_links:, }.][{doubts:?} "
-            "Doubts about the masses: {doubts}.][ Masses {grade:dynamics.graded_as}: torques are as uncertain.]"
+            "Doubts about the masses: {doubts}.][ Grade of the masses: {grade:data}; torques are as uncertain.]"
         ),
         "missing_link": "link {link}: no mass given; {singular:dynamics.massless}",
         "point_mass": "link {link}: mass without inertia",
@@ -124,8 +118,6 @@ TEXTS = texts(
 WORDS.update(
     words(
         {
-            "dynamics.need": NEEDS,
-            "dynamics.graded_as": GRADED,
             "dynamics.why": WHY,
             "dynamics.path": {None: "holding still"},
             "dynamics.masses": {True: "masses are uncertain", False: "not everything was examined"},
@@ -154,8 +146,8 @@ def payload_text(summary: Summary | None, robot: Robot) -> str:
     bounds = [
         (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
     ]
-    open_of = getattr(summary, "unknown", ())
-    missing = [each for each in open_of if each.what not in get_args(model.Guess)]
+    open_ = summary.assumed if isinstance(summary, model.DynamicsSummary) else ()
+    missing = [each for each in open_ if each.reason in UNKNOWN and each.names != ("load_guess",)]
     official = _rated(robot, official=True)
     parts: dict[str, Any] = {"kg": None, "by": (), "guesses": ()}
     if bounds:
@@ -172,7 +164,8 @@ def _guesses(summary: Summary | None) -> list[str]:
     """On which guesses the torques and their limits rest."""
     masses = getattr(summary, "masses", None)
     found = [tr("the masses of the links")] if masses and masses.grade == "inferred" else []
-    return found + [say(each) for each in getattr(summary, "unknown", ()) if each.what in get_args(model.Guess)]
+    named = [(each.reason, *each.names) for each in summary.assumed] if summary else []
+    return found + [tr(GUESSED[each]) for each in GUESSED if any(each in names for names in named)]
 
 
 def _rated(robot: Robot, *, official: bool = False) -> str:
@@ -185,11 +178,6 @@ def _rated(robot: Robot, *, official: bool = False) -> str:
     document, *_ = re.split("[;；]", own_title(source.source))
     doubt = "official" if len(wrist.moment) and len(wrist.inertia) else "official_alone"
     return sentence("payload.rated", kg=wrist.payload, source=document, doubt=doubt)
-
-
-def need_word(need: model.Need) -> str:
-    """What is asked for."""
-    return word("dynamics.need", NEEDS, need)
 
 
 def quantity_word(quantity: model.Quantity) -> str:
@@ -206,22 +194,8 @@ def use_text(use: model.Use | Finding) -> str:
     return sentence("dynamics.use", what=what, **parts)
 
 
-@says("dynamics.no_data")
-def _(found: Finding) -> str:
-    return say_as(found, named=[each.what for each in found.needs if each.what in ("masses", "peak", "load")])
-
-
 @says("dynamics.no_limits", "dynamics.fits", "dynamics.marginal", "dynamics.overload")
 def _(found: Finding) -> str:
-    parts: dict[str, Any] = {"unknown": (), "not_run": (), **found.params}
-    rest = sentence("dynamics.rest", **parts)
+    rest = sentence("dynamics.rest", **{"not_run": (), **found.params})
     masses = bool(found.params.get("unsettled") or found.doubts or found.grade == "inferred")
     return say_as(found, masses=masses, rest=f" {rest}" if rest else "")
-
-
-@says("dynamics.unknown")
-def _(found: Finding) -> str:
-    links = found.what == "masses"
-    return bracketed(
-        need_word(found.what), ", ".join(body_word(f"link_{k}") if links else f"J{k}" for k in found.numbers)
-    )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, tr, with_unit, words
-from er3a.pipeline.messages.kinematics import limited
-from er3a.pipeline.messages.say import WORDS, joined, same_text, texts
+from er3a.pipeline.messages.kinematics import SINGULAR_POSES, limited
+from er3a.pipeline.messages.say import WORDS, joined, texts
 
 KEY_FIGURES = words(
     {
@@ -22,14 +22,7 @@ NEAREST_RULE = N_(
     "all joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
     "smaller root of the summed squares of all joint motions decides, then the lower branch number."
 )
-FREE_AT = words(
-    {
-        "wrist": "axes 4 and 6 collinear",
-        "shoulder": "wrist centre on axis 1",
-        "elbow": "arm folded onto itself",
-        "curve": "self-motion",
-    }
-)
+FREE_AT = SINGULAR_POSES | words({"elbow": "arm folded onto itself", "curve": "self-motion"})
 TEXTS = texts(
     {
         "inverse.not_reproduced": (
@@ -64,9 +57,6 @@ TEXTS = texts(
     }
 )
 WORDS["inverse.collisions"] = words({True: "collisions", False: "self-collision"})
-
-
-same_text("inverse.targets", "inverse.all_solved", "inverse.none_solved", "inverse.some_unsolved")
 
 
 def limits_in_short(found: Finding) -> str:

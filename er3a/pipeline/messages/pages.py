@@ -32,7 +32,7 @@ GRADE_NAMES = words(
 GROUP_NAMES = words(
     {  # of a robot file
         "dh": "D-H table",
-        "zero": "zero pose and directions",
+        "zero": "zeros and directions",
         "limits": "limits",
         "speeds": "joint speeds",
         "coupling": "coupling",
@@ -66,18 +66,12 @@ GLOSSARY = terms(
             "by which the Jacobian's linear rows are divided, so that its singular values have no unit"
         ),
         "wrist centre": "the point in which the last three axes meet",
-        "rank loss": "where axes become dependent, so that the tool can't move in some direction",
-        "avoidance strategy": (
-            "what can be done about a path's singular segment: slow down, another branch, a via point, a joint "
-            "detour, stop"
-        ),
         "settled": "of a table entry: independent documents give it to within the tolerance",
         "but for signs": (
             "of a settled table entry: keep it, unless an open entry turns out otherwise, which may change a sign or "
             "half turn here"
         ),
         "claim": "what an article says; shown, but no verdict rests on it",
-        "margin": "how far something is from a limit, in its unit",
         "capability": "what the tool can do at a place: share of directions, solutions, dexterity",
         "tray": (
             "the space, as of a bin or a pallet's load, that the workspace page places where the tool reaches all of it"
@@ -86,7 +80,6 @@ GLOSSARY = terms(
         "undecided": "what the computed bounds can't decide; never called safe",
         "holding torque": "the torque or force by which a drive keeps a joint at rest in a pose",
         "RMS torque": "root-mean-square over a motion, which heats the motor; compared with the rated torque",
-        "utilisation": "a value divided by its limit, in percent",
     }
 )
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from er3a.collision.pairs import BASE, link_label
-from er3a.finding import AnyFinding
 from er3a.pipeline.language import own_title, tr, words
-from er3a.pipeline.messages.pages import GROUP_NAMES
-from er3a.pipeline.messages.say import FORMATS, bracketed, joined, say, sentence, texts, word
+from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES
+from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, sentence, texts, word
 from er3a.pipeline.scope import Check, Coverage, Open
 
 CHECKS: Mapping[Check, str] = words(
@@ -20,7 +19,7 @@ CHECKS: Mapping[Check, str] = words(
         "reach": "reach",
         "rates": "speeds and accelerations",
         "singularity": "singularities",
-        "self_collision": "collisions with itself",
+        "self_collision": "self-collision",
         "scene_collision": "collisions with the scene",
         "torque": "torques",
         "camera": "camera",
@@ -47,7 +46,7 @@ GAP_WORDS: Mapping[str, str] = words(
         "no_scene": "no scene is given",
         "base_inside": "the base lies inside solids",
         "inside_solid": "places inside solids",
-        "gripper": "the gripper has no shape (`carried` in the scene)",
+        "gripper": "the tool has no shape (`carried` in the scene)",
         "gravity": "gravity is set to {amount:g} m/s²",
         "paths_not_run": "paths that may not be run",
         "program_loads": "loads that programs name",
@@ -73,10 +72,10 @@ ASSUMED: Mapping[str, str] = words(
         "guessed_pairs": "pairs of links for which guessed shapes are too coarse",
         "base_contacts": "the base is mounted on these solids",
         "start_branches": "the solution to start with",
-        "arm_angles": "the arm angle",
+        "arm_angles": "arm angle",
         "solutions_complete": "the solutions found are all",
         "program_starts": "where programs start from",
-        "program_load": "programs name loads",
+        "program_load": "loads that programs name",
         "outer_axes": "axes beside the arm's rest",
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
@@ -89,7 +88,11 @@ ASSUMED: Mapping[str, str] = words(
         "rated_torques": "rated torques are unknown",
         "rotor_inertias": "rotors have no inertia",
         "friction": "joints have no friction",
-        "wrist_limits": "wrist limits are unknown",
+        "wrist_moments": "allowed moments at the wrist are unknown",
+        "wrist_inertias": "allowed inertias at the wrist are unknown",
+        "rated_payload": "the rated payload is unknown",
+        "drives_guess": "the drives' limits, which the robot's file guesses",
+        "wrist_guess": "the wrist's limits, which the robot's file guesses",
         "load": "tool and payload weigh nothing",
         "open_space": "nothing stands around the arm",
         "mounting": "the base stands upright",
@@ -104,37 +107,35 @@ ASSUMED: Mapping[str, str] = words(
 )
 """What is assumed, by its reason."""
 
+NEVER: Mapping[str, str] = words(
+    {
+        "validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
+        "workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
+        "inverse": "Never checked: the motions from one target to the next.",
+        "trajectory": (
+            "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
+        ),
+        "collision": "Never checked: real shapes; links where a joint joins them; what lies between samples.",
+        "dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
+        "vision": "Never checked: the detector, the part in the gripper, and torques.",
+        "programs": (
+            "Never checked: torques, the way back to a program's start, and how a controller rounds and ramps."
+        ),
+    }
+)
+"""What each stage never checks."""
 TEXTS = texts(
     {
         "link": "[base{base:?}][{base:!}link {number}]",
-        "reserved.dynamics.no_limits": (
-            "What is not known comes on top of these torques, whose ± is that of the known masses alone: don't choose "
-            "motors by them."
-        ),
         "not_checked": "Not checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
         "coverage": "[all{all:?}][none{none:?}][{part:?}{covered} of {of}]",
-        "never.validation": "Never checked: how the arm at hand differs from its table. A calibration measures that.",
-        "never.workspace": "Never checked: collisions along the way to a point, and points between those sampled.",
-        "never.inverse": "Never checked: the motions from one target to the next.",
-        "never.trajectory": (
-            "Never checked: torques, the ways between paths, real shapes, and how a controller rounds and ramps."
-        ),
-        "never.collision": "Never checked: real shapes; links where a joint joins them; what lies between samples.",
-        "never.dynamics": "Never checked: heat, wear, elasticity, and what drives can do at speed.",
-        "never.vision": "Never checked: the detector, the part in the gripper, and torques.",
-        "never.programs": (
-            "Never checked: torques, the way back to a program's start, and how a controller rounds and ramps."
-        ),
     }
 )
 
 
 MAX_NAMED = 6  # in a sentence; the table names all
 _words: dict[str, tuple[str, Mapping[str, str]]] = {}
-RESERVED: Mapping[str, tuple[str, ...]] = {
-    "dynamics.no_limits": ("link_masses", "load", "friction"),
-}
 
 
 def names_in_words(reason: str, code: str, words: Mapping[Any, str]) -> None:
@@ -183,16 +184,11 @@ def missed_text(found: Coverage) -> str:
 
 def never_text(stage: str) -> str:
     """What a stage never checks; empty for a stage of others, which says it on its page."""
-    return sentence(key) if (key := f"never.{stage}") in TEXTS else ""
-
-
-def say_reserved(finding: AnyFinding, assumed: Iterable[Open]) -> str:
-    """A verdict's finding, and what it is not to be taken for where its stage assumed something."""
-    reserved = any(each.reason in RESERVED.get(finding.code, ()) for each in assumed)
-    return joined([say(finding), sentence(f"reserved.{finding.code}") if reserved else ""], " ")
+    return tr(NEVER[stage]) if stage in NEVER else ""
 
 
 FORMATS["missed"] = missed_text
+WORDS["data"] = GRADE_NAMES
 
 
 def not_checked(missed: tuple[Coverage, ...]) -> str:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import is_one
 from er3a.pipeline.language import as_text, with_unit, words
 from er3a.pipeline.messages import expectations  # noqa: F401
 from er3a.pipeline.messages.kinematics import singular_pose, singularity_word
-from er3a.pipeline.messages.planning import STRATEGIES as ADVICE
-from er3a.pipeline.messages.say import joined, listed, same_text, say, say_first, sentence, texts, word
+from er3a.pipeline.messages.planning import STRATEGIES
+from er3a.pipeline.messages.say import joined, listed, say, say_first, sentence, texts, word
 from er3a.pipeline.stages.trajectory import model
-from er3a.planning.motion_faults import RateCause, rate_ratio
+from er3a.planning.motion_faults import rate_ratio
 from er3a.planning.names import StrategyName
 
 KEY_FIGURES = words(
@@ -41,17 +41,6 @@ KINDS: dict[model.PathKind, str] = words(
         "plan": "planned motion",
     }
 )
-STRATEGIES: dict[StrategyName, str] = words(
-    {
-        "slow": "slow down on the path",
-        "branch": "another IK solution first",
-        "via_shift": "via point, tool point shifted",
-        "via_tilt": "via point, tool tilted",
-        "detour": "joint move across the region",
-        "stop": "stop before it, with an alarm",
-        "planned": "planned motion of the joints",
-    }
-)
 BY_JOINTS: tuple[StrategyName, ...] = ("branch", "detour", "planned")  # ways that no path of the tool shows
 NO_DEVIATION = 0.005  # mm or deg
 NO_TIME = 0.005  # s
@@ -66,13 +55,11 @@ PACE_MARGIN = 1.01  # by which a slower pace stays below the limits
 TEXTS = texts(
     {
         "trajectory.paths": (
-            "[{paths:?}{safe} of {paths} paths pass.][ Unreachable: {unreachable:, }.][ None found: {none_found:, "
-            "}.][ Leave limits: {leaves_limits:, }.][ Collide: {collides:, }.][ Too fast: {too_fast:, }.][ "
-            "Singular: {singular:, }.][ Too fast for the assumed limits: {too_fast_if_assumed:, }.][ Undecided: "
-            "{undecided:, }.][ Near-singular: {near_singular:, }.][ Not followed to the end: {not_followed:, }.][ "
-            "Doubt or fault in the program: {of_program:, }.][{near_assumed:?} Within the margin of assumed "
-            "shapes: {near_assumed}.][ Expected to fail, and did: {demonstrations:, }.]"
+            "[{paths:?}{safe} of {paths} paths pass.][ Not safe: {faults:; }.][ Not followed to the end: "
+            "{not_followed:, }.][ Doubt or fault in the program: {of_program:, }.][{near_assumed:?} Within the margin "
+            "of assumed shapes: {near_assumed}.][ Expected to fail, and did: {demonstrations:, }.]"
         ),
+        "paths_of": "{outcome:outcome}: {names:, }",
         "dependent_axes": "axes {axes:, } dependent",
         "smallest_singular_value": "smallest singular value {value:.3g}",
         "path.shown": "the figure shows the straight joint move",
@@ -118,9 +105,6 @@ TEXTS = texts(
 )
 
 
-same_text("trajectory.paths", "trajectory.safe", "trajectory.some_unsafe", "trajectory.none_safe")
-
-
 def kind_word(kind: model.PathKind) -> str:
     """What kind of path it is."""
     return word("trajectory.kind", KINDS, kind)
@@ -144,7 +128,7 @@ def event_distance(event: model.Singularity) -> str:
 
 def strategy_word(name: StrategyName) -> str:
     """A strategy's name."""
-    return word("trajectory.strategy", STRATEGIES, name)
+    return word("strategy", STRATEGIES, name)
 
 
 def path_text(path: model.PathSummary) -> str:
@@ -184,11 +168,11 @@ def _(jump: model.Jump) -> str:
     return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
 
 
-def _when(stretch: model.Stretch) -> str:  # type: ignore[type-arg]
+def _when(stretch: model.Stretch) -> str:
     return sentence("path.stretch", start=stretch.t0_s, end=stretch.t1_s)
 
 
-def cause_text(part: model.Stretch) -> str:  # type: ignore[type-arg]
+def cause_text(part: model.Stretch) -> str:
     """Why a stretch of a path is listed."""
     return _with_worst(part, say(part.cause))
 
@@ -208,7 +192,7 @@ def first_faults(path: model.PathSummary) -> list[FaultText]:
     order of time, what only follows from others last. What is undecided counts only where it comes before all that is
     not."""
     fast = [[part for part in path.too_fast if part.cause.basis == each] for each in ("documented", "assumed")]
-    grave: list[Sequence[model.Stretch[Any]]] = [path.unreachable, path.out_of_limits, path.collisions]
+    grave: list[Sequence[model.Stretch]] = [path.unreachable, path.out_of_limits, path.collisions]
     firsts = [min(each, key=lambda part: part.t0_s) for each in grave if each]
     found = [FaultText(part.t0_s, _with_worst(part, say_first(part.cause)), part.t0_s) for part in firsts]
     edge = _edge(path)
@@ -246,13 +230,13 @@ def cause_of(path: model.PathSummary) -> str:
     return sentence("path.edge") if any(each.follows for each in first_faults(path)) and path.unreachable else ""
 
 
-def _beside(event: model.Singularity, part: model.Stretch[RateCause]) -> bool:
+def _beside(event: model.Singularity, part: model.Stretch) -> bool:
     return part.t0_s - ADJOINING <= event.until_s and event.t_s <= part.t1_s + ADJOINING
 
 
-def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]]:
+def adjoined(stretches: Sequence[model.Stretch]) -> list[model.Stretch]:
     """Stretches in order of time, those of one cause that adjoin as one."""
-    found: list[model.Stretch[Any]] = []
+    found: list[model.Stretch] = []
     for part in sorted(stretches, key=lambda part: part.t0_s):
         k = next((k for k, each in enumerate(found) if each.cause == part.cause), None)
         if k is not None and part.t0_s <= found[k].t1_s + ADJOINING:
@@ -262,7 +246,7 @@ def adjoined(stretches: Sequence[model.Stretch[Any]]) -> list[model.Stretch[Any]
     return sorted(found, key=lambda part: part.t0_s)
 
 
-def _run(stretches: Sequence[model.Stretch[RateCause]]) -> tuple[list[model.Stretch[RateCause]], float | None]:
+def _run(stretches: Sequence[model.Stretch]) -> tuple[list[model.Stretch], float | None]:
     """The first of stretches with those that adjoin, and when (s) the next one begins."""
     first, *later = sorted(stretches, key=lambda part: part.t0_s)
     run = [first]
@@ -273,19 +257,19 @@ def _run(stretches: Sequence[model.Stretch[RateCause]]) -> tuple[list[model.Stre
     return run, None
 
 
-def _end_of(run: Sequence[model.Stretch[RateCause]]) -> float:
+def _end_of(run: Sequence[model.Stretch]) -> float:
     return max(part.t1_s for part in run)
 
 
-def _worst_of_kinds(run: Sequence[model.Stretch[RateCause]]) -> list[model.Stretch[RateCause]]:
+def _worst_of_kinds(run: Sequence[model.Stretch]) -> list[model.Stretch]:
     """Of each kind of limit the stretch that exceeds it most, speeds first."""
-    kinds: dict[str, list[model.Stretch[RateCause]]] = {}
+    kinds: dict[str, list[model.Stretch]] = {}
     for part in sorted(run, key=lambda part: not is_one(part.cause, "too_fast")):
         kinds.setdefault(f"{part.cause.code} {part.cause.limit.unit}", []).append(part)
     return [max(alike, key=lambda part: rate_ratio(part.cause)) for alike in kinds.values()]
 
 
-def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf) -> str:
+def _rates(stretches: Sequence[model.Stretch], edge: float = math.inf) -> str:
     """What is too fast first, of all joints: stretches that adjoin are one, and each kind of limit has its worst.
 
     ``edge``: when (s) the path leaves the reach; towards it speeds have no bound.
@@ -301,14 +285,14 @@ def _rates(stretches: Sequence[model.Stretch[RateCause]], edge: float = math.inf
     return sentence("path.rates", end=end, rates=sentence("rates", joints=named, worst=worst), again=again)
 
 
-def _with_worst(part: model.Stretch[Any], cause: str) -> str:
+def _with_worst(part: model.Stretch, cause: str) -> str:
     """A cause, and when it is worst on a stretch that is not but a moment."""
     if part.worst_s is None or not _lasts(part):
         return cause
     return sentence("path.worst", cause=cause, t=f"{part.worst_s:.4g}")
 
 
-def _lasts(part: model.Stretch[Any]) -> bool:
+def _lasts(part: model.Stretch) -> bool:
     return part.t1_s - part.t0_s >= MOMENT
 
 
@@ -391,7 +375,7 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
         joint = max(swings, key=swings.__getitem__)
         tool = joined([tool, sentence("advice.swing", joint=joint, swing=swings[joint])])
     clearance = None if motion.clearance_mm is None else math.floor(10 * motion.clearance_mm) / 10
-    way = word("advice", ADVICE, tried.name)
+    way = strategy_word(tried.name)
     if slowed:
         percent = math.floor(100 * slowed.part)
         way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)

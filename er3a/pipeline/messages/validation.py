@@ -7,22 +7,14 @@ from collections.abc import Sequence
 
 import er3a.pipeline.messages.diagnosis
 import er3a.pipeline.messages.kinematics  # noqa: F401
-from er3a.finding import Finding
+from er3a.finding import Finding, is_one
 from er3a.identifiability.entries import GROUP_OF
 from er3a.identifiability.evidence import PART_OF_GROUP, PartName
-from er3a.identifiability.reactions import CheckCounts
-from er3a.pipeline.language import as_text, distinct, tr, with_unit, words
-from er3a.pipeline.messages.pages import GRADE_NAMES
+from er3a.identifiability.statements import ToolOff
+from er3a.pipeline.language import distinct, tr, with_unit, words
 from er3a.pipeline.messages.references import CHECK_KINDS, GROUP_WORDS, quoted
-from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
+from er3a.pipeline.messages.say import WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
-from er3a.pipeline.stages.validation.model import (
-    AnotherArm,
-    Contradicted,
-    LeftOpen,
-    ModelUnsound,
-    PartFound,
-)
 
 SELF_CHECKS = words(
     {
@@ -41,8 +33,8 @@ SELF_CHECKS = words(
 )
 KEY_FIGURES = words(
     {
-        "independent_checks": "Independent checks passed",
-        "consistency_checks": "Consistency checks passed",
+        "independent_checks": "independent checks pass",
+        "consistency_checks": "consistency checks pass",
         "zero_pose_flange_error": "Zero pose: flange off the documents by",
         "farthest_axis": "Joint axes: largest distance from the documents",
         "most_tilted_axis": "Joint axes: largest angle to the documents",
@@ -80,14 +72,10 @@ GROUPS = GROUP_WORDS | words({"table_sanity": "table sanity", "round_trips": "ro
 TEXTS = texts(
     {
         "claims": "Statements without a document (“claims”) in {reference_set} that fail: {failed} of {claims}.",
-        "counted_checks": "{passed} of {total} {kind} checks pass",
+        "counted_checks": "{passed} of {total} {kind:check_kind} checks pass",
         "validation.off": (
             "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f} deg.[ A tool's tip is then "
-            "off by up to {factor:.2g} times its distance from the flange: run no Cartesian target with a tool "
-            "before.]"
-        ),
-        "validation.speaks": (
-            "{why:speaks}. {checks}[{conflicting:?}, {conflicting} undecided, as documents contradict each other]."
+            "off by up to {factor:.2g} times its distance from the flange. Run no Cartesian target with a tool before.]"
         ),
         "validation.parts": (
             "Confirmed by independent documents (to {mm:g} mm and {deg:g} deg at the tool): {parts:, }."
@@ -97,21 +85,23 @@ TEXTS = texts(
             "Only the table's own source gives {names}: nothing bounds the tool's error if they are wrong."
         ),
         "validation.left_open": (
-            "{speaks}[ {settled}][ {off: }][ Most useful measurement: {next_measurement}.][ {contradiction}][ "
-            "{claims: }][ {own_text: }]"
+            "{why:speaks}. {counts:, }[{conflicting:?}, {conflicting} undecided, as documents contradict each other].[ "
+            "{settled}][ {off: }][ Most useful measurement: {next_measurement}.][ {contradiction}][ {claims: }][ "
+            "{own_text: }]"
         ),
         "validation.missed": (
-            "[The table contradicts{other:!}][This is not the arm of{other:?}] the {grades:data and } data in "
-            "{reference_set}: the {quantity} is {measured}, not {expected}. {checks}.[ Contradicted entries that "
-            "move the tool: {names}.]"
+            "[{described} ][{other:!}The table contradicts][{other:?}This is not the arm of] the {grades:data and } "
+            "data in {reference_set}: the {quantity} is "
+            "{measured}, not {expected}. {counts:, }.[ Contradicted entries that move the tool: {names}.][ "
+            "{diagnosis}][ {claims: }][ {own_text: }]"
         ),
         "validation.defined_otherwise": (
             "This is the same arm, defined otherwise than in the {grades:data and } data in {reference_set} "
-            "({counts:counts}). Convert joint values and positions before you use them.[ {diagnosis}][ {claims: }]"
+            "({counts:, }). Convert joint values and positions before you use them.[ {diagnosis}][ {claims: }]"
             "[ {own_text: }]"
         ),
         "validation.confirmed": (
-            "Independent documents settle every entry that moves the tool: {counts:counts} ({grades:data and } data)."
+            "Independent documents settle every entry that moves the tool: {counts:, } ({grades:data and } data)."
             "[ {contradiction}][ {claims: }][ {own_text: }]"
         ),
         "part_found": (
@@ -125,7 +115,7 @@ TEXTS = texts(
             "There is no official, CAD or exported data to compare this table with. Read five poses at the pendant: "
             "er3a confirm ROBOT --plan.[ {claims: }][ {own_text: }]"
         ),
-        "validation.model_unsound": "The model fails its internal checks: {check} {value}.",
+        "validation.model_unsound": "The model fails its internal checks: {check} {measured:.4g}.",
         "contradiction": (
             "References contradict each other about the {subjects}: measure that on the arm before you rely on it."
         ),
@@ -136,9 +126,9 @@ TEXTS = texts(
 WORDS.update(
     words(
         {
-            "data": GRADE_NAMES,
             "part_entries": PART_ENTRIES,
             "self_check": SELF_CHECKS,
+            "check_kind": CHECK_KINDS,
             "speaks": {
                 "uncovered": "No independent document covers this table",
                 "unsettled": "Don't rely on this table: no independent document settles any of its entries",
@@ -149,46 +139,24 @@ WORDS.update(
 )
 
 
-def counted_checks(counts: CheckCounts) -> str:
-    """How many checks pass, by what they rest on: the one scheme of counts of all pages."""
-    kinds = {kind: getattr(counts, kind) for kind in ("independent", "consistency")}
-    shown = {kind: own for kind, own in kinds.items() if own.total} or {"independent": counts.independent}
-    said = [
-        sentence("counted_checks", passed=own.passed, total=own.total, kind=word("kind", CHECK_KINDS, kind))
-        for kind, own in shown.items()
-    ]
-    return joined(said, ", ")
+@says("validation.left_open")
+def _(found: Finding) -> str:
+    return say_as(found, settled=settled_parts(found), off=how_far_off(found))
 
 
-FORMATS["counts"] = counted_checks
-
-
-@say.register
-def _(found: LeftOpen) -> str:
-    some = any(part.settled or part.up_to_signs for part in found.parts) or not found.parts
-    counts = found.counts.independent
-    why = ("uncontradicted" if some else "unsettled") if counts.total else "uncovered"
-    checks = counted_checks(found.counts)
-    speaks = sentence("validation.speaks", why=why, checks=checks, conflicting=counts.conflicting)
-    return say_as(found, speaks=speaks, settled=settled_parts(found), off=how_far_off(found))
-
-
-def settled_parts(found: LeftOpen) -> str:
+def settled_parts(found: Finding) -> str:
     """How much of each part of a table is settled, and what is not."""
-    known, limit = [part for part in found.parts if part.settled or part.up_to_signs], found.tolerance
-    confirmed = sentence("validation.parts", parts=known, mm=limit.mm, deg=limit.deg) if known and limit else ""
-    return joined([confirmed, not_confirmed(unconfirmed(found.parts, found.unbounded))], " ")
-
-
-def not_confirmed(names: str) -> str:
-    """What nothing settles, as a sentence; empty where that is nothing."""
-    return sentence("validation.open", names=names) if names else ""
+    known = [part for part in found.parts if part.settled or part.up_to_signs]
+    settled = {"parts": known, "mm": found.settled_mm, "deg": found.settled_deg}
+    names = unconfirmed(found.parts, found.unbounded)
+    left = sentence("validation.open", names=names) if names else ""
+    return joined([sentence("validation.parts", **settled) if known else "", left], " ")
 
 
 PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
 
 
-def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> str:
+def unconfirmed(parts: Sequence[Finding], unbounded: Sequence[str] = ()) -> str:
     """What of a table nothing settles: the entries by name, as far as they have one here, or how many more there are; a
     part of which none is settled as a whole. ``unbounded``: entries that only their own document speaks of."""
     left, named = list(unbounded), []
@@ -209,7 +177,7 @@ def unconfirmed(parts: Sequence[PartFound], unbounded: Sequence[str] = ()) -> st
     return joined([*named, shortened(left)], ", ")
 
 
-def condition(parts: Sequence[PartFound], unbounded: Sequence[str], assumed: str = "") -> str:
+def condition(parts: Sequence[Finding], unbounded: Sequence[str], assumed: str = "") -> str:
     """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is.
 
     ``assumed``: what is assumed besides, as no document gives it.
@@ -222,7 +190,7 @@ def condition(parts: Sequence[PartFound], unbounded: Sequence[str], assumed: str
     return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 
-def _open_alone(found: LeftOpen) -> list[str]:
+def _open_alone(found: Finding) -> list[str]:
     """The open entries that move the tool, where none is weak besides, as weak ones are not named."""
     moving = [part for part in found.parts if part.part in ("geometry", "zero_and_directions")]
     named = {name for part in moving for name in (*part.open, *part.contradicted)}
@@ -235,22 +203,23 @@ def _part(name: str) -> PartName | None:
     return next((part for column, part in PARTS.items() if column == name.rstrip("0123456789")), None)
 
 
-def how_far_off(found: LeftOpen) -> list[str]:
+def how_far_off(found: Finding) -> list[str]:
     """How far what is open or weak could put the tool off, each a sentence."""
     sentences = []
     if found.unbounded:
         sentences.append(sentence("validation.unbounded", names=shortened(found.unbounded)))
-    if found.off.moves:
+    mm, deg = found.off_mm, found.off_deg
+    if ToolOff(mm, deg).moves:
         entry = bracketed(tr("an open or weak entry"), shortened(_open_alone(found)))
         bound = tr("at least") if found.at_least else tr("up to")
-        factor = 2.0 if found.at_least else 2 * math.sin(math.radians(min(found.off.deg, 180.0) / 2))
-        tip, off = None if round(found.off.mm) else factor, found.off
-        sentences.append(sentence("validation.off", entry=entry, bound=bound, mm=off.mm, deg=off.deg, factor=tip))
+        factor = 2.0 if found.at_least else 2 * math.sin(math.radians(min(deg, 180.0) / 2))
+        tip = None if round(mm) else factor
+        sentences.append(sentence("validation.off", entry=entry, bound=bound, mm=mm, deg=deg, factor=tip))
     return sentences
 
 
-@say.register
-def _(found: PartFound) -> str:
+@says("part_found")
+def _(found: Finding) -> str:
     return say_as(found, known=found.settled + found.up_to_signs)
 
 
@@ -263,43 +232,17 @@ def shortened(names: Sequence[str]) -> str:
     return joined((f"{kind} {', '.join(own)}" if own[0] else kind for kind, own in by_kind.items()), ", ")
 
 
-@say.register
-def _(found: ModelUnsound) -> str:
-    value = with_unit(as_text(found.measured, ".1f"), found.unit) if found.unit else as_text(found.measured, "g")
-    return say_as(found, value=value)
-
-
-@say.register
-def _(found: Contradicted | AnotherArm) -> str:
-    other = isinstance(found, AnotherArm)
-    described, diagnosis = found.described if other else None, None if other else found.diagnosis
-    excluded = shortened(found.contradicted) if other else ""
-    shown = [described, missed_text(found, excluded), diagnosis, *found.claims, *found.own_text]
-    return joined([each if isinstance(each, str) else say(each) for each in shown if each], " ")
-
-
 @says("contradiction")
 def _(found: Finding) -> str:
+    stated = tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
     more = [sentence("more", count=found.more)] if found.more else []
-    return say_as(found, subjects=joined([bracketed(say(found.subject), stated_text(found)), *more], ", "))
+    return say_as(found, subjects=joined([bracketed(say(found.subject), stated), *more], ", "))
 
 
-def stated_text(found: Finding) -> str:
-    """The values that references state about one number."""
-    return tr(" or ").join(with_unit(value, found.unit) for value in distinct(found.stated))
-
-
-def missed_text(found: Contradicted | AnotherArm, names: str = "") -> str:
-    """What a contradicted table gives, and what the documents say; ``names``: entries that they exclude."""
+@says("validation.contradicted", "validation.another_arm")
+def _(found: Finding) -> str:
+    another = is_one(found, "validation.another_arm")
     measured, expected = (with_unit(value, found.unit) for value in distinct([found.measured, found.expected]))
-    return sentence(
-        "validation.missed",
-        other=isinstance(found, AnotherArm) and not found.described,
-        grades=found.grades,
-        reference_set=found.reference_set,
-        checks=counted_checks(found.counts),
-        quantity=quoted(found.check),
-        measured=measured,
-        expected=expected,
-        names=names,
-    )
+    names = shortened(found.contradicted) if another else ""
+    parts = {"other": another and not found.described, "quantity": quoted(found.check), "names": names}
+    return sentence("validation.missed", **dict(found.params) | parts | {"measured": measured, "expected": expected})

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.files.kept_files import write_text
+from er3a.finding import is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr, with_unit
@@ -19,7 +20,7 @@ from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, paths_tile, table_tile, tray_tile
 from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.model import LeftOpen, ValidationResults
+from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
@@ -159,12 +160,17 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
     if table == "not_examined":
         return "measure", tr("not examined yet")
     finding = head.finding if head else None
-    if table != "caution" or not isinstance(finding, LeftOpen) or finding.contradiction or not _some_settled(finding):
+    if (
+        table != "caution"
+        or not is_one(finding, "validation.left_open")
+        or finding.contradiction
+        or not _some_settled(finding)
+    ):
         return "measure", tr("don't rely on it yet")
     return "plan", tr("plan only")
 
 
-def _some_settled(finding: LeftOpen) -> bool:
+def _some_settled(finding: Any) -> bool:
     """Whether independent documents settle any length or twist."""
     return any(part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry")
 

@@ -37,7 +37,7 @@ FOR_A_PERSON = (InputError, ResultError, WriteError, MemoryError, OSError, Impor
 class Compute(Protocol):
     """What a stage's ``compute.compute`` is: a robot's results from the study."""
 
-    def __call__(self, study: Study, name: str, /) -> Results[Any]: ...
+    def __call__(self, study: Study, name: str, /) -> Results: ...
 
 
 class View(Protocol):
@@ -85,7 +85,7 @@ def _with_inputs(summary: Summary, study: Study, name: str, stage: Stage) -> Sum
 MASSES = "inertia."
 
 
-def _computed(stage: Stage, study: Study, robot: str) -> Results[Any]:
+def _computed(stage: Stage, study: Study, robot: str) -> Results:
     try:
         if finding := stage.applies(study.robot(robot)):
             return AbsentResults(Summary(Verdict("not_computed", finding), ()))

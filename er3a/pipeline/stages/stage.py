@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.files.yaml_file import StrictModel
-from er3a.finding import AnyFinding
+from er3a.finding import Finding
 from er3a.numerics.jit import kernels_folder
 from er3a.robots.robot import Robot
 
@@ -49,7 +49,7 @@ class Stage:
     inputs: Callable[[StudyFiles, str], list[Path]] = lambda study, robot: []
     extra_inputs: Callable[[StudyFiles, str], dict[str, Any]] = lambda study, robot: {}
     is_configured: Callable[[StudyFiles, str], bool] = lambda study, robot: True
-    applies: Callable[[Robot], AnyFinding | None] = lambda robot: None
+    applies: Callable[[Robot], Finding | None] = lambda robot: None
     views: tuple[str, ...] = ("record", "report")
     rests_on: tuple[str, ...] = ()
     shows: tuple[str, ...] = ()

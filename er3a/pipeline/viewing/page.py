@@ -39,7 +39,7 @@ from er3a.pipeline.messages.numbers import (
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text, say_reserved
+from er3a.pipeline.messages.scope import assumed_text, check_name, covered_text, gap_text, never_text
 from er3a.pipeline.results import (
     AbsentResults,
     Provenance,
@@ -318,7 +318,7 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
     meant = len(getattr(verdict.finding, "demonstrations", ()))
     summary = stored.results.summary
-    found = say_reserved(verdict.finding, summary.assumed)
+    found = say(verdict.finding)
     text = joined([found, *listed(verdict.findings[1:])], " ")
     checked = tuple(
         (check_name(each.check), covered_text(each), joined([gap_text(gap, None) for gap in each.gaps], ", "))

@@ -23,7 +23,7 @@ from er3a.pipeline.scope import OF_MOTIONS, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, measured
+from er3a.pipeline.stages.trajectory.judgement import measured
 from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant, shown
@@ -110,7 +110,7 @@ def path_clearances(
         motion = entry.motion
         if motion is None:
             continue
-        along = measured(Surroundings(bodies, tolerance), motion)
+        along = measured(bodies, tolerance, motion)
         q = motion.joints(along.t)
         known = np.isfinite(along.distance)
         near = np.full((len(q), 2, 3), np.nan)
@@ -356,7 +356,7 @@ def _verdict(
     wrong: Finding | None,
     found: Finding,
     home: Finding | None,
-) -> Verdict[Finding]:
+) -> Verdict:
     if pairs.always.any():
         return Verdict(
             "fail", fact("collision.never_free", pairs=tuple(pairs.between[pairs.always]), assumed=found.shapes_assumed)

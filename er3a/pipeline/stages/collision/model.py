@@ -7,10 +7,9 @@ from typing import Literal
 
 from er3a.collision.matrix import PairState
 from er3a.collision.pairs import Pair
-from er3a.finding import Finding
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 
@@ -77,7 +76,6 @@ class CollisionSummary(Summary):
 
     needs = ("self_collision", "scene_collision", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     scene: str | None
     samples: int
     of_itself: FreeShare
@@ -109,7 +107,7 @@ class MatrixRows(Table):
 class PairShares(Table):
     """How often each pair overlaps among random joint vectors."""
 
-    between: Findings = findings("the two bodies", Pair)
+    between: Findings = findings("the two bodies")
     of_itself: Flags = column("whether both belong to the arm or to what it carries")
     ratio: Reals = column("share of the joint vectors in which they overlap")
     low: Reals = column("lower end of its 95 % interval")
@@ -150,9 +148,10 @@ class PathClearances(Table):
     to_mm: Reals = vector("to_{}_mm", "the nearest point of the second body")
 
 
-class CollisionResults(Results[CollisionSummary]):
+class CollisionResults(Results):
     """The stage's results."""
 
+    summary: CollisionSummary
     matrix: MatrixRows
     pairs: PairShares
     places: PlaceRows

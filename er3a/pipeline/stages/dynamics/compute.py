@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import get_args
+from typing import Literal
 
 import numpy as np
 
@@ -17,14 +17,13 @@ from er3a.dynamics.plausibility import MassFinding, has_mass, mass_findings
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.finding import Finding, fact, is_one
-from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
 from er3a.pipeline.scope import GAPS, OF_MOTIONS, Check, Coverage, Open, by_reason, coverages
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.trajectory.judgement import Surroundings, judge, measured, outcomes_of
+from er3a.pipeline.stages.trajectory.judgement import Judge, Judgement
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
@@ -33,13 +32,10 @@ from er3a.pipeline.stages.trajectory.motion import (
     study_motions,
 )
 from er3a.pipeline.study import Study
-from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict
 from er3a.planning.timing import JointLimits
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
-
-DynamicsVerdict = Verdict[Finding]
 
 
 def drive_uses(
@@ -75,7 +71,7 @@ def drive_uses(
     return tuple(found)
 
 
-def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[Finding, ...]:
+def unknowns(robot: Robot, of_load: Sequence[model.LoadPart | Literal["load"]]) -> tuple[Open, ...]:
     """What the files leave open of masses, drives and wrist.
 
     Parameters
@@ -84,46 +80,36 @@ def unknowns(robot: Robot, of_load: Sequence[model.Need]) -> tuple[Finding, ...]
 
     Returns
     -------
-    open : each kind of value once, with its joints or links; without numbers if it concerns all
+    open : each kind of value once, with its joints or links; without names if it concerns none of these
     """
-    drives, wrist, joints = drives_of(robot), robot.masses.wrist, range(1, robot.joints + 1)
-    links = tuple(link for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link)))
-    open_joints: dict[model.Need, tuple[int, ...]] = {
-        "masses": links,
-        "peak": _open(drives.peak),
-        "rated": _open(drives.rated),
-        "armature": _open(drives.armature),
+    drives, wrist = drives_of(robot), robot.masses.wrist
+    links = [str(link) for link in range(1, robot.rows + 1) if not has_mass(robot.masses.body(link))]
+    last = {joint for joint in range(1, robot.joints + 1)[-3:] if not robot.slides[joint - 1]}
+    joints: dict[str, Iterable[int]] = {
+        "peak_torques": _open(drives.peak),
+        "rated_torques": _open(drives.rated),
+        "rotor_inertias": _open(drives.armature),
         "friction": _open(drives.coulomb + drives.viscous),
+        "wrist_moments": last - {joint for joint, _ in (wrist.moment if wrist else ())},
+        "wrist_inertias": last - {joint for joint, _ in (wrist.inertia if wrist else ())},
     }
-    found = [
-        fact(
-            "dynamics.unknown",
-            what=what,
-            numbers=() if len(numbers) == (robot.rows if what == "masses" else robot.joints) else numbers,
-        )
-        for what, numbers in open_joints.items()
-        if numbers
-    ]
-    last = {joint for joint in joints[-3:] if not robot.slides[joint - 1]}
-    if wrist is None or not np.isfinite(wrist.payload):
-        found.append(fact("dynamics.unknown", what="payload", numbers=()))
-    asked: tuple[tuple[model.Need, set[int]], ...] = (
-        ("wrist_moment", last - {joint for joint, _ in (wrist.moment if wrist else ())}),
-        ("wrist_inertia", last - {joint for joint, _ in (wrist.inertia if wrist else ())}),
-    )
-    found += [fact("dynamics.unknown", what=what, numbers=tuple(sorted(missing))) for what, missing in asked if missing]
-    groups: tuple[tuple[model.Need, str], ...] = (("drives_guess", "drives"), ("wrist_guess", "wrist_load"))
-    found += [
-        fact("dynamics.unknown", what=what, numbers=()) for what, group in groups if _is_guess(robot.sources.get(group))
-    ]
-    return (*found, *(fact("dynamics.unknown", what=each, numbers=()) for each in of_load))
+    whole = {
+        "rated_payload": wrist is None or not np.isfinite(wrist.payload),
+        "drives_guess": _is_guess(robot.sources.get("drives")),
+        "wrist_guess": _is_guess(robot.sources.get("wrist_load")),
+        "load": bool(of_load),
+    }
+    found = {"link_masses": links} | {reason: [f"J{joint}" for joint in sorted(of)] for reason, of in joints.items()}
+    named = [Open(reason, tuple(names)) for reason, names in found.items() if names]
+    parts = {"load": tuple(part for part in of_load if part != "load")}
+    return (*named, *(Open(reason, parts.get(reason, ())) for reason, holds in whole.items() if holds))
 
 
 def _is_guess(source: Source | LoadFields | None) -> bool:
     return source is not None and source.grade == "inferred"
 
 
-def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
+def open_of_load(study: Study, name: str) -> tuple[model.LoadPart | Literal["load"], ...]:
     """What the study does not say of tool and payload, or guesses.
 
     Parameters
@@ -162,11 +148,11 @@ def verdict_of(
     holding: tuple[model.HoldingTorque, ...],
     uses: tuple[model.Use, ...],
     findings: tuple[MassFinding, ...],
-    unknown: tuple[Finding, ...],
+    unknown: tuple[Open, ...],
     masses: model.MassesUsed | None,
     *,
     skipped: tuple[str, ...] = (),
-) -> DynamicsVerdict:
+) -> Verdict:
     """The stage's answer, by what is asked for against what is allowed.
 
     Parameters
@@ -188,11 +174,11 @@ def verdict_of(
     shown = {"missing_links": missing, "doubts": doubts, "grade": grade}
     if not uses:
         if not holding:
-            return Verdict("no_reference", fact("dynamics.no_data", needs=unknown))
+            return Verdict("no_reference", fact("dynamics.no_data"))
         return Verdict("no_reference", _no_limits([path.summary for path in paths], holding).but(**shown))
     beyond = sum(use.ratio > 1 for use in uses)
     unsettled = sum(use.ratio <= 1 and use.upper > use.allowed for use in uses)
-    needs = tuple(each.what for each in unknown)
+    needs = tuple(each.reason for each in unknown)
     nothing_runs = not any(path.summary.counts for path in paths)
     not_run = (
         *skipped,
@@ -289,50 +275,24 @@ class PathTorques:
     imbalance: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class PathJudge:
-    """Says which paths may be run, as the trajectory stage does."""
-
-    robot: Robot
-    surroundings: Surroundings
-    near: NearSingular
-    limits: JointLimits
-
-    def judged(self, motion: Motion) -> tuple[tuple[PathVerdict, ...], bool]:
-        """What a motion came to, as the trajectory stage judges it, and whether it may be run.
-
-        Parameters
-        ----------
-        motion : of the arm, with its times
-
-        Returns
-        -------
-        outcomes : the first fault first
-        may_run : whether none of these forbids it, and joint speeds have a bound
-        """
-        found = judge(self.robot, motion, self.near, self.limits)
-        outcomes = outcomes_of(found, measured(self.surroundings, motion), float(motion.built.duration))
-        return outcomes, set(outcomes).isdisjoint(NOT_TO_BE_RUN) and found.speed_bounded
-
-
 def path_torques(
-    arm: LoadedArm, motion: Motion, judged: tuple[tuple[PathVerdict, ...], bool], samples: int, wrist: tuple[int, ...]
+    arm: LoadedArm, motion: Motion, judged: Judgement, samples: int, wrist: tuple[int, ...]
 ) -> PathTorques:
     """Torques of a path: its table at evenly spread times; peaks and means also where the path was solved and checked,
     and within pieces of it that are shorter than their steps.
 
     Parameters
     ----------
-    judged : what it came to, and whether it may be run
+    judged : what it came to
     wrist : joints whose moments by the load are wanted
     """
-    entry, n, (outcomes, runs) = motion.entry, arm.robot.joints, judged
+    entry, n = motion.entry, arm.robot.joints
     asked = set(entry.expected) <= {"safe"}
     t = np.linspace(0.0, motion.built.duration, samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
-        absent = model.PathLoad(entry.name, entry.title, outcomes, False, False, *nothing)
+        absent = model.PathLoad(entry.name, entry.title, judged.outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
@@ -348,8 +308,8 @@ def path_torques(
     summary = model.PathLoad(
         name=entry.name,
         title=entry.title,
-        outcomes=outcomes,
-        counts=runs,
+        outcomes=judged.outcomes,
+        counts=judged.may_run,
         complete=True,
         duration_s=float(t[-1]),
         joints=_joint_loads(arm.robot, t, parts, tolerance, needed),
@@ -543,7 +503,6 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
         gravity_m_s2=settings.gravity_m_s2,
         masses=masses,
         findings=findings,
-        unknown=unknown,
         payload_centre_mm=tuple(settings.payload_centre_mm),
         payload_gyration_mm=settings.payload_gyration_mm,
         paths=summaries,
@@ -556,7 +515,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
             *(each for each in rest if each.reason not in GAPS),
             *_mounting(study, name),
             *(() if study.scene(name, "trajectory") or not paths else (Open("open_space"),)),
-            *_assumed(robot, unknown),
+            *unknown,
         ),
     )
     followed = [path.rows for path in paths if path.demand]
@@ -625,42 +584,6 @@ def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: Dyn
     return coverages(asked, (each for each in gaps if each.reason in GAPS))
 
 
-def _assumed(
-    robot: Robot,
-    unknown: tuple[Finding, ...],
-) -> tuple[Open, ...]:
-    """What the files leave open, and paths that count for nothing."""
-    subjects: dict[model.Need, tuple[str, ...]] = {
-        "masses": ("link_masses",),
-        "peak": ("peak_torques",),
-        "rated": ("rated_torques",),
-        "armature": ("rotor_inertias",),
-        "friction": ("friction",),
-        "drives_guess": ("peak_torques", "rated_torques"),
-        "wrist_moment": ("wrist_limits",),
-        "wrist_inertia": ("wrist_limits",),
-        "wrist_guess": ("wrist_limits",),
-        "payload": ("wrist_limits",),
-        "load": ("load",),
-    }
-    names: dict[str, set[int]] = {}
-    parts = [each.what for each in unknown if each.what in get_args(model.LoadPart)]
-    for each in unknown:
-        if each.what in parts:
-            continue
-        everything = range(1, (robot.rows if each.what == "masses" else robot.joints) + 1)
-        whole = each.what in ("load", "payload", "wrist_guess")
-        for subject in subjects[each.what]:
-            names.setdefault(subject, set()).update(() if whole else each.numbers or everything)
-    found = [
-        Open(subject, tuple(f"{'' if subject == 'link_masses' else 'J'}{number}" for number in sorted(numbers)))
-        for subject, numbers in names.items()
-    ]
-    if parts:
-        found.append(Open("load", tuple(parts)))
-    return tuple(found)
-
-
 ON_EARTH = (9.76, 9.84)  # m/s^2, from the equator's mountains to the poles
 
 
@@ -678,15 +601,15 @@ def _paths(
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
-    surroundings = Surroundings(bodies, trajectory.penetration_tolerance_mm / 1000)
-    judge_of = PathJudge(study.robot(name), surroundings, near_singular(trajectory), arm.limits)
+    tolerance = trajectory.penetration_tolerance_mm / 1000
+    judge = Judge(bodies.robot, bodies, tolerance, near_singular(trajectory), arm.limits)
     found, skipped, rest = [], [], list[Open]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
         rest += each.open if each.meant_safe else ()
         if each.motion is None:
             skipped.append(each.name)
         else:
-            found.append(path_torques(arm, each.motion, judge_of.judged(each.motion), settings.samples, wrist))
+            found.append(path_torques(arm, each.motion, judge.judged(each.motion), settings.samples, wrist))
             if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
                 rest.append(Open("program_loads", (each.name,)))
     return found, tuple(skipped), by_reason(rest)

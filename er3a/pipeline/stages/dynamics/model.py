@@ -12,10 +12,9 @@ from typing import Literal, get_args
 
 from er3a.dynamics.margins import Binding, WristQuantity
 from er3a.dynamics.plausibility import MassFinding
-from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint
 from er3a.planning.names import PathVerdict
@@ -27,14 +26,7 @@ TORQUE, FORCE = get_args(Unit)
 EITHER = N_("N m or N")
 PARTS = ("gravity", "inertia", "velocity", "friction", "tool")
 Quantity = Literal["peak", "rms", "holding"] | WristQuantity
-Guess = Literal["drives_guess", "wrist_guess", "load_guess"]
-"""What is compared, and settles nothing, because its source is a guess."""
 LoadPart = Literal["tool", "carried", "load_centre", "load_inertia", "load_guess"]
-Need = (
-    Literal["masses", "peak", "rated", "armature", "friction", "wrist_moment", "wrist_inertia", "payload", "load"]
-    | LoadPart
-    | Guess
-)
 
 
 @dataclass(frozen=True)
@@ -281,11 +273,9 @@ class DynamicsSummary(Summary):
 
     needs = ("torque", "limits", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     gravity_m_s2: float
     masses: MassesUsed | None
     findings: tuple[MassFinding, ...]
-    unknown: tuple[Finding, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
     paths: tuple[PathLoad, ...]
@@ -311,9 +301,10 @@ class TorqueRows(Table):
     power_w: Reals = per_joint("power of the drive", heading=N_("drive power"))
 
 
-class DynamicsResults(Results[DynamicsSummary]):
+class DynamicsResults(Results):
     """Summary and tables of the stage."""
 
+    summary: DynamicsSummary
     torques: TorqueRows
 
 

@@ -474,7 +474,7 @@ def _is_certain(method: Method) -> bool:
 
 def _verdict(
     targets: Sequence[model.TargetResult], worst: tuple[float, float], trips: BatchRoundTrips | None, collisions: bool
-) -> Verdict[Finding]:
+) -> Verdict:
     position, orientation = worst
     lost = trips.poses - trips.own_found if trips else 0
     if lost or position > REPRODUCED_M or orientation > REPRODUCED_RAD:
@@ -492,9 +492,8 @@ def _verdict(
     )
     singular = tuple(each.name for each in asked if any(is_one(it, "at_singularity") for it in each.advice))
     solved = len(asked) - len(unsolved)
-    code = "inverse.some_unsolved" if solved else "inverse.none_solved"
     found = fact(
-        code if unsolved else "inverse.all_solved",
+        "inverse.targets",
         targets=len(asked),
         solved=solved,
         unsolved=unsolved,

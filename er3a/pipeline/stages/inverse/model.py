@@ -12,9 +12,9 @@ from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.selection.nearest import Refusal, WhyFirst, WhyNone
+from er3a.selection.nearest import WhyFirst, WhyNone
 from er3a.selection.rule_names import RuleName
 
 Obstacle = Finding
@@ -164,7 +164,6 @@ class InverseSummary(Summary):
 
     needs = ("reach", "limits", "self_collision", "scene_collision")
 
-    verdict: Verdict[Finding]
     mix: dict[RuleName, float]
     scene: str | None
     turns: bool
@@ -183,7 +182,7 @@ class SolutionRows(Table):
     q_deg: Reals = per_joint("joint angle")
     turn: Integers = per_joint("full turns added to the angle in (-180, 180]")
     within_limits: Flags = column("whether all joints are within their limits")
-    refusal: Findings = findings("which limits are left, or what overlaps; none for admissible solutions", Refusal)
+    refusal: Findings = findings("which limits are left, or what overlaps; none for admissible solutions")
     rank: Integers = column("1 is the chosen one; 0 for refused ones")
     first_of_branch: Flags = column("whether it is the branch's best")
     position_residual_mm: Reals = column("by how much forward kinematics misses the target")
@@ -212,9 +211,10 @@ class RankingRows(Table):
     between: Texts = column("of the rule clearance, what is nearest to what")
 
 
-class InverseResults(Results[InverseSummary]):
+class InverseResults(Results):
     """The stage's results."""
 
+    summary: InverseSummary
     solutions: SolutionRows
     rankings: RankingRows
 

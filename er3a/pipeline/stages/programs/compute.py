@@ -10,7 +10,7 @@ import numpy as np
 from er3a.collision.along import bodies_of
 from er3a.collision.shapes import shapes_assumed
 from er3a.files.program_file import ProgramEntry, ProgramsFile, load_programs
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import fact, is_one
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.results import Figure, Status, Verdict
@@ -232,7 +232,7 @@ def _motion(name: str, check: ProgramCheck, robot: Robot) -> tuple[model.Program
 
 def _verdict(
     programs: list[model.ProgramSummary],
-) -> Verdict[Finding]:
+) -> Verdict:
     if not programs:
         return Verdict("no_reference", fact("programs.none"))
     if unmet := unmet_expectations(programs, "pass"):

@@ -9,7 +9,7 @@ from typing import Any
 
 from er3a.finding import Finding
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.program_check.check_program import CycleTime, LocatedFinding
@@ -103,7 +103,6 @@ class ProgramsSummary(Summary):
 
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     scene: str | None
     assumed_speed: tuple[bool, ...]
     programs: tuple[ProgramSummary, ...]
@@ -141,9 +140,10 @@ class ProgramMotion(Table):
     xyz_mm: Reals = vector("{}_mm", "tool point in the base frame")
 
 
-class ProgramsResults(Results[ProgramsSummary]):
+class ProgramsResults(Results):
     """Summary and tables of the stage."""
 
+    summary: ProgramsSummary
     lines: Lines
     instructions: Instructions
     motion: ProgramMotion

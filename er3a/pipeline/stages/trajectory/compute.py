@@ -43,7 +43,7 @@ from er3a.pipeline.study import Study
 from er3a.planning.avoidance.avoidance import SingularSegment, singular_segment
 from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, best, compare_strategies, deviation
 from er3a.planning.motion_faults import Interval, SingularEvent
-from er3a.planning.names import PathVerdict, StrategyName
+from er3a.planning.names import PATH_VERDICTS, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
 from er3a.planning.way_around import PlanningTask, WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
@@ -80,15 +80,22 @@ class AvoidanceTask:
     only : the strategy that the study asks for; None to compare all
     """
 
-    robot: Robot
-    near: NearSingular
-    limits: JointLimits
+    judge: judgement.Judge
     only: StrategyName | None
-    surroundings: judgement.Surroundings
     planning: PlanningTask
     margin: float
 
-    def avoid(self, motion: Motion, found: judgement.Judgement, along: ClearanceAlong) -> Avoided:
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+        return self.judge.robot
+
+    @property
+    def limits(self) -> JointLimits:
+        """Its rates' limits."""
+        return self.judge.limits
+
+    def avoid(self, motion: Motion, found: judgement.Judgement) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
 
         A strategy on whose motion the arm meets its surroundings or itself is not usable. Where the path keeps the
@@ -100,16 +107,16 @@ class AvoidanceTask:
             quickest, results = self._joint_move(motion, found)
         else:
             fixed_start = motion.built.q_start is not None
-            segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
+            segment = singular_segment(motion.followed, self.judge.near, self.limits, found.events, fixed_start)
             quickest = _quickest(segment)
-            if found.verdict != "safe":
+            if found.of_joints != "safe":
                 results = compare_strategies(
                     replace(segment, limits=self._no_more_than(found), allowed=self.limits), self.only
                 )
-        collides = bool(along.contacts)
+        collides = bool(found.along.contacts)
         if (collides or found.beyond or found.limits) and motion.not_planned is None and self.only in (None, "planned"):
             results += self._planned(motion)
-        margin, name = self._margin_of(along), motion.entry.name
+        margin, name = self._margin_of(found.along), motion.entry.name
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
@@ -177,9 +184,7 @@ class AvoidanceTask:
         nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
-        along = clearance_along(
-            self.surroundings.bodies, curve.joints, curve.rate_bounds, grid, grid, self.surroundings.tolerance
-        )
+        along = clearance_along(self.judge.bodies, curve.joints, curve.rate_bounds, grid, grid, self.judge.tolerance)
         smallest = judgement.min_clearance(along)
         if smallest is None:
             return None, None
@@ -302,7 +307,6 @@ def path_summary(
     task: AvoidanceTask,
     motion: Motion,
     found: judgement.Judgement,
-    along: ClearanceAlong,
     avoided: Avoided,
     assumed_margin: float,
 ) -> model.PathSummary:
@@ -310,20 +314,19 @@ def path_summary(
 
     Parameters
     ----------
-    found : its faults by the joints
-    along : its clearance
+    found : its faults
     avoided : what was tried where it is not safe
     assumed_margin : m, by how much assumed shapes of the arm may be wrong
 
     Returns
     -------
-    summary : in mm, deg and s; its verdict is the gravest of its own and "collides"
+    summary : in mm, deg and s
     """
     robot, limits = task.robot, task.limits
     followed, entry = motion.followed, motion.entry
     labels = branch_labels(robot) if has_branches(robot) else ()
     slots = [] if followed is None else [int(slot) for slot in dict.fromkeys(followed.slot) if slot >= 0]
-    contacts = judgement.collisions(robot, along, assumed_margin)
+    contacts = judgement.collisions(robot, found.along, assumed_margin)
     speed, acceleration = found.max_rates or (None, None)
     missed_mm, missed_deg = corner_misses(robot, motion.built)
     return model.PathSummary(
@@ -331,7 +334,8 @@ def path_summary(
         title=entry.title,
         kind=entry.kind,
         times_in=times_in(entry),
-        verdict=judgement.verdict_of(found, along),
+        verdict=found.verdict,
+        outcomes=found.outcomes,
         expect=entry.expected,
         in_joint_space=followed is None,
         duration_s=float(motion.built.duration),
@@ -358,7 +362,7 @@ def path_summary(
         max_joint_acceleration_ratio=_ratio(acceleration, limits.acceleration),
         joint_speed_bounded=found.speed_bounded,
         collisions=_stretches(motion, contacts),
-        clearance=judgement.min_clearance(along),
+        clearance=judgement.min_clearance(found.along),
         not_planned=motion.not_planned,
         fastest_s=avoided.fastest_s,
         avoidance=avoided.tried,
@@ -386,7 +390,7 @@ def _singularity(event: SingularEvent) -> model.Singularity:
     )
 
 
-def _stretches(motion: Motion, intervals: Iterable[Interval[model.CauseT]]) -> tuple[model.Stretch[model.CauseT], ...]:
+def _stretches(motion: Motion, intervals: Iterable[Interval[Finding]]) -> tuple[model.Stretch, ...]:
     """Intervals in time and on the tool point's way."""
     found = []
     for interval in intervals:
@@ -409,14 +413,13 @@ def _judged(
     task: AvoidanceTask, each: ListedMotion, motion: Motion, settings: TrajectorySettings, assumed_margin: float
 ) -> JudgedPath:
     """A path with its faults, what avoids them, and its programs; ``assumed_margin``: m, around assumed shapes."""
-    robot, limits, surroundings = task.robot, task.limits, task.surroundings
-    found = judgement.judge(robot, motion, task.near, limits)
-    along = judgement.measured(surroundings, motion)
-    avoided = task.avoid(motion, found, along)
-    checks = _checks(robot, motion, found, task.near, limits)
+    robot, limits = task.robot, task.limits
+    found = task.judge.judged(motion)
+    avoided = task.avoid(motion, found)
+    checks = _checks(robot, motion, found, task.judge.near, limits)
     path = replace(
-        path_summary(task, motion, found, along, avoided, assumed_margin),
-        clear_until=judgement.last_safe_stop(surroundings, motion, found, along, task.margin, limits.acceleration),
+        path_summary(task, motion, found, avoided, assumed_margin),
+        clear_until=judgement.last_safe_stop(task.judge, motion, found, task.margin),
         of_program=tuple(map(finding_at, each.found)),
     )
     path = replace(path, sound_end=judgement.advised_end(path, checks, _limits_used(robot, limits, settings)))
@@ -424,7 +427,7 @@ def _judged(
     close = near_assumed_shapes(robot, each.name, path.clearance, assumed_margin)
     asked = settings.programs, settings.write_unsafe
     programs = program_files(robot, motion, path.verdict, *asked, near=close, repaired=repair, speed=limits.speed)
-    return JudgedPath(path, checks, judgement.clearance_rows(each.name, along), avoided.rows, programs)
+    return JudgedPath(path, checks, judgement.clearance_rows(each.name, found.along), avoided.rows, programs)
 
 
 def compute(study: Study, name: str) -> model.TrajectoryResults:
@@ -435,11 +438,12 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     robot, settings = study.robot(name), study.section(TrajectorySettings)
     near, limits = near_singular(settings), limits_of(robot, settings)
     scene, assumed_margin = study.scene(name, "trajectory"), study.assumed_margin(name)
-    surroundings = judgement.Surroundings(Bodies(robot, scene), settings.penetration_tolerance_mm / 1000)
+    tolerance = settings.penetration_tolerance_mm / 1000
+    judge = judgement.Judge(robot, Bodies(robot, scene), tolerance, near, limits)
     only = None if settings.avoidance == "compare" else settings.avoidance
-    planning = planning_of(robot, settings, surroundings.bodies, study.seed)
-    margin = (assumed_margin if arm_shapes(robot).assumed else surroundings.tolerance) + ROUNDED
-    task = AvoidanceTask(robot, near, limits, only, surroundings, planning, margin)
+    planning = planning_of(robot, settings, judge.bodies, study.seed)
+    margin = (assumed_margin if arm_shapes(robot).assumed else tolerance) + ROUNDED
+    task = AvoidanceTask(judge, only, planning, margin)
     listed = list(listed_motions(Path(study.entry(name).paths), planning, near, settings.checks_per_sample))
     judged = [_judged(task, each, each.motion, settings, assumed_margin) for each in listed if each.motion]
     checks = model.PathChecks.stacked([each.checks for each in judged]).of_joints(robot.slides)
@@ -464,7 +468,7 @@ def _summary(
     assumed_margin: float,
 ) -> model.TrajectorySummary:
     """The stage's answer, its paths, and what it did not look at."""
-    robot, limits, bodies = task.robot, task.limits, task.surroundings.bodies
+    robot, limits, bodies = task.robot, task.limits, task.judge.bodies
     skipped = [_not_followed(robot, each) for each in listed if each.motion is None]
     safe = [each for each in listed if each.meant_safe]
     turned = [asked for each in safe if each.motion for asked in _asked_of_tool(each.name, each.motion)]
@@ -564,39 +568,31 @@ def _checks(
     )
 
 
-def _verdict(
-    paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: Finding | None
-) -> Verdict[Finding]:
+def _verdict(paths: list[model.PathSummary], skipped: list[model.PathNotFollowed], shapes: Finding | None) -> Verdict:
     if unmet := unmet_expectations([*paths, *skipped], "safe"):
         return Verdict("fail", unmet)
     asked = [path for path in paths if path.meant_safe]
     unfollowed = [path for path in skipped if not path.expect]
 
-    def named(verdict: PathVerdict) -> tuple[str, ...]:
-        return tuple(path.name for path in asked if path.verdict == verdict)
-
+    by_verdict: dict[PathVerdict, list[str]] = {}
+    for path in asked:
+        by_verdict.setdefault(path.verdict, []).append(path.name)
     safe, count = sum(model.is_safe(path, shapes) for path in asked), len(asked) + len(unfollowed)
-    code = "trajectory.safe" if safe == count else "trajectory.some_unsafe" if safe else "trajectory.none_safe"
     failed = any(path.fails for path in asked) or any(path.stops_at_s is not None for path in unfollowed)
-    status: Status = (
-        pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed or not named("safe") else "caution"
+    failed |= not by_verdict.get("safe")
+    status: Status = pass_of([*asked, *unfollowed]) if safe == count else "fail" if failed else "caution"
+    found = [each for each in PATH_VERDICTS if each != "safe" and each in by_verdict]
+    of_program = tuple(path.name for path in asked if path.verdict == "safe" and path.of_program)
+    counts = fact(
+        "trajectory.paths",
+        paths=count,
+        safe=safe,
+        faults=tuple(fact("paths_of", outcome=each, names=tuple(by_verdict[each])) for each in found),
+        not_followed=tuple(path.name for path in unfollowed),
+        of_program=of_program,
+        near_assumed=len(by_verdict.get("safe", ())) - safe - len(of_program),
+        demonstrations=demonstrations([*paths, *skipped], "safe"),
     )
-    judged: list[model.PathSummary | model.PathNotFollowed] = [*paths, *skipped]
-    unsafe = {
-        "unreachable": named("unreachable"),
-        "none_found": named("none found"),
-        "leaves_limits": named("leaves limits"),
-        "collides": named("collides"),
-        "too_fast": named("too fast"),
-        "singular": named("singular"),
-        "too_fast_if_assumed": named("too fast for the assumed limits"),
-        "undecided": named("undecided"),
-        "near_singular": named("near-singular"),
-        "not_followed": tuple(path.name for path in unfollowed),
-        "of_program": tuple(path.name for path in asked if path.verdict == "safe" and path.of_program),
-    }
-    near, shown = count - safe - sum(map(len, unsafe.values())), demonstrations(judged, "safe")
-    counts = fact(code, paths=count, safe=safe, near_assumed=near, demonstrations=shown, **unsafe)
     return Verdict(status, counts)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.motion import Motion
 from er3a.planning import motion_faults
-from er3a.planning.names import PathVerdict, gravest
+from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
@@ -33,133 +33,172 @@ SPEED_MARGIN = 0.9  # of a joint's speed limit; these four are chosen, no standa
 STOPS = 2.0  # times the time that the joints take to stop, left before the first fault
 
 
-@dataclass(frozen=True, eq=False)
-class Faults:
-    """Faults of a motion by its joints, collisions apart.
-
-    Attributes
-    ----------
-    fast : where a joint exceeds a limit of speed, acceleration or jerk
-    undecided : where the bounds leave something open
-    max_rates : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
-    """
-
-    events: list[motion_faults.SingularEvent]
-    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
-    fast: list[motion_faults.Interval[motion_faults.RateCause]]
-    undecided: list[motion_faults.Interval[Finding]]
-    max_rates: tuple[Reals, Reals] | None
+AT_EDGE, AROUND_EDGE = 0.001, 0.1
+"""Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
+joints may be too fast because of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement(Faults):
+class Judgement:
     """A motion's faults and the verdict that they make.
 
     Attributes
     ----------
+    verdict : the gravest; of_joints : the gravest where bodies are passed over
+    outcomes : all that it came to, the first fault first
+    fast : where a joint exceeds a limit of speed, acceleration or jerk
+    undecided : where the bounds leave something open
     beyond : where no branch reaches the pose
+    along : its clearance
+    max_rates : maximum speeds (n,), rad/s, and accelerations (n,), rad/s^2, if any are known
     times, q, velocity, acceleration : (N,) s and (N, n) in rad, rad/s, rad/s^2 at all points of the table
     speed_bounded : False where the exact path needs a joint speed without bound
     """
 
     verdict: PathVerdict
+    of_joints: PathVerdict
+    outcomes: tuple[PathVerdict, ...]
+    events: list[motion_faults.SingularEvent]
+    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
+    fast: list[motion_faults.Interval[motion_faults.RateCause]]
+    undecided: list[motion_faults.Interval[Finding]]
     beyond: list[motion_faults.Interval[Finding]]
+    along: ClearanceAlong
+    max_rates: tuple[Reals, Reals] | None
     times: Reals
     q: Reals
     velocity: Reals
     acceleration: Reals
     speed_bounded: bool
 
+    @property
+    def may_run(self) -> bool:
+        """Whether nothing that it came to forbids to run it, and joint speeds have a bound."""
+        return set(self.outcomes).isdisjoint(NOT_TO_BE_RUN) and self.speed_bounded
 
-def judge(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Judgement:
-    """Check a motion, whatever made it: its polynomials, exactly.
 
-    Parameters
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """What motions of an arm are judged by, for all stages and programs.
+
+    Attributes
     ----------
+    bodies : that must not meet; tolerance : m, the overlap that may go unnoticed
     near : distances below which a pass counts as near-singular
-    """
-    found = faults_of(robot, motion, near, limits)
-    times = np.unique(np.concatenate([motion.checks, [event.t for event in found.events]]))
-    q, velocity, acceleration = motion.rates(times)
-    beyond = motion_faults.unreachable(robot, motion.followed) if motion.followed else []
-    jumps = motion.followed.jumps if motion.followed else ()
-    edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
-    bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
-    return Judgement(
-        **vars(found) | ({} if bounded else {"max_rates": None}),
-        verdict="none found"
-        if motion.not_planned
-        else _verdict(found, bool(beyond), bool(jumps), motion.followed is not None),
-        beyond=beyond,
-        times=times,
-        q=q,
-        velocity=velocity,
-        acceleration=acceleration,
-        speed_bounded=bool(bounded),
-    )
-
-
-def _verdict(found: Faults, beyond: bool, jumps: bool, of_tool: bool) -> PathVerdict:
-    known = [part for part in found.fast if part.cause.basis != "assumed"]
-    faults: dict[PathVerdict, object] = {
-        "unreachable": beyond,
-        "leaves limits": found.limits,
-        "too fast": known,
-        "singular": of_tool and (jumps or any(event.crossing for event in found.events)),
-        "too fast for the assumed limits": found.fast,
-        "undecided": found.undecided,
-        "near-singular": of_tool and found.events,
-    }
-    return gravest(verdict for verdict, there in faults.items() if there)
-
-
-def faults_of(robot: Robot, motion: Motion, near: NearSingular, limits: JointLimits) -> Faults:
-    """The faults of the motion's polynomials, collisions left out.
-
-    Parameters
-    ----------
-    near : distances below which a pose is near-singular
     limits : of speeds and accelerations, rad or m
-
-    Returns
-    -------
-    faults : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
     """
-    curve, followed = motion.curve, motion.followed
-    events = motion_faults.singular_events(robot, curve, near)
-    ends = followed and (followed.jumps or np.isnan(followed.q).any() or any(event.crossing for event in events))
-    known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
-    return Faults(
-        events=events,
-        limits=motion_faults.limit_intervals(robot, curve),
-        fast=[part for limit in limits.rates for part in motion_faults.rate_intervals(curve, limit)],
-        undecided=[] if ends else open_stretches(curve),
-        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known else None,
-    )
 
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What motions must not meet: bodies, and the overlap (m) that may go unnoticed."""
-
+    robot: Robot
     bodies: Bodies
     tolerance: float
+    near: NearSingular
+    limits: JointLimits
+
+    def judged(self, motion: Motion, along: ClearanceAlong | None = None) -> Judgement:
+        """Check a motion, whatever made it: its polynomials, exactly.
+
+        Parameters
+        ----------
+        motion : of the arm, with its times
+        along : its clearance, if that has been measured
+
+        Returns
+        -------
+        found : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
+        """
+        curve, followed = motion.curve, motion.followed
+        events = motion_faults.singular_events(self.robot, curve, self.near)
+        crossed, jumps = any(event.crossing for event in events), followed.jumps if followed else ()
+        ends = followed is not None and (jumps or np.isnan(followed.q).any() or crossed)
+        times = np.unique(np.concatenate([motion.checks, [event.t for event in events]]))
+        q, velocity, acceleration = motion.rates(times)
+        beyond = motion_faults.unreachable(self.robot, followed) if followed else []
+        edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
+        bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
+        known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
+        limits = motion_faults.limit_intervals(self.robot, curve)
+        fast = [part for limit in self.limits.rates for part in motion_faults.rate_intervals(curve, limit)]
+        undecided = [] if ends else open_stretches(curve)
+        along = along or measured(self.bodies, self.tolerance, motion)
+        spans: dict[PathVerdict, list[tuple[float, float]]] = {
+            "unreachable": [(part.start, part.end) for part in beyond],
+            "leaves limits": [(part.start, part.end) for part in limits],
+            "collides": [(contact.start, contact.end) for contact in along.contacts],
+            "too fast": [(part.start, part.end) for part in fast if part.cause.basis != "assumed"],
+        }
+        faults: dict[PathVerdict, object] = {
+            **spans,
+            "none found": motion.not_planned,
+            "singular": followed and (jumps or crossed),
+            "too fast for the assumed limits": fast,
+            "undecided": undecided,
+            "near-singular": followed and events,
+        }
+        there = [name for name, found in faults.items() if found]
+        verdict = gravest(there)
+        return Judgement(
+            verdict=verdict,
+            of_joints=gravest(name for name in there if name != "collides"),
+            outcomes=in_order(verdict, spans, float(motion.built.duration)),
+            events=events,
+            limits=limits,
+            fast=fast,
+            undecided=undecided,
+            beyond=beyond,
+            along=along,
+            max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known and bounded else None,
+            times=times,
+            q=q,
+            velocity=velocity,
+            acceleration=acceleration,
+            speed_bounded=bool(bounded),
+        )
 
 
-def measured(surroundings: Surroundings, motion: Motion) -> ClearanceAlong:
+def in_order(
+    verdict: PathVerdict, spans: Mapping[PathVerdict, Sequence[tuple[float, float]]], duration: float
+) -> tuple[PathVerdict, ...]:
+    """A path's verdict and whatever else makes it a fail by itself, the first fault first.
+
+    Where a path leaves the reach it is too fast at any pace, so that follows from being unreachable. Where no motion
+    was planned, only collisions of the straight move are told.
+
+    Parameters
+    ----------
+    spans : from when to when (s) it has each fault: ``unreachable``, and what can stand beside a verdict
+    duration : s, of the whole path
+    """
+    edges = [edge for span in spans["unreachable"] for edge in span]
+    besides: dict[PathVerdict, list[float]] = {name: [start for start, _ in found] for name, found in spans.items()}
+    besides["too fast"] = [span[0] for span in spans["too fast"] if not _by_the_edge(span, edges, duration)]
+    if verdict == "none found":
+        besides = {"collides": besides["collides"]}
+    starts = {name: min(found) for name, found in besides.items() if found}
+    starts.setdefault(verdict, 0.0)
+    return tuple(sorted((verdict, *(name for name in starts if name != verdict)), key=starts.__getitem__))
+
+
+def _by_the_edge(span: tuple[float, float], edges: Iterable[float], duration: float) -> bool:
+    """Whether a stretch of time (s) runs up to the edge of the reach, or begins there, and is short."""
+    start, end = span
+    at, around = AT_EDGE * duration, AROUND_EDGE * duration
+    return any(
+        start <= edge + at and end >= edge - at and start >= edge - around and end <= edge + around for edge in edges
+    )
+
+
+def measured(bodies: Bodies, tolerance: float, motion: Motion) -> ClearanceAlong:
     """Clearance along a motion, proven between the points that are measured, and given at its samples.
 
     Parameters
     ----------
-    surroundings : bodies, and the overlap (m) that may go unnoticed
+    tolerance : m, the overlap that may go unnoticed
 
     Returns
     -------
     along : distances in m, negative by the depth of an overlap
     """
-    return clearance_along(
-        surroundings.bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, surroundings.tolerance
-    )
+    return clearance_along(bodies, motion.joints, motion.rate_bounds, motion.t, motion.samples, tolerance)
 
 
 def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motion_faults.Interval[Finding]]:
@@ -197,39 +236,6 @@ def collisions(robot: Robot, along: ClearanceAlong, margin: float) -> list[motio
     ]
 
 
-def verdict_of(found: Judgement, along: ClearanceAlong) -> PathVerdict:
-    """The gravest verdict on a motion, collisions included.
-
-    Parameters
-    ----------
-    found : its faults by the joints
-    along : its clearance
-    """
-    return gravest([found.verdict, "collides"] if along.contacts else [found.verdict])
-
-
-def outcomes_of(found: Judgement, along: ClearanceAlong, duration: float) -> tuple[PathVerdict, ...]:
-    """All that a motion came to, as :func:`er3a.pipeline.stages.trajectory.model.in_order` names it.
-
-    Parameters
-    ----------
-    found : its faults by the joints; speeds beyond assumed limits do not count
-    along : its clearance
-    duration : s, of the motion
-
-    Returns
-    -------
-    outcomes : the first fault first
-    """
-    spans: dict[PathVerdict, list[tuple[float, float]]] = {
-        "unreachable": [(part.start, part.end) for part in found.beyond],
-        "leaves limits": [(part.start, part.end) for part in found.limits],
-        "collides": [(contact.start, contact.end) for contact in along.contacts],
-        "too fast": [(part.start, part.end) for part in found.fast if part.cause.basis != "assumed"],
-    }
-    return model.in_order(verdict_of(found, along), spans, duration)
-
-
 def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     """Where the arm comes nearest to anything.
 
@@ -247,26 +253,19 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-def last_safe_stop(
-    surroundings: Surroundings,
-    motion: Motion,
-    found: Judgement,
-    along: ClearanceAlong,
-    margin: float,
-    acceleration: Reals,
-) -> model.ClearUntil | None:
+def last_safe_stop(judge: Judge, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
     """The last point from which a motion still stops with a margin (m) kept; None if it meets nothing, or keeps it
-    nowhere. ``acceleration``: of the joints (n,), rad/s^2.
+    nowhere.
 
     The end of the margin is searched for on a grid up to the first contact, or to where the motion leaves limits or
     reach, and proven: where the clearance along the motion up to it is less, it is moved back. Of links that touch by
     design at their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first
     distance.
     """
-    if not along.contacts:
+    contacts, bodies, acceleration = found.along.contacts, judge.bodies, judge.limits.acceleration
+    if not contacts:
         return None
-    bodies, robot, first = surroundings.bodies, surroundings.bodies.robot, along.contacts[0].start
-    met = {pair for contact in along.contacts for pair in contact.pairs}
+    first, met = contacts[0].start, {pair for contact in contacts for pair in contact.pairs}
     joined = np.array([k for k, pair in enumerate(bodies.pairs) if bodies.joined[k] and pair in met], int)
 
     def apart(t: Reals) -> Reals:
@@ -282,7 +281,7 @@ def last_safe_stop(
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
     last = min([first, *(BEFORE_STOP * stop for stop in stops)])
-    kept_to = _margin_end(surroundings, motion, beyond, last, margin)
+    kept_to = _margin_end(judge, motion, beyond, last, margin)
     if kept_to is None:
         return None
     end = kept_to
@@ -301,13 +300,13 @@ def last_safe_stop(
         float(motion.way(np.array([end]))[0]),
         tuple((1000 * pose[:3, 3]).tolist()),
         tuple(np.degrees(rpy_of(pose)).tolist()),
-        tuple(shown(robot, q[0]).tolist()),
+        tuple(shown(judge.robot, q[0]).tolist()),
         tuple((1000 * touching).tolist()),
     )
 
 
 def _margin_end(
-    surroundings: Surroundings, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
+    judge: Judge, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
 ) -> float | None:
     """Up to when (s, ``last`` at most) a motion keeps a margin (m), proven; None if nowhere.
 
@@ -323,10 +322,8 @@ def _margin_end(
         if k > 0:
             end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * last)
         known = np.append(motion.t[motion.t < end], end)
-        until = clearance_along(
-            surroundings.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], surroundings.tolerance
-        )
-        short = until.distance < margin - surroundings.tolerance
+        until = clearance_along(judge.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], judge.tolerance)
+        short = until.distance < margin - judge.tolerance
         if not short.any():
             return float(end)
         end = float(until.t[int(np.argmax(short))])

@@ -5,23 +5,21 @@ Times count from a path's start, ways along the tool point's path. Angles are th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import Literal
 
 from er3a.collision.pairs import Pair
-from er3a.finding import AnyFinding, Finding
+from er3a.finding import Finding
 from er3a.kinematics.classes.class_solvers import BranchLabel
 from er3a.kinematics.singularity import EventType
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.planning.avoidance.strategies import NotUsable
-from er3a.planning.motion_faults import LimitCause, RateCause
 from er3a.planning.names import FAULTS, PathVerdict, StrategyName
 from er3a.planning.way_around import NoWayAround
 
@@ -29,12 +27,6 @@ PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table"
 TimesIn = Literal["path_file", "table", "program"]
 FASTEST: Literal["fastest"] = "fastest"
 """In the table of strategies: the path itself, as fast as the joints can."""
-
-AT_EDGE, AROUND_EDGE = 0.001, 0.1
-"""Shares of a path's duration: how near to the edge of the reach counts as at it, and how long before or after it
-joints may be too fast because of it."""
-
-CauseT = TypeVar("CauseT", bound=AnyFinding)
 
 
 @dataclass(frozen=True)
@@ -103,7 +95,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class Stretch(Generic[CauseT]):
+class Stretch:
     """A stretch of a path, in time and along its way, on which something is wrong; and when it is worst, where that has
     a value."""
 
@@ -111,7 +103,7 @@ class Stretch(Generic[CauseT]):
     t1_s: float
     s0_m: float
     s1_m: float
-    cause: CauseT
+    cause: Finding
     worst_s: float | None = None
 
 
@@ -210,6 +202,7 @@ class PathSummary:
 
     Attributes
     ----------
+    outcomes : all that it came to, the first fault first
     expect : what its file expects
     in_joint_space : whether it is a move of the joints, which singular poses do no harm
     branches : of the closed form, in the order in which they serve
@@ -234,6 +227,7 @@ class PathSummary:
     title: str
     kind: PathKind
     verdict: PathVerdict
+    outcomes: tuple[PathVerdict, ...]
     expect: tuple[PathVerdict, ...]
     in_joint_space: bool
     duration_s: float
@@ -246,16 +240,16 @@ class PathSummary:
     repeated_rows: tuple[int, ...]
     start_turn_deg: tuple[float, ...] | None
     singularities: tuple[Singularity, ...]
-    unreachable: tuple[Stretch[Finding], ...]
-    out_of_limits: tuple[Stretch[LimitCause], ...]
-    too_fast: tuple[Stretch[RateCause], ...]
-    undecided: tuple[Stretch[Finding], ...]
+    unreachable: tuple[Stretch, ...]
+    out_of_limits: tuple[Stretch, ...]
+    too_fast: tuple[Stretch, ...]
+    undecided: tuple[Stretch, ...]
     jumps: tuple[Jump, ...]
     max_joint_speed_deg_s: tuple[float, ...] | None
     max_joint_speed_ratio: float | None
     max_joint_acceleration_ratio: float | None
     joint_speed_bounded: bool
-    collisions: tuple[Stretch[Finding], ...]
+    collisions: tuple[Stretch, ...]
     clearance: MinClearance | None
     not_planned: NoWayAround | None
     fastest_s: float | None
@@ -284,19 +278,6 @@ class PathSummary:
         return set(self.expect) <= {"safe"}
 
     @property
-    def outcomes(self) -> tuple[PathVerdict, ...]:
-        """All that it came to, as :func:`in_order` names it."""
-        known = [part for part in self.too_fast if part.cause.basis != "assumed"]
-        faults: dict[PathVerdict, Sequence[Stretch[Any]]] = {
-            "unreachable": self.unreachable,
-            "leaves limits": self.out_of_limits,
-            "collides": self.collisions,
-            "too fast": known,
-        }
-        spans = {name: [(part.t0_s, part.t1_s) for part in parts] for name, parts in faults.items()}
-        return in_order(self.verdict, spans, self.duration_s)
-
-    @property
     def fails(self) -> bool:
         """Whether it can't be run as it is: it is at fault, no joints follow it, or its program fails. Only bodies that
         touch for certain are a fault."""
@@ -310,38 +291,6 @@ class PathSummary:
     def chosen(self) -> TriedStrategy | None:
         """The strategy to take."""
         return next((tried for tried in self.avoidance if tried.name == self.strategy), None)
-
-
-def in_order(
-    verdict: PathVerdict, spans: Mapping[PathVerdict, Sequence[tuple[float, float]]], duration: float
-) -> tuple[PathVerdict, ...]:
-    """A path's verdict and whatever else makes it a fail by itself, the first fault first.
-
-    Where a path leaves the reach it is too fast at any pace, so that follows from being unreachable. Where no motion
-    was planned, only collisions of the straight move are told.
-
-    Parameters
-    ----------
-    spans : from when to when (s) it has each fault: ``unreachable``, and what can stand beside a verdict
-    duration : s, of the whole path
-    """
-    edges = [edge for span in spans["unreachable"] for edge in span]
-    besides: dict[PathVerdict, list[float]] = {name: [start for start, _ in found] for name, found in spans.items()}
-    besides["too fast"] = [span[0] for span in spans["too fast"] if not _by_the_edge(span, edges, duration)]
-    if verdict == "none found":
-        besides = {"collides": besides["collides"]}
-    starts = {name: min(found) for name, found in besides.items() if found}
-    starts.setdefault(verdict, 0.0)
-    return tuple(sorted((verdict, *(name for name in starts if name != verdict)), key=starts.__getitem__))
-
-
-def _by_the_edge(span: tuple[float, float], edges: Iterable[float], duration: float) -> bool:
-    """Whether a stretch of time (s) runs up to the edge of the reach, or begins there, and is short."""
-    start, end = span
-    at, around = AT_EDGE * duration, AROUND_EDGE * duration
-    return any(
-        start <= edge + at and end >= edge - at and start >= edge - around and end <= edge + around for edge in edges
-    )
 
 
 @dataclass(frozen=True)
@@ -398,7 +347,6 @@ class TrajectorySummary(Summary):
 
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
-    verdict: Verdict[Finding]
     characteristic_length_m: float
     near: NearThresholds
     joint_limits: LimitsUsed
@@ -469,9 +417,10 @@ class ProgramFiles(Table):
     assumed_speed: Texts = column("greatest joint speeds that are assumed and that its speeds were written with")
 
 
-class TrajectoryResults(Results[TrajectorySummary]):
+class TrajectoryResults(Results):
     """Summary and tables of the stage."""
 
+    summary: TrajectorySummary
     samples: Samples
     checks: PathChecks
     clearance: Clearances

@@ -68,11 +68,7 @@ def written(
         times = motion.samples
         joints = motion.joints(times)
         known = np.isfinite(joints[:, 0])
-        comments = tuple(HEAD + line for line in (*head, *map(head_line, unsafe)))
-        poses = np.linalg.inv(robot.base) @ forward(robot, joints[known])
-        return {
-            ".csv": write_csv(times[known], shown(robot, joints[known]), poses, comments, joint_columns(robot))
-        }, unsafe
+        return _table(robot, times[known], joints[known], (*head, *map(head_line, unsafe))), unsafe
     command = motion.entry.command(CommandSource(), robot)
     if isinstance(command, PlanCommand):  # a planned motion is written as the points that its samples are
         timing = Times(motion.samples, np.arange(len(motion.samples)))
@@ -92,6 +88,12 @@ def written(
     options = WriteOptions(robot, start, notes=(*unsafe, *beside, *made.findings), head=head, assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
+
+
+def _table(robot: Robot, t: Reals, q: Reals, head: Sequence[str]) -> Mapping[str, str]:
+    """A motion over time as a table, by suffix: joints (N, n) and poses at times (N,), s, below its head."""
+    poses = np.linalg.inv(robot.base) @ forward(robot, q)
+    return {".csv": write_csv(t, shown(robot, q), poses, tuple(HEAD + line for line in head), joint_columns(robot))}
 
 
 def _of_its_program(motion: Motion) -> list[str]:
@@ -187,20 +189,14 @@ def _repair(
 ) -> tuple[Mapping[str, str], tuple[Finding, ...]]:
     """The motion that repairs a path by suffix: all rows with their times as a table, else as joint moves."""
     comment = f"path {motion.entry.name} for {ascii_text(robot.title)}, repaired: {rows.strategy[0]}"
-    q = meant(robot, rows.q_deg)
+    head, q = (comment, *_of_its_program(motion)), meant(robot, rows.q_deg)
     if language == "csv":
-        poses = np.linalg.inv(robot.base) @ forward(robot, q)
-        comments = tuple(HEAD + line for line in (comment, *_of_its_program(motion)))
-        return {".csv": write_csv(rows.t_s, rows.q_deg, poses, comments, joint_columns(robot))}, ()
+        return _table(robot, rows.t_s, q, head), ()
     kept = needed_points(q, STRAIGHT)
     command = JointTableCommand(q[kept], Times(rows.t_s[kept], np.arange(len(kept))))
     made = listing_of(command, robot, q[0], repair_name(motion.entry.name))
-    head = (
-        comment,
-        *_of_its_program(motion),
-        f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it",
-    )
-    options = WriteOptions(robot, q[0], notes=made.findings, head=head, assumed_speed=speed)
+    within = f"joint moves between points of the checked motion, within {np.degrees(STRAIGHT):.3f} deg of it"
+    options = WriteOptions(robot, q[0], notes=made.findings, head=(*head, within), assumed_speed=speed)
     program = write_program(made.listing, language, options)
     return program.files, program.findings
 

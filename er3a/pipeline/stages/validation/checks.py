@@ -12,7 +12,7 @@ import numpy as np
 from er3a.diagnosis.faults import CONVENTIONS
 from er3a.files.robot_file import LONGEST_LENGTH_MM, MIN_LONGEST_MM
 from er3a.files.units import WIDEST_IN_RADIANS
-from er3a.finding import Finding, fact, is_one
+from er3a.finding import Amount, Finding, fact, is_one
 from er3a.identifiability.entries import GROUP_OF, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import GRAVEST, PART_OF_GROUP, PartName, together
@@ -34,7 +34,7 @@ from er3a.references.quantities import Limit, Quantity, Speed, undecided_from
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
 from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
-from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
+from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 ROUNDING = 1e-9  # in the unit of a reference (mm, deg, mm/s, deg/s): what reading and predicting it lose at most
 NONE_ALLOWED = 0.5  # tolerance of a count
@@ -48,7 +48,7 @@ def against_itself(
     tolerance: float,
     unit: str = "",
     note: Finding | None = None,
-) -> model.ModelCheck:
+) -> model.Judged:
     """A check that needs no document.
 
     Parameters
@@ -58,7 +58,7 @@ def against_itself(
     note : of what the check leaves out
     """
     status: Literal["pass", "fail"] = "pass" if abs(measured) <= tolerance else "fail"
-    return model.ModelCheck(measured, 0.0, measured, tolerance, unit, model.SelfCheck(quantity), group, status, note)
+    return model.Judged(measured, 0.0, measured, tolerance, unit, model.SelfCheck(quantity), group, status, note)
 
 
 def checks_of_set(
@@ -123,7 +123,7 @@ class _Stated:
             return _without_value(
                 self.set_name, reference, fact("too_uncertain", uncertainty=reference.uncertainty, undecided_from=bound)
             )
-        return model.ReferenceCheck(
+        return model.Judged(
             measured=value,
             expected=expected,
             difference=value - expected,
@@ -293,7 +293,7 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
 OF_THE_TOOL: tuple[PartName, ...] = ("geometry", "zero_and_directions")
 
 
-def parts_found(evidence: Evidence) -> tuple[model.PartFound, ...]:
+def parts_found(evidence: Evidence) -> tuple[Finding, ...]:
     """What is known of each part of a table: geometry, zero and directions, and others.
 
     Parameters
@@ -312,14 +312,15 @@ def parts_found(evidence: Evidence) -> tuple[model.PartFound, ...]:
     return tuple(_part(evidence, part, own) for part, own in by_part.items() if own)
 
 
-def _part(evidence: Evidence, part: PartName, own: Sequence[EntryEvidence]) -> model.PartFound:
+def _part(evidence: Evidence, part: PartName, own: Sequence[EntryEvidence]) -> Finding:
     def named(wanted: Status) -> tuple[str, ...]:
         return tuple(each.entry for each in own if each.status == wanted)
 
     off = reduce(ToolOff.worse, (each.off for each in own if each.status in ("weak", "open")), NOT_OFF)
     if part == "zero_and_directions" and named("open"):
         off = off.worse(together(evidence, list(named("open"))))
-    return model.PartFound(
+    return fact(
+        "part_found",
         part=part,
         status=next((each for each in GRAVEST if named(each)), "settled"),
         entries=sum(each.status != "gauge" for each in own),
@@ -327,7 +328,8 @@ def _part(evidence: Evidence, part: PartName, own: Sequence[EntryEvidence]) -> m
         up_to_signs=len(named("settled_up_to_signs")),
         contradicted=named("contradicted"),
         open=named("open"),
-        off=off,
+        off_mm=off.mm,
+        off_deg=off.deg,
     )
 
 
@@ -381,7 +383,7 @@ def verdict_of(
     sets: tuple[model.SetSummary, ...],
     diagnoses: Mapping[str, model.SetDiagnosis],
     evidence: model.TableEvidence | None,
-) -> Verdict[model.Validated]:
+) -> Verdict:
     """The stage's answer.
 
     Parameters
@@ -396,49 +398,50 @@ def verdict_of(
     verdict : fail if the model is unsound or authoritative documents contradict it, no_reference without any of these.
         It passes only if documents settle all that moves the tool.
     """
-    documented = [check for check in checks if isinstance(check, model.ReferenceCheck) and check.is_authoritative]
+    documented = [check for check in _referenced(checks) if check.grade in AUTHORITATIVE_GRADES]
     failed = [check for check in documented if check.status == "fail"]
-    named = {
-        name: diagnosis.conclusion
-        for name, diagnosis in diagnoses.items()
-        if is_one(diagnosis.conclusion, "named", "mostly")
-    }
+    counts = counts_of(checks)
     common: dict[str, Any] = {
-        "counts": counts_of(checks),
-        "conflicts": len(conflicts),
-        "sets": tuple(each.name for each in sets),
+        "counts": tally_facts(counts),
         "claims": _claims(sets),
         "own_text": tuple(each.own_text for each in sets if each.own_text),
     }
     for check in checks:
-        if isinstance(check, model.ModelCheck) and check.status == "fail":
-            found = model.ModelUnsound(**common, check=check.subject, measured=check.measured, unit=check.unit)
-            return Verdict("fail", found)
+        if isinstance(check, model.Judged) and check.kind is None and check.status == "fail":
+            measured = Amount(check.measured, check.unit)
+            return Verdict("fail", fact("validation.model_unsound", **common, check=check.subject, measured=measured))
+    grades = tuple(grade for grade in AUTHORITATIVE_GRADES if grade in {check.grade for check in documented})
     if failed:
         every = evidence.entries if evidence else ()
-        excluded = [each for each in every if each.status == "contradicted" and each.moves_tool]
-        common |= {"grades": _grades(documented), "contradicted": tuple(each.entry for each in excluded)}
-        return Verdict("fail", _missed(common, failed, sets, named))
+        excluded = tuple(each.entry for each in every if each.status == "contradicted" and each.moves_tool)
+        return Verdict("fail", _missed(failed, sets, diagnoses).but(**common, grades=grades, contradicted=excluded))
     if not documented:
-        return Verdict("no_reference", model.NothingToCompare(**common))
-    contradiction = _contradiction(conflicts) if conflicts else None
-    common |= {"contradiction": contradiction}
+        return Verdict("no_reference", fact("validation.no_reference", **common))
+    common |= {"contradiction": _contradiction(conflicts) if conflicts else None}
+    moving = [part for part in evidence.parts if part.part in OF_THE_TOOL] if evidence else []
+    if evidence and moving and all(part.status == "settled" for part in moving):
+        return Verdict("pass", fact("validation.confirmed", **common, grades=grades))
+    left = fact("validation.left_open", **common, conflicting=counts.independent.conflicting, **_left_of(evidence))
+    known = not left.parts or any(part.settled or part.up_to_signs for part in left.parts)
+    why = "uncovered" if not counts.independent.total else "uncontradicted" if known else "unsettled"
+    return Verdict("caution", left.but(why=why))
+
+
+def _left_of(evidence: model.TableEvidence | None) -> dict[str, Any]:
+    """What evidence leaves open of a table."""
     parts = evidence.parts if evidence else ()
+    entries = (*evidence.entries, *evidence.combinations) if evidence else ()
     moving = [part for part in parts if part.part in OF_THE_TOOL]
-    if not moving or any(part.status != "settled" for part in moving):
-        off = reduce(ToolOff.worse, (part.off for part in moving), NOT_OFF)
-        entries = (*evidence.entries, *evidence.combinations) if evidence else ()
-        left = model.LeftOpen(
-            **common,
-            parts=parts,
-            tolerance=evidence.tolerance if evidence else None,
-            off=off,
-            at_least=any(each.at_least for each in entries),
-            unbounded=tuple(each.entry for each in entries if each.moves_tool and each.status == "consistent"),
-            next_measurement=_next_measurement(evidence),
-        )
-        return Verdict("caution", left)
-    return Verdict("pass", model.Confirmed(**common, grades=_grades(documented)))
+    return {
+        "parts": parts,
+        "settled_mm": evidence.tolerance.mm if evidence else None,
+        "settled_deg": evidence.tolerance.deg if evidence else None,
+        "off_mm": max((part.off_mm for part in moving), default=0.0),
+        "off_deg": max((part.off_deg for part in moving), default=0.0),
+        "at_least": any(each.at_least for each in entries),
+        "unbounded": tuple(each.entry for each in entries if each.moves_tool and each.status == "consistent"),
+        "next_measurement": _next_measurement(evidence),
+    }
 
 
 def _next_measurement(evidence: model.TableEvidence | None) -> Proposal | None:
@@ -465,11 +468,27 @@ def counts_of(checks: Iterable[model.Check]) -> CheckCounts:
     -------
     counts : passed, failed and in conflict, of independent checks, those of consistency, and claims
     """
-    referenced = [check for check in checks if isinstance(check, model.ReferenceCheck)]
-    return count_checks([check.kind for check in referenced], [check.status for check in referenced])
+    referenced = _referenced(checks)
+    return count_checks([check.kind for check in referenced if check.kind], [check.status for check in referenced])
 
 
-def most_telling(failed: list[model.ReferenceCheck]) -> model.ReferenceCheck:
+def _referenced(checks: Iterable[model.Check]) -> list[model.Judged]:
+    return [check for check in checks if isinstance(check, model.Judged) and check.kind is not None]
+
+
+def tally_facts(counts: CheckCounts) -> tuple[Finding, ...]:
+    """How many checks pass, by what they rest on; independent ones alone where there are none of any kind.
+
+    Parameters
+    ----------
+    counts : of claims, which no verdict rests on, nothing is said
+    """
+    kinds = {"independent": counts.independent, "consistency": counts.consistency}
+    shown = {kind: own for kind, own in kinds.items() if own.total} or {"independent": counts.independent}
+    return tuple(fact("counted_checks", kind=kind, passed=own.passed, total=own.total) for kind, own in shown.items())
+
+
+def most_telling(failed: list[model.Judged]) -> model.Judged:
     """The failed check to quote in a verdict.
 
     Parameters
@@ -522,11 +541,7 @@ def key_figures(
     if len(trusted):
         figures.append(_figure("farthest_axis", float(trusted.distance_mm.max())))
         figures.append(_figure("most_tilted_axis", float(trusted.angle_deg.max()), "deg"))
-    labels = [
-        abs(check.difference)
-        for check in checks
-        if isinstance(check, model.ReferenceCheck) and check.group == "envelope"
-    ]
+    labels = [abs(check.difference) for check in _referenced(checks) if check.group == "envelope"]
     if labels:
         figures.append(_figure("worst_drawing_label", max(labels)))
     figures += [_figure(name, value) for name, value in reach.items()]
@@ -540,28 +555,27 @@ def _figure(name: str, value: float, unit: str = "mm") -> Figure:
 
 
 def _missed(
-    common: dict[str, Any],
-    failed: list[model.ReferenceCheck],
-    sets: tuple[model.SetSummary, ...],
-    named: Mapping[str, model.LikelyFault],
-) -> model.Contradicted | model.AnotherArm | model.DefinedOtherwise:
+    failed: list[model.Judged], sets: tuple[model.SetSummary, ...], diagnoses: Mapping[str, model.SetDiagnosis]
+) -> Finding:
+    """What documents contradict, by the failed check that tells most."""
     quoted = most_telling(failed)
-    common |= {
-        "reference_set": quoted.reference_set,
-        "check": quoted.subject,
-        "measured": quoted.measured,
-        "expected": quoted.expected,
-        "unit": quoted.unit,
-        "diagnosis": named.get(quoted.reference_set),
-    }
     own = next(each for each in sets if each.name == quoted.reference_set)
-    if own.another_arm:
-        return model.AnotherArm(**common, described=own.described)
-    found = named.get(quoted.reference_set)
-    faults = found.faults if found else ()
+    conclusion = diagnoses[own.name].conclusion if own.name in diagnoses else None
+    named = conclusion if is_one(conclusion, "named", "mostly") else None
+    faults = named.faults if named else ()
     chosen = any(is_one(fault, *CONVENTIONS) for fault in faults)
     chosen &= all(is_one(fault, "wrong_limit", *CONVENTIONS) for fault in faults)
-    return model.DefinedOtherwise(**common) if chosen else model.Contradicted(**common)
+    code = "another_arm" if own.another_arm else "defined_otherwise" if chosen else "contradicted"
+    return fact(
+        f"validation.{code}",
+        reference_set=own.name,
+        check=quoted.subject,
+        measured=quoted.measured,
+        expected=quoted.expected,
+        unit=quoted.unit,
+        diagnosis=None if own.another_arm else named,
+        described=own.described if own.another_arm else None,
+    )
 
 
 def _zero_pose_error(poses: model.KeyPoses, set_name: str) -> float | None:
@@ -584,8 +598,3 @@ def _contradiction(conflicts: list[model.Conflict]) -> Finding:
     first = conflicts[0]
     stated = tuple(statement.expected for statement in first.statements)
     return fact("contradiction", subject=first.subject, unit=first.unit, stated=stated, more=len(conflicts) - 1)
-
-
-def _grades(checks: list[model.ReferenceCheck]) -> tuple[Grade, ...]:
-    present = {check.grade for check in checks}
-    return tuple(grade for grade in AUTHORITATIVE_GRADES if grade in present)

@@ -233,8 +233,8 @@ def _covered(trips: model.RoundTripErrors | None, evidence: model.TableEvidence 
 
 def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator[Open]:
     """What no reference states or settles, and what the study places otherwise than the model that was checked."""
-    judged = {check.subject for check in checks if isinstance(check, model.ReferenceCheck)}
-    groups = {check.group for check in checks if isinstance(check, model.ReferenceCheck)}
+    judged = {check.subject for check in checks if check.kind is not None}
+    groups = {check.group for check in checks if check.kind is not None}
     missing = {
         check.group
         for check in checks

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Self, get_args
+from typing import Literal, Self, get_args
 
-from er3a.by_value import Coded
 from er3a.diagnosis.conclusions import Conclusion, RankedHypothesis
 from er3a.files.robot_library import robot_of
-from er3a.finding import Finding
+from er3a.finding import Finding, is_one
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
-from er3a.identifiability.evidence import PartName, PartStatus
 from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, CheckKind
-from er3a.identifiability.statements import ToolOff
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.language import N_
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
 from er3a.references.subjects import ReferenceSubject, Subject
-from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade, Robot
+from er3a.robots.robot import Grade, Robot
 
 ModelGroup = Literal["table_sanity", "round_trips"]
 SelfChecked = Literal[
@@ -55,189 +52,40 @@ class WholeGroup(Subject):
 CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
 
 
-Note = Finding | ClosedFormMissing | Finding
-
-
-LikelyFault = Finding
-
-
-@dataclass(frozen=True)
-class JudgedTable:
-    """What every verdict holds.
-
-    Attributes
-    ----------
-    counts : of the checks against references; conflicts : numbers that references contradict each other about
-    sets : names of the reference sets
-    claims : of the sets that hold nothing but claims
-    own_text : what the table's own author says against it
-    """
-
-    counts: CheckCounts
-    conflicts: int
-    sets: tuple[str, ...]
-    claims: tuple[Finding, ...]
-    own_text: tuple[Finding, ...]
-
-
-class Confirmed(JudgedTable, Coded, code="validation.confirmed"):
-    """The model meets all that it can, and independent documents settle all that moves the tool."""
-
-    grades: tuple[Grade, ...]
-    contradiction: Finding | None
-
-
-class PartFound(Coded):
-    """What is known of a part of the table.
-
-    Attributes
-    ----------
-    status : the gravest of its entries'
-    entries, settled : how many it has that mean something alone, and how many of these are settled outright
-    up_to_signs : how many more are settled but for a sign or half turn, which depends on what is open elsewhere
-    contradicted, open : names of such entries
-    off : how far the tool could be off for what is weak or open; what only its own document speaks of has no bound
-    """
-
-    part: PartName
-    status: PartStatus
-    entries: int
-    settled: int
-    up_to_signs: int
-    contradicted: tuple[str, ...]
-    open: tuple[str, ...]
-    off: ToolOff
-
-
-class LeftOpen(JudgedTable, Coded, code="validation.left_open"):
-    """Nothing contradicts the table, but independent documents don't settle all that moves the tool.
-
-    Attributes
-    ----------
-    parts : of the table
-    off : how far the tool could be off for what is weak or open, all over the joint ranges
-    at_least : whether that is what was found, and more may be left open
-    unbounded : entries that move the tool and that only their own document speaks of: for these there is no bound
-    next_measurement : the one that settles the entry for which it could be off farthest
-    tolerance : how far what counts as settled may leave the tool off
-    """
-
-    parts: tuple[PartFound, ...]
-    tolerance: Tolerance | None
-    off: ToolOff
-    at_least: bool
-    unbounded: tuple[str, ...]
-    next_measurement: Proposal | None
-    contradiction: Finding | None
-
-
-class NothingToCompare(JudgedTable, Coded, code="validation.no_reference"):
-    """No authoritative document speaks about the model."""
-
-
-class ModelUnsound(JudgedTable, Coded, code="validation.model_unsound"):
-    """The model fails a check that needs no document."""
-
-    check: SelfCheck
-    measured: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class _Missed(JudgedTable):
-    """The model fails checks against documents; ``check`` is the one to quote.
-
-    Attributes
-    ----------
-    grades : of all authoritative checks
-    diagnosis : the likely fault, if there is one
-    contradicted : entries that move the tool and whose values independent documents exclude
-    """
-
-    reference_set: str
-    check: ReferenceSubject
-    measured: float
-    expected: float
-    unit: str
-    grades: tuple[Grade, ...]
-    diagnosis: LikelyFault | None
-    contradicted: tuple[str, ...]
-
-
-class Contradicted(_Missed, Coded, code="validation.contradicted"):
-    """The model contradicts documents about its arm."""
-
-
-class AnotherArm(_Missed, Coded, code="validation.another_arm"):
-    """The documents describe another arm; ``described``: what no one or two corrections remove."""
-
-    described: Finding | None
-
-
-class DefinedOtherwise(_Missed, Coded, code="validation.defined_otherwise"):
-    """The documents describe this arm, with zeros, directions, base or flange that ``diagnosis`` names."""
-
-
-Validated = Confirmed | LeftOpen | NothingToCompare | ModelUnsound | Contradicted | AnotherArm | DefinedOtherwise
-
-
+Note = Finding | ClosedFormMissing
 MODEL_GROUPS: tuple[ModelGroup, ...] = get_args(ModelGroup)
 
 
 @dataclass(frozen=True)
-class _Compared:
-    """What the model says (``measured``) beside what it should; ``difference``: measured - expected."""
+class Judged:
+    """What the model says (``measured``) against what it should; ``difference``: measured - expected.
+
+    Attributes
+    ----------
+    status : ``conflict`` of a reference that the model misses while meeting another that contradicts it
+    kind : what it rests on; None, like ``reference_set``, of a check of the model against itself
+    independent_of : the entries that it reacts to and whose document is another, with nothing in common
+    """
 
     measured: float
     expected: float
     difference: float
     tolerance: float
     unit: str
+    subject: CheckSubject
+    group: str
+    status: Literal["pass", "fail", "conflict"]
+    note: Finding | None = None
+    reference_set: str | None = None
+    source: str | None = None
+    grade: Grade | None = None
+    kind: CheckKind | None = None
+    independent_of: tuple[str, ...] = ()
 
     @property
     def tolerances_off(self) -> float:
         """How many tolerances the difference is."""
         return abs(self.difference) / self.tolerance
-
-
-@dataclass(frozen=True)
-class ModelCheck(_Compared):
-    """A check of the model against itself, which needs no document."""
-
-    subject: SelfCheck
-    group: ModelGroup
-    status: Literal["pass", "fail"]
-    note: Finding | None = None
-    kind: None = None
-    reference_set: None = None
-    source: None = None
-    grade: None = None
-    is_authoritative: ClassVar[bool] = True
-
-
-@dataclass(frozen=True)
-class ReferenceCheck(_Compared):
-    """A check against a reference; ``conflict`` is one that the model misses while meeting another that contradicts
-    it.
-
-    ``kind`` is what it rests on; ``independent_of`` names the entries that it reacts to and whose document is another,
-    with nothing in common.
-    """
-
-    subject: ReferenceSubject
-    group: str
-    status: Literal["pass", "fail", "conflict"]
-    reference_set: str
-    source: str
-    grade: Grade
-    kind: CheckKind
-    independent_of: tuple[str, ...]
-    note: None = None
-
-    @property
-    def is_authoritative(self) -> bool:
-        """Whether the verdict may rest on it."""
-        return self.grade in AUTHORITATIVE_GRADES
 
 
 @dataclass(frozen=True)
@@ -258,13 +106,8 @@ class Unjudged:
     tolerance: None = None
     kind: None = None
 
-    @property
-    def is_authoritative(self) -> bool:
-        """Whether the verdict could rest on it."""
-        return self.grade in AUTHORITATIVE_GRADES or self.group in MODEL_GROUPS
 
-
-Check = ModelCheck | ReferenceCheck | Unjudged
+Check = Judged | Unjudged
 
 
 @dataclass(frozen=True)
@@ -427,7 +270,7 @@ class TableEvidence:
     tolerance: Tolerance
     entries: tuple[EntryEvidence, ...]
     combinations: tuple[EntryEvidence, ...]
-    parts: tuple[PartFound, ...]
+    parts: tuple[Finding, ...]
     proposals: tuple[Proposal, ...]
     table_meets: bool
     other: OtherTableFound | None
@@ -446,6 +289,22 @@ class TableEvidence:
 class ValidationSummary(Summary):
     """The stage's summary.
 
+    The verdict's finding is one of the codes below after ``validation.``, else ``confirmed``, ``no_reference`` or
+    ``model_unsound``. All have ``counts`` of the checks against references, by what they rest on; ``claims``, of the
+    sets that hold nothing but claims; and ``own_text``, what the table's own author says against it.
+
+    ``left_open``: nothing contradicts the table, but independent documents don't settle all that moves the tool. It has
+    the ``parts`` of the table, each with how many entries mean something alone (``entries``), how many of these are
+    ``settled`` outright, or but for a sign or half turn that depends on what is open elsewhere (``up_to_signs``), and
+    the names of those ``contradicted`` and ``open``; how far what counts as settled may leave the tool off
+    (``settled_mm``, ``settled_deg``), and how far what is weak or open may (``off_mm``, ``off_deg``; ``at_least``: more
+    may be left open); the entries that only their own document speaks of, for which there is no bound (``unbounded``);
+    and the ``next_measurement``, which settles the entry for which the tool could be off farthest.
+
+    ``contradicted``, ``another_arm`` and ``defined_otherwise`` (the same arm, with zeros, directions, base or flange
+    that the ``diagnosis`` names) quote one failed ``check``, and name the entries that documents exclude.
+    ``described``: what no one or two corrections remove of another arm's mismatch.
+
     Attributes
     ----------
     counts : checks against references by what they rest on
@@ -454,7 +313,6 @@ class ValidationSummary(Summary):
 
     needs = ("table",)
 
-    verdict: Verdict[Validated]
     checks: tuple[Check, ...]
     conflicts: tuple[Conflict, ...]
     sets: tuple[SetSummary, ...]
@@ -467,14 +325,14 @@ class ValidationSummary(Summary):
     @property
     def is_beyond_correction(self) -> bool:
         """Whether documents describe another arm, which no correction of the table makes it."""
-        same = isinstance(self.verdict.finding, DefinedOtherwise)
+        same = is_one(self.verdict.finding, "validation.defined_otherwise")
         return not same and any(found.another_arm for found in self.sets)
 
 
 class Checks(Table):
     """The summary's checks as a table."""
 
-    subject: Findings = findings("what is compared", CheckSubject)
+    subject: Findings = findings("what is compared")
     group: Texts = column("group of the check")
     reference_set: Texts = column("reference set, none for checks of the model against itself")
     status: Texts = column("pass, fail, conflict or no_reference")
@@ -486,7 +344,7 @@ class Checks(Table):
     source: Texts = column("source of the reference")
     grade: Texts = column("grade of the source")
     kind: Texts = column("what it rests on: independent, consistency or claim; none without a document")
-    note: Findings = findings("why it is not judged, or how", Note)
+    note: Findings = findings("why it is not judged, or how")
 
     @classmethod
     def of_records(cls, checks: Iterable[Check]) -> Self:
@@ -527,7 +385,7 @@ class KeyPoses(Table):
     source: Texts = column("source of the point")
     grade: Texts = column("grade of the source")
     group: Texts = column("group of the references")
-    pose: Findings = findings("the pose", Finding)
+    pose: Findings = findings("the pose")
     point: Texts = column("flange or wrist_centre")
     q_deg: Reals = per_joint("joint angle")
     point_mm: Reals = vector("{}_mm", "stated point, with the model's coordinate where none is stated")
@@ -535,9 +393,10 @@ class KeyPoses(Table):
     deviation_mm: Reals = column("distance of the two points")
 
 
-class ValidationResults(Results[ValidationSummary]):
+class ValidationResults(Results):
     """The stage's results."""
 
+    summary: ValidationSummary
     checks: Checks
     axes: Axes
     key_poses: KeyPoses

@@ -218,7 +218,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
         *(() if scene and scene.carried else (Open("gripper"),)),
     )
     gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
-    judged = Verdict[Found]("fail", doubt) if doubt else verdict_of(calibration, objects, near)
+    judged = Verdict("fail", doubt) if doubt else verdict_of(calibration, objects, near)
     summary = model.VisionSummary(
         verdict=judged.with_assumed_shapes(shapes),
         figures=figures_of(calibration, objects, near),
@@ -263,7 +263,7 @@ def _without_calibration(
     error: HandEyeError, file: VisionFile, scene: str | None, settings: VisionSettings
 ) -> model.VisionResults:
     """What is written where the samples allow no calibration: why, and no rows."""
-    verdict: Verdict[Found] = Verdict("fail", fact("calibration_impossible", why=error.finding))
+    verdict: Verdict = Verdict("fail", fact("calibration_impossible", why=error.finding))
     summary = model.VisionSummary(verdict, (), file.title, scene, settings.least_success, None, ())
     return model.VisionResults(
         summary,
@@ -449,7 +449,7 @@ def _grasp(robot: Robot, chosen: ChosenGrasp) -> model.GraspResult:
 
 def verdict_of(
     calibration: model.CalibrationResult, objects: tuple[model.ObjectResult, ...], near: tuple[str, ...]
-) -> Verdict[Found]:
+) -> Verdict:
     """The stage's answer, once the calibration is not in doubt.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.calibration_set import Setup
 from er3a.vision.grasping import GraspRefusal
@@ -173,7 +173,6 @@ class VisionSummary(Summary):
 
     needs = ("camera", "reach", "limits", "self_collision", "scene_collision")
 
-    verdict: Verdict[Finding]
     title: str
     scene: str | None
     least_success: float
@@ -218,9 +217,10 @@ class PathRows(Table):
     q_deg: Reals = per_joint("joint angle")
 
 
-class VisionResults(Results[VisionSummary]):
+class VisionResults(Results):
     """The stage's results; without a calibration the tables are empty."""
 
+    summary: VisionSummary
     samples: SampleRows
     ways: PathRows
     corners: CornerRows

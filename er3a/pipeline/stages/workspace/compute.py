@@ -32,7 +32,7 @@ from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Void, is_flat, pocket_block, proven_voids
 
 
-def judge(voids: Sequence[Void], undecided: float, *, flat: bool = False) -> Verdict[Finding]:
+def judge(voids: Sequence[Void], undecided: float, *, flat: bool = False) -> Verdict:
     """The stage's verdict.
 
     An enclosed void about the shoulder is what every arm leaves that can't fold onto itself. Any other one is a hole

@@ -14,7 +14,7 @@ from er3a.finding import Finding, is_one
 from er3a.kinematics.classes.class_solvers import BranchLabel, SlotName
 from er3a.kinematics.forward import forward, jacobian
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.pipeline.results import Results, Summary, Verdict
+from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, lists, vector
 from er3a.robots.robot import Robot
 from er3a.sampling.random_joints import Sampling
@@ -358,7 +358,6 @@ class WorkspaceSummary(Summary):
 
     needs = ("reach", "limits", "self_collision")
 
-    verdict: Verdict[Finding]
     samples: int
     sampling: Sampling
     volume_m3: Bounds
@@ -382,9 +381,10 @@ class WorkspaceSummary(Summary):
         return [void for void in self.voids if void.kind == "enclosed"]
 
 
-class WorkspaceResults(Results[WorkspaceSummary]):
+class WorkspaceResults(Results):
     """The stage's results; each table is written under its attribute's name."""
 
+    summary: WorkspaceSummary
     section: SectionCells
     cloud: Cloud
     proof: ProofCells

@@ -105,7 +105,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
-        unknown=listed(summary.unknown),
         links=_links(summary),
         uses=[_use(use) for use in summary.uses[:MAX_USES]],
         more_uses=max(0, len(summary.uses) - MAX_USES),

@@ -5,7 +5,7 @@ Layout is fixed, so that matplotlib draws each figure once.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -182,9 +182,9 @@ def _cut(ax: Axes, values: Reals) -> None:
         ax.text(0.99, 0.04, text, transform=ax.transAxes, ha="right", fontsize=8, bbox=ground, zorder=6)
 
 
-def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch[Any], ...], str, float, str]]:
+def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch, ...], str, float, str]]:
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
-    shades: list[tuple[tuple[model.Stretch[Any], ...], str, float, str]] = [
+    shades: list[tuple[tuple[model.Stretch, ...], str, float, str]] = [
         (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
         (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
         (path.unreachable, palette.INK, 0.14, tr("not reachable")),

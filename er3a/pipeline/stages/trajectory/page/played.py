@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -158,7 +157,7 @@ def _linked(moment: FaultMoment, path: str) -> FaultMoment:
     )
 
 
-def _assumed(part: model.Stretch[Any]) -> bool:
+def _assumed(part: model.Stretch) -> bool:
     """Whether what a stretch exceeds is an assumed limit."""
     return isinstance(part.cause, Finding) and part.cause.basis == "assumed"
 
@@ -282,7 +281,7 @@ def _pass(event: model.Singularity) -> PlayedEvent:
     return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution", axes=axes)
 
 
-def _few_words(part: model.Stretch[Any]) -> str:
+def _few_words(part: model.Stretch) -> str:
     """Why a stretch is an event; of bodies that overlap the first two."""
     if is_one(part.cause, "bodies_overlap"):
         return say(part.cause.touches[0].pair)
@@ -311,7 +310,7 @@ def _joints(cause: object) -> tuple[tuple[int, str], ...]:
     return ((joint, times_needed(rate_ratio(cause))),)
 
 
-def _weight(path: model.PathSummary, part: model.Stretch[Any]) -> Weight:
+def _weight(path: model.PathSummary, part: model.Stretch) -> Weight:
     return "caution" if _assumed(part) or part in path.undecided else "fail"
 
 
@@ -333,7 +332,7 @@ def _singular(event: model.Singularity) -> str:
     return tr("singular: {type}", type=word) if event.crossing else tr("near-singular: {type}", type=word)
 
 
-def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch[Any], ...]], ...]:
+def kinds(path: model.PathSummary) -> tuple[tuple[str, tuple[model.Stretch, ...]], ...]:
     """The stretches of each kind of fault, with its name."""
     return (
         (tr("not reachable"), path.unreachable),

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
+from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
 from er3a.kinematics.forward import frames, skeleton
@@ -53,7 +54,7 @@ COLUMNS = (
     N_("Source"),
 )
 
-Judged = model.ModelCheck | model.ReferenceCheck
+Judged = model.Judged
 
 
 def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
@@ -89,7 +90,7 @@ def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
-    if isinstance(check, model.ReferenceCheck):
+    if check.source is not None and check.grade is not None:
         grade = word("grade", GRADE_NAMES, check.grade)
         source = bracketed(own_title(check.source), grade)
     else:
@@ -202,9 +203,9 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
         keys.append((str(unsure), tr("entries unconfirmed")))
     if instead:
         fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
-    elif isinstance(found, model.LeftOpen) and found.next_measurement:
+    elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
-    elif isinstance(found, model.NothingToCompare):
+    elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     else:
         fix = None
@@ -214,7 +215,7 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[str, str]:
     """The verdict in two short sentences; ``bad``, ``unsure``: entries contradicted, and not confirmed."""
     status = summary.verdict.status
-    if isinstance(summary.verdict.finding, model.DefinedOtherwise):
+    if is_one(summary.verdict.finding, "validation.defined_otherwise"):
         return tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first.")
     if status == "fail":
         another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
