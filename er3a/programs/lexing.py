@@ -366,7 +366,6 @@ def dotted(expression: Expression) -> str:
 MAX_PROGRAM_BYTES = 32_000_000
 MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 HIGH_RUNS = re.compile(rb"[\x80-\xff]+")
-DECLARED = re.compile(r"""^\s*<\?xml[^>]*?encoding=["']([\w.-]+)["']""")
 
 
 @dataclass(frozen=True)

@@ -306,10 +306,7 @@ class Machine:
             case syntax.Move():
                 self._move(way, operation.place, self.dialect.motion(memory, operation))
             case syntax.Fixed(instruction=instruction):
-                if isinstance(instruction, ArmMotion):
-                    self._move(way, operation.place, instruction)
-                else:
-                    done = instruction
+                done = instruction
             case Assign():
                 done = self._assign(memory, operation)
             case Waiting():

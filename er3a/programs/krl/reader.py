@@ -38,7 +38,6 @@ from er3a.programs.syntax import (
     Opaque,
     Operation,
     Program,
-    Record,
     Routine,
     RoutineParameter,
     Unclear,
@@ -86,9 +85,6 @@ class KrlWords(Words):
             more = self.accept(",")
             if not more:
                 self.expect("}")
-        values = tuple((name, each.value) for name, each in items if isinstance(each, Constant))
-        if len(values) == len(items):
-            return Constant(Record(kind, values))
         return Aggregate(kind, tuple(items))
 
 

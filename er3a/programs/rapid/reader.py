@@ -85,8 +85,7 @@ class RapidWords(Words):
             if not self.accept(","):
                 self.expect("]")
                 break
-        values = tuple(each.value for each in items if isinstance(each, Constant))
-        return Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
+        return syntax.Listed("", tuple(items))
 
     def parts_of(self, found: Expression) -> Expression:
         """An expression with the fields and arguments after it, and elements in braces.

@@ -12,11 +12,9 @@ from collections.abc import Iterator
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, as_number, ranked
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked
 from er3a.programs.syntax import (
-    POSE_KEYS,
     Assign,
-    Constant,
     Element,
     Expression,
     Invocation,
@@ -65,41 +63,12 @@ class UrWords(Words):
         elif self.next != "[" or self.kind == "text":
             return None
         self.take()
-        numbers = self._numbers()
-        if numbers is not None and not kind:
-            return Constant(numbers)
-        if numbers is not None and len(numbers) == len(POSE_KEYS):
-            return Constant(syntax.Record("p", tuple(zip(POSE_KEYS, numbers))))
-        if numbers is not None:
-            return self._pose_or_element(tuple(map(Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
         given = tuple(each for each in placed if each is not None)
-        return self._pose_or_element(given) if kind else Listed(kind, given)
-
-    def _pose_or_element(self, given: tuple[Expression, ...]) -> Expression:
-        """``p[...]``: a pose has six numbers; with one it is an element of a variable of this name."""
-        return Element(Variable("p"), given) if len(given) == 1 else Listed("p", given)
-
-    def _numbers(self) -> tuple[int | float, ...] | None:
-        """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
-        kinds, texts, at = self.kinds, self.texts, self.at
-        found: list[int | float] = []
-        while True:
-            minus = texts[at] == "-"
-            at += minus
-            if kinds[at] != "number" or texts[at][:2] == "0x":
-                return None
-            value = as_number(texts[at])
-            found.append(-value if minus else value)
-            at += 1
-            if texts[at] == "]":
-                self.at = at + 1
-                return tuple(found)
-            if texts[at] != ",":
-                return None
-            at += 1
+        # ``p[...]``: a pose has six numbers; with one it is an element of a variable of this name.
+        return Element(Variable("p"), given) if kind and len(given) == 1 else Listed(kind, given)
 
 
 def read_urscript(source: ProgramText) -> Program:
