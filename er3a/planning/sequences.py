@@ -19,10 +19,12 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from er3a.by_value import ByValue
 from er3a.errors import PathError, PoseError
@@ -30,7 +32,18 @@ from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import Segment, rotation_between
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import FromRestToRest, LegTimes, Rates, TimeLaw, Times, Timetable, times_at
+from er3a.planning.profiles import (
+    POWERS,
+    FromRestToRest,
+    LegTimes,
+    Rates,
+    TimeLaw,
+    Times,
+    Timetable,
+    joining,
+    polynomial,
+    times_at,
+)
 
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
@@ -140,7 +153,6 @@ def arc(
     return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))
 
 
-POWERS = 6  # of a quintic, 0 to 5
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -175,15 +187,8 @@ class Curve:
     def __call__(self, s: Reals) -> tuple[Reals, Reals, Reals]:
         """Value, first and second derivative by the parameter, each (..., k), at parameters (...,)."""
         i, u = self.piece(s)
-        c, u = self.coefficients[i], u[..., None]
         span = (self.edges[i + 1] - self.edges[i])[..., None]
-        x, dx, ddx = c[..., 5, :], 5 * c[..., 5, :], 20 * c[..., 5, :]
-        for power in range(4, -1, -1):
-            x = c[..., power, :] + u * x
-            if power >= 1:
-                dx = power * c[..., power, :] + u * dx
-            if power >= 2:
-                ddx = power * (power - 1) * c[..., power, :] + u * ddx
+        x, dx, ddx = polynomial(np.moveaxis(self.coefficients[i], -2, 0), u[..., None])
         return x, dx / span, ddx / span**2
 
 
@@ -203,35 +208,9 @@ def straight(start: Reals, end: Reals) -> Reals:
     return found
 
 
-def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float | Reals) -> Reals:
-    """The quintic piece that takes over value and derivatives on one side and joins those on the other.
-
-    Parameters
-    ----------
-    before, after : value, first and second derivative, each (k,)
-    span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
-        values are (m, k)
-
-    Returns
-    -------
-    coefficients : (6, k), of the powers 0 to 5 of the piece's share; (6, m, k) of m pieces
-    """
-    x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
-    x1, v1, a1 = after[0], after[1] * span, after[2] * span**2
-    value, velocity, acceleration = x1 - x0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
-    return np.stack(
-        [
-            x0,
-            v0,
-            a0 / 2,
-            10 * value - 4 * velocity + acceleration / 2,
-            -15 * value + 7 * velocity - acceleration,
-            6 * value - 3 * velocity + acceleration / 2,
-        ]
-    )
-
-
-SMALL = 1e-2  # rad^2; below it the series are exact to rounding
+SERIES = 20  # terms of coefficients of a turn's rates: they are exact to rounding for more than two turns
+OF_TURN = [[(-1.0) ** k / math.factorial(2 * k + first) for k in range(SERIES)] for first in (2, 3)]
+"""(1 - cos) / x and (angle - sin) / (x angle) as series of the squared angle x."""
 
 
 def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
@@ -246,7 +225,8 @@ def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
     omega, its derivative : (..., 3), in the frame that the rotation vector is written in
     """
     x = (w * w).sum(axis=-1, keepdims=True)
-    a, b, da, db = _coefficients(x)
+    a, b = (polyval(x, series) for series in OF_TURN)
+    da, db = (polyval(x, polyder(series)) for series in OF_TURN)
     dx = 2 * (w * dw).sum(axis=-1, keepdims=True)
     first = np.cross(w, dw)
     second = np.cross(w, first)
@@ -254,23 +234,6 @@ def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
     third = np.cross(w, ddw)
     slope = ddw + da * dx * first + a * third + db * dx * second + b * (np.cross(dw, first) + np.cross(w, third))
     return omega, slope
-
-
-def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-    """(1 - cos) / x and (angle - sin) / (x angle) of the squared angle x, and their derivatives by x."""
-    small = x < SMALL
-    y = np.where(small, 1.0, x)
-    angle = np.sqrt(y)
-    s, c = np.sin(angle), np.cos(angle)
-    a, b = (1 - c) / y, (angle - s) / (y * angle)
-    da, db = (s / (2 * angle) - a) / y, ((1 - c) / (2 * y) - 1.5 * b) / y
-    z = np.where(small, x, 0.0)
-    return (
-        np.where(small, 1 / 2 - z / 24 * (1 - z / 30 * (1 - z / 56 * (1 - z / 90))), a),
-        np.where(small, 1 / 6 - z / 120 * (1 - z / 42 * (1 - z / 72 * (1 - z / 110))), b),
-        np.where(small, -1 / 24 + z / 360 * (1 - 3 * z / 112 * (1 - 2 * z / 135)), da),
-        np.where(small, -1 / 120 + z / 2520 * (1 - z / 48 * (1 - 2 * z / 165)), db),
-    )
 
 
 TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
@@ -605,10 +568,8 @@ def _timed(
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
     if isinstance(timing, LegTimes):
-        halts = np.flatnonzero(np.concatenate([[True], sharp, [True]]))
-        times = np.concatenate([[0.0], np.cumsum(timing.times)])[halts]
-        ramps = (timing.ramps[halts[:-1]] + timing.ramps[halts[1:] - 1]) / 2 / np.diff(times)
-        return FromRestToRest(times, corners[halts], np.minimum(ramps, 0.5)), float(times[-1])
+        times = np.append(0.0, np.cumsum(timing.times))
+        return FromRestToRest(times, corners, timing.ramps), float(times[-1])
     halt = np.concatenate([[True], sharp & ~runs_on, [True]])
     if isinstance(timing, Times):
         return Timetable(timing.times, corners[timing.corner], halt[timing.corner]), float(timing.times[-1])

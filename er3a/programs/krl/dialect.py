@@ -18,6 +18,7 @@ from er3a.programs.evaluation import (
     evaluated,
     external_axes,
     root,
+    target_numbers,
     unresolved,
 )
 from er3a.programs.instructions import (
@@ -195,19 +196,12 @@ def _position(memory: ProgramMemory, value: Value, text: str) -> Record | Unreso
 
 def _components(value: Record, keys: tuple[str, ...], text: str) -> list[float | None] | UnresolvedTarget:
     """Numbers of a record, None for what it leaves out."""
-    found: list[float | None] = []
-    given = dict(value.items)
-    for key in keys:
-        part = given.get(key)
-        if isinstance(part, Unclear):
-            return unresolved(part)
-        plain = syntax.number(part)
-        if part is not None and plain is None:
-            return UnresolvedTarget(text, "not_understood")
-        if plain is not None and not math.isfinite(plain):
-            return UnresolvedTarget(text, "not_finite")
-        found.append(plain)
-    return found
+    parts = [value.get(key) for key in keys]
+    plain = target_numbers([each for each in parts if each is not None], text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
+    given = iter(plain)
+    return [None if each is None else next(given) for each in parts]
 
 
 def _joints(memory: ProgramMemory, value: Record, text: str, missing: Reals) -> Target:
@@ -264,9 +258,7 @@ def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
     elif pose is None and is_frame(value):
         name = shown(value)
     mapped = memory.cell.frames.get(name)
-    if pose is None or (mapped is not None and value == frame_record(mapped)):
-        pose = mapped
-    return NamedFrame(name, pose)
+    return NamedFrame(name, mapped if pose is None else pose)
 
 
 def _field(data: Value | None, name: str, kept_as: str, usual: Value | None = None) -> Value:
