@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from er3a.errors import InputError, given_bytes
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
@@ -36,6 +36,7 @@ def ranked(*levels: str) -> dict[str, int]:
     return {sign: rank for rank, level in enumerate(levels, 1) for sign in level.split()}
 
 
+Item = TypeVar("Item")
 Names = Mapping[str, str]
 """Names of a module that others do not see, with those under which the program has them."""
 NO_NAMES: Names = {}
@@ -207,6 +208,27 @@ class Words:
             # One rank higher on the right, because operators of one rank bind from left to right.
             found = Binary(operator, found, self.expression(binds + 1))
         self._depth -= 1
+        return found
+
+    def listed(self, close: str, each: Callable[[], Item]) -> list[Item]:
+        """What is between commas up to a closing bracket, which is passed.
+
+        Parameters
+        ----------
+        each : reads one of them
+
+        Raises
+        ------
+        MisreadError
+            where another word follows, or nothing after a comma
+        """
+        found: list[Item] = []
+        more = not self.accept(close)
+        while more:
+            found.append(each())
+            more = self.accept(",")
+            if not more:
+                self.expect(close)
         return found
 
     def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:

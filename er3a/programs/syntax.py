@@ -444,6 +444,21 @@ class Program(ByValue):
         return list(dict.fromkeys(found))
 
 
+def called_by_others(routines: Mapping[str, Routine]) -> set[str]:
+    """Names of the routines that another one calls.
+
+    Parameters
+    ----------
+    routines : by their names, linked: their calls are operations
+    """
+    return {
+        operation.routine
+        for name, each in routines.items()
+        for operation in each.code
+        if isinstance(operation, Call) and operation.routine != name
+    }
+
+
 Each = Callable[[Expression], Expression]
 Held = TypeVar("Held", bound=Any)
 

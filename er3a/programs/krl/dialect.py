@@ -654,7 +654,6 @@ class KrlDialect(Dialect):
                 other = name
         found = self._motion(memory, move)
         memory.shared = kept
-        memory.kept.clear()
         return replace(found, not_followed=found.not_followed or other)
 
     def _motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
@@ -733,27 +732,22 @@ def _left_out(memory: ProgramMemory, argument: Expression | None, value: Value) 
 
 
 def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> ArmMotion:
-    """A motion with all that is set for it; it is kept, because most motions follow one whose settings are the same."""
-    key = (kind, move.words)
-    found = memory.kept.get(key)
-    if not isinstance(found, ArmMotion):
-        load, part = memory.read("$LOAD"), memory.read("$LOAD.M")
-        given = load_of(load)
-        if part is not None and not isinstance(load, Record):  # of a load whose whole is not known
-            given = UnclearLoad("$LOAD.M", syntax.number(part))
-        found = ArmMotion(
-            kind,
-            UnresolvedTarget(move.text, "undefined"),
-            speed=_speed(memory, kind),
-            acceleration=_acceleration(memory, kind),
-            zone=_zone(memory, kind, move.words),
-            tool=_frame(memory, "$TOOL"),
-            base=_frame(memory, "$BASE"),
-            load=given,
-            turn_speed=None if kind == "joint" else _turn_speed(memory),
-        )
-        memory.kept[key] = found
-    return found
+    """A motion with all that is set for it, but for its target."""
+    load, part = memory.read("$LOAD"), memory.read("$LOAD.M")
+    given = load_of(load)
+    if part is not None and not isinstance(load, Record):  # of a load whose whole is not known
+        given = UnclearLoad("$LOAD.M", syntax.number(part))
+    return ArmMotion(
+        kind,
+        UnresolvedTarget(move.text, "undefined"),
+        speed=_speed(memory, kind),
+        acceleration=_acceleration(memory, kind),
+        zone=_zone(memory, kind, move.words),
+        tool=_frame(memory, "$TOOL"),
+        base=_frame(memory, "$BASE"),
+        load=given,
+        turn_speed=None if kind == "joint" else _turn_speed(memory),
+    )
 
 
 def _speed(memory: ProgramMemory, kind: MotionKind) -> Rate | None:

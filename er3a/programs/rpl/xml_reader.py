@@ -184,8 +184,6 @@ def text_of(element: Element) -> str:
         case "for":
             step = f" BY {inner('by')}" if element.find("by") is not None else ""
             return f"FOR {inner('var')} := {inner('from')} TO {inner('to')}{step} DO"
-        case "rem":
-            return f"(* {inner('text')} *)"
         case "call":
             name = "".join(_text(each, "name") for each in element.findall("subroutine"))
             arguments = ", ".join(map(_own_text, element.findall("subroutine/args/arg")))

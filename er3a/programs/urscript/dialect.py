@@ -56,6 +56,7 @@ PARAMETERS = {
     "movec": ("pose_via", "pose_to", "a", "v", "r", "mode"),
 }
 DEFAULTS = {"movej": (1.4, 1.05), "movel": (1.2, 0.25), "movep": (1.2, 0.25), "movec": (1.2, 0.25)}
+SAME_TURN = 1e-9  # of an element of a rotation matrix
 ROBOT_BASE = NamedFrame("base", np.eye(4))
 RESTING = frozenset(("set_gravity", "set_payload_mass", "set_payload_cog", "servoc", "servoj", "speedj", "speedl"))
 """What is not followed, and sets no tool; some of them move the arm."""
@@ -76,7 +77,7 @@ is_within_safety_limits modbus_add_rtu_signal modbus_add_signal modbus_delete_si
 modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_request_update_signal_value
 modbus_send_custom_command modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
 modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency popup pose_dist powerdown
-interpolate_pose rotvec2rpy rpy2rotvec make_list size normalize log pose_sub get_target_waypoint
+interpolate_pose rotvec2rpy rpy2rotvec make_list size log
 stopj stopl
 random read_input_boolean_register read_input_float_register read_input_integer_register
 read_output_boolean_register read_output_float_register read_output_integer_register read_port_bit
@@ -113,15 +114,17 @@ LOADS = {"set_payload": ("m", "cog"), "set_target_payload": ("m", "cog", "inerti
 """Functions that say what hangs on the flange, by their parameters."""
 SIGNATURES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("get_actual_joint_positions", "get_target_joint_positions", "get_actual_tcp_pose"), ()),
-    **dict.fromkeys(("get_target_tcp_pose", "get_tcp_offset"), ()),
+    **dict.fromkeys(("get_target_tcp_pose", "get_target_waypoint", "get_tcp_offset"), ()),
     "get_actual_tool_flange_pose": (),
     "get_forward_kin": ("q",),
     "get_inverse_kin": ("x", "qnear"),
     "pose_trans": ("p_from", "p_from_to"),
     "pose_add": ("p_1", "p_2"),
+    "pose_sub": ("p_to", "p_from"),
     "pose_inv": ("p_from",),
     "point_dist": ("p_from", "p_to"),
     "norm": ("a",),
+    "normalize": ("v",),
     "length": ("v",),
     "get_list_length": ("v",),
     **dict.fromkeys(("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil", "abs"), ("f",)),
@@ -358,7 +361,7 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> Value | Non
     .. [1] Universal Robots, *User Manual UR5/CB3*, version 3.10, section 14.6, conditional blend trajectories.
     """
     here, tool = memory.here, _tool(memory)
-    if here.passing:
+    if here.passing and name != "get_target_waypoint":
         here = Position()
     match name:
         case "get_actual_joint_positions" | "get_target_joint_positions":
@@ -372,7 +375,7 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> Value | Non
             here = Position(joints.joints) if isinstance(joints, JointTarget) else Position()
         case "get_actual_tool_flange_pose":
             tool = NamedFrame("flange", np.eye(4))
-        case "get_forward_kin" | "get_actual_tcp_pose" | "get_target_tcp_pose":
+        case "get_forward_kin" | "get_actual_tcp_pose" | "get_target_tcp_pose" | "get_target_waypoint":
             pass
         case _:
             return None
@@ -393,16 +396,21 @@ def _of_values(name: str, values: list[Value]) -> Value | None:
     match name:
         case "length" | "get_list_length":
             return len(value) if isinstance(value, tuple) else None
-        case "norm" if plain and finite(plain):
-            return math.hypot(*plain)
+        case "norm" | "normalize" if plain and finite(plain):
+            size = math.hypot(*plain)
+            return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
         case "pose_inv" if len(poses) == 1:
             return _record(np.asarray(np.linalg.inv(poses[0]), np.float64))
         case "pose_trans" if len(poses) == 2:
             return _record(poses[0] @ poses[1])
-        case "pose_add" if len(poses) == 2:
-            found = poses[0] @ poses[1]
-            found[:3, 3] = poses[0][:3, 3] + poses[1][:3, 3]
-            return _record(found)
+        case "pose_add" | "pose_sub" if len(poses) == 2:
+            (a, b), sign = poses, 1 if name == "pose_add" else -1
+            turn = b[:3, :3] if sign > 0 else b[:3, :3].T
+            found = a.copy()
+            found[:3, 3] += sign * b[:3, 3]
+            found[:3, :3] = a[:3, :3] @ turn
+            known = sign > 0 or np.allclose(found[:3, :3], turn @ a[:3, :3], rtol=0, atol=SAME_TURN)
+            return _record(found) if known else None  # in which frame a difference turns is not documented
         case "point_dist" if len(poses) == 2:
             return float(np.linalg.norm(poses[0][:3, 3] - poses[1][:3, 3]))
     return None

@@ -7,7 +7,7 @@ it; blocks, brackets and texts without an end are errors.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from dataclasses import replace
 
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
@@ -15,6 +15,7 @@ from er3a.programs.instructions import Place
 from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked
 from er3a.programs.syntax import (
     Assign,
+    Call,
     Element,
     Expression,
     Invocation,
@@ -23,6 +24,7 @@ from er3a.programs.syntax import (
     Program,
     Routine,
     Variable,
+    called_by_others,
 )
 
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
@@ -50,6 +52,11 @@ class UrWords(Words):
         """Nothing may follow but a semicolon."""
         self.accept(";")
         super().finish()
+
+    def parameter(self) -> syntax.RoutineParameter:
+        """A parameter of a routine's head, with the value that it has if the caller gives none."""
+        name = self.name()
+        return syntax.RoutineParameter(name, False, self.expression() if self.accept("=") else None)
 
     def special(self) -> Expression | None:
         """Lists and poses, with an index after them."""
@@ -80,8 +87,7 @@ def read_urscript(source: ProgramText) -> Program:
         for texts, brackets and blocks without an end
     """
     reader = _UrReader(source)
-    by_name = linked(reader.read())
-    return Program("urscript", source.path.stem, source.path, by_name, "", lines=source.lines)
+    return Program("urscript", source.path.stem, source.path, reader.read(), "", lines=source.lines)
 
 
 class _UrReader:
@@ -91,7 +97,7 @@ class _UrReader:
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
 
-    def read(self) -> list[Routine]:
+    def read(self) -> dict[str, Routine]:
         """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
         for place, text, is_comment in statements(self.source, BREAKS, _is_over):
@@ -104,17 +110,17 @@ class _UrReader:
             if builder.blocks:
                 builder.routine(place)
             raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
-        top = self.open[0]
-        names = {each.name for each in self.routines}
-        if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
-            called = {
-                name for each in self.routines for step in each.code for name in _called(step) if name != each.name
-            }
-            outermost = [each for each in self.routines if each.name in self.outermost and not each.thread]
-            starts = [each for each in outermost if each.name not in called] or outermost
-            if starts:
-                top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
-        return [*self.routines, top.routine(place)]
+        return self._begun(linked([*self.routines, self.open[0].routine(place)]))
+
+    def _begun(self, routines: dict[str, Routine]) -> dict[str, Routine]:
+        """The routines; the one without a name calls the first of the others if it has nothing to do itself."""
+        top, called = routines[""], called_by_others(routines)
+        outermost = [each for name in self.outermost if not (each := routines[name]).thread]
+        starts = [each for each in outermost if each.name not in called] or outermost
+        if starts and not any(isinstance(each, Move | Call) for each in top.code):
+            start = Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START)
+            routines[""] = replace(top, code=(*top.code[:-1], start, top.code[-1]))
+        return routines
 
     def _statement(self, place: Place, text: str) -> None:
         builder = self.open[-1]
@@ -154,15 +160,8 @@ class _UrReader:
     def _begin(self, words: UrWords, place: Place) -> None:
         kind = words.take()
         name = words.name()
-        parameters = []
         words.expect("(")
-        while not words.accept(")"):
-            parameter = words.name()
-            default = words.expression() if words.accept("=") else None
-            parameters.append(syntax.RoutineParameter(parameter, False, default))
-            if not words.accept(","):
-                words.expect(")")
-                break
+        parameters = words.listed(")", words.parameter)
         words.accept(":")
         words.finish()
         self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
@@ -233,8 +232,3 @@ def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> 
         return False
     builder.unclear(place, Variable(name), text)
     return True
-
-
-def _called(operation: syntax.Operation) -> Iterator[str]:
-    """Functions that an operation calls."""
-    return (each.function for each in syntax.parts(operation) if isinstance(each, Invocation))

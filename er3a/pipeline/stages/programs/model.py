@@ -32,7 +32,6 @@ class FindingAt:
 
     file: str
     line: int
-    element: str
     level: Level
     times: int
     finding: Finding
@@ -52,7 +51,6 @@ def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> 
     return FindingAt(
         each.place.file.name if each.place.file else "",
         each.place.line,
-        each.place.element,
         each.level,
         each.times,
         _without_path(each.finding),
