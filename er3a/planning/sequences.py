@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
@@ -416,14 +417,68 @@ class JointSequence:
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
-    """A piece of a :class:`SegmentPath`, which explains the names."""
+class _Leg:
+    """A straight way of the joints: from ``start`` (n,) by ``step`` (n,), rad."""
 
+    start: Reals
+    step: Reals
+    rotation: ClassVar[Reals] = np.zeros(0)
+
+    def points(self, progress: Reals) -> Reals:
+        return self.start + np.asarray(progress)[..., None] * self.step
+
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        return self.step, np.zeros_like(self.step)
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of a sequence: of a part between shares of it, or the rounded corner where a part begins.
+
+    Attributes
+    ----------
+    part : number of the part in whose frame it is written
+    span : its length; shares : of the part; None of a corner
+    """
+
+    part: int
     span: float
     coefficients: Reals
-    origin: Reals
-    arc: Arc | None = None
-    arc_shares: tuple[float, float] = (0.0, 1.0)
+    shares: tuple[float, float] | None = None
+
+
+def _pieces(parts: Many[Segment | _Leg], sizes: Reals, blends: Reals) -> tuple[list[_Piece], Reals, Flags]:
+    """Parts with rounded corners.
+
+    Returns
+    -------
+    pieces : one after another
+    off : (m, k), by how much the middle of each rounded corner misses it, after a row of 0
+    runs_on : (n - 1,), where the next part goes on as the one before ends, so that a sharp corner is none
+    """
+    starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
+    pieces: list[_Piece] = []
+    off, runs_on = [0.0 * _beside(parts[0], 0.0, 1.0, 0.0)[0]], []
+    for k, part in enumerate(parts):
+        u = np.array([starts[k], ends[k]])
+        if u[1] - u[0] > RUNS_ON:
+            both = np.hstack([part.points(u), u[:, None] * part.rotation])
+            pieces.append(_Piece(k, (u[1] - u[0]) * sizes[k], straight(*both), (u[0], u[1])))
+        if k + 1 == len(parts):
+            break
+        onward, span = parts[k + 1], 2 * blends[k]
+        if span > 0:
+            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
+            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
+            pieces.append(_Piece(k + 1, span, joining(before, after, span)))
+            middle = 0.5 ** np.arange(POWERS) @ pieces[-1].coefficients
+            off.append(middle - _beside(onward, 0.0, 1.0, 0.0)[0])
+            runs_on.append(False)
+        else:
+            ending = _beside(part, 1.0, sizes[k], 0.0)[1]
+            beginning = _beside(onward, 0.0, sizes[k + 1], 0.0)[1]
+            runs_on.append(np.linalg.norm(ending - beginning) < RUNS_ON * np.linalg.norm(ending))
+    return pieces, np.array(off), np.array(runs_on, bool)
 
 
 def segment_path(
@@ -449,39 +504,19 @@ def segment_path(
     """
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     _check(sizes, blends, 1000.0, "mm")
-    firsts, lasts = ([part.twists(np.array(share)) for part in segments] for share in (0.0, 1.0))
-    runs_on = [
-        np.linalg.norm(last[0] / a - first[0] / b) < RUNS_ON * np.linalg.norm(last[0] / a)
-        for last, first, a, b in zip(lasts, firsts[1:], sizes, sizes[1:])
-    ]
-    starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
-    pieces: list[_Piece] = []
-    misses = np.zeros(2)
-    for k, part in enumerate(segments):
-        origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
-        if u[1] - u[0] > RUNS_ON:
-            ends_of_part = np.hstack([part.points(u), u[:, None] * part.rotation])
-            arc = part if isinstance(part, Arc) else None
-            pieces.append(_Piece((u[1] - u[0]) * sizes[k], straight(*ends_of_part), origin, arc, (u[0], u[1])))
-        if k + 1 < len(segments) and blends[k] > 0:
-            onward = segments[k + 1]
-            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
-            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
-            span = 2 * blends[k]
-            pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
-            off = _midway(pieces[-1].coefficients) - np.append(onward.T_start[:3, 3], np.zeros(3))
-            misses = np.maximum(misses, [np.linalg.norm(off[:3]), np.linalg.norm(off[3:])])
-    law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
+    pieces, off, runs_on = _pieces(segments, sizes, blends)
+    law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
+    whose = [(segments[piece.part], piece.shares) for piece in pieces]
     return SegmentPath(
         duration=duration,
         law=law,
-        curve=_curve([piece.span for piece in pieces], [piece.coefficients for piece in pieces]),
-        origins=np.array([piece.origin for piece in pieces]),
-        arcs=tuple(piece.arc for piece in pieces),
-        arc_shares=np.array([piece.arc_shares for piece in pieces]),
+        curve=_curve(pieces),
+        origins=np.array([part.T_start[:3, :3] for part, _ in whose]),
+        arcs=tuple(part if isinstance(part, Arc) and shares else None for part, shares in whose),
+        arc_shares=np.array([shares or (0.0, 1.0) for _, shares in whose]),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
-        misses=misses,
+        misses=np.array([np.linalg.norm(each, axis=1).max() for each in (off[:, :3], off[:, 3:])]),
     )
 
 
@@ -509,31 +544,9 @@ def joint_sequence(
     steps = np.diff(points, axis=0)
     sizes = np.abs(steps).max(axis=1)
     _check(sizes, blends, np.degrees(1.0), "deg")
-    rates = steps / sizes[:, None]
-    runs_on = np.abs(np.diff(rates, axis=0)).max(axis=1) < RUNS_ON
-    spans, coefficients = [], []
-    still = misses = np.zeros(points.shape[1])
-    cut = np.concatenate([[0.0], blends, [0.0]])
-    for k in range(len(steps)):
-        a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
-        rest = sizes[k] - cut[k] - cut[k + 1]
-        if rest > RUNS_ON * sizes[k]:
-            spans.append(rest)
-            coefficients.append(straight(a, b))
-        if cut[k + 1] > 0:
-            onward = points[k + 1] + cut[k + 1] * rates[k + 1]
-            span = 2 * cut[k + 1]
-            spans.append(span)
-            coefficients.append(joining((b, rates[k], still), (onward, rates[k + 1], still), span))
-            misses = np.maximum(misses, np.abs(_midway(coefficients[-1]) - points[k + 1]))
+    pieces, off, runs_on = _pieces([_Leg(*leg) for leg in zip(points, steps)], sizes, blends)
     law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
-    return JointSequence(duration, law, _curve(spans, coefficients), misses)
-
-
-def _midway(coefficients: Reals) -> Reals:
-    """Value (k,) of a piece in its middle."""
-    found: Reals = 0.5 ** np.arange(POWERS) @ coefficients
-    return found
+    return JointSequence(duration, law, _curve(pieces), np.abs(off).max(axis=0))
 
 
 def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
@@ -547,18 +560,18 @@ def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
             raise PathError(k + 1, problem + f"{most * unit:.4g} {name}")
 
 
-def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
-    """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its path length."""
+def _beside(part: Segment | _Leg, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
+    """Position and rotation vector of a part beside a corner, with derivatives by its path length."""
     first, second = part.twists(np.array(share))
     value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
     return value, first / size, second / size**2
 
 
-def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
-    edges = np.concatenate([[0.0], np.cumsum(spans)])
+def _curve(pieces: Many[_Piece]) -> Curve:
+    edges = np.concatenate([[0.0], np.cumsum([piece.span for piece in pieces])])
     edges /= edges[-1]
     edges[-1] = 1.0
-    return Curve(edges, np.array(coefficients).reshape(len(spans), POWERS, -1))
+    return Curve(edges, np.array([piece.coefficients for piece in pieces]))
 
 
 def _timed(
