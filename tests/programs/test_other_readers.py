@@ -112,7 +112,10 @@ FOR i := 1 TO 3 BY 2 DO
 END_FOR;
 IF i = 5 THEN MJOINT(POINTJ(1,0,0,0,0,0), v50perc, fine, tool0); ELSE DWELL(9); END_IF;
 MJOINT(*, v500, fine, tool0);
-IF i <> 5 THEN DWELL(1); ELSIF i = 5 THEN DWELL(2); END_IF;
+CASE i OF
+  1,2: DWELL(1);
+  5: DWELL(2);
+END_CASE;
 REPEAT i := i - 1; UNTIL i <= 0 END_REPEAT;
 WAIT(NOT io.DIn[3]);
 jump(3);

@@ -14,11 +14,12 @@ from er3a.programs.evaluation import (
     Dialect,
     ProgramMemory,
     evaluated,
+    external_axes,
     target_numbers,
     unresolved,
 )
 from er3a.programs.instructions import ArmMotion, NamedFrame, Rate, UnresolvedTarget, Zone
-from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, POSITION
+from er3a.programs.rpl.reader import CONFIGURATION, FIELDS, JOINTS, LIBRARY_NAMES, OUTER, POSITION
 from er3a.programs.syntax import Expression, Invocation, Move, Record, Unclear, Value, number, shown
 
 SPEED = re.compile(r"v(\d+(?:\.\d+)?)(perc)?$", re.IGNORECASE)
@@ -33,7 +34,7 @@ class RplDialect(Dialect):
 
     whole_division = None
     signals = ("io.", "fidbus.")
-    harmless = SOCKETS | {*FIELDS, "EPOINTJ", "EPOINTC", "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
+    harmless = SOCKETS | {*FIELDS, "OFFSET", *IN_DEGREES, *map(str.lower, IN_DEGREES)}
 
     def function(self, memory: ProgramMemory, name: str, given: Invocation) -> Value:
         """The value of a function of RPL: points, OFFSET, roots and absolute values.
@@ -116,6 +117,8 @@ def _point(name: str, values: list[Value | None]) -> Value:
     if not 6 <= len(values) <= len(fields) or None in values:
         return Unclear(f"{name}({', '.join('' if each is None else shown(each) for each in values)})")
     given = [each for each in values if each is not None]
+    if name == "EPOINTC" and len(given) == 10 and isinstance(given[6], str):
+        fields = FIELDS["POINTC"]
     return Record(name, tuple(zip(fields, given)))
 
 
@@ -139,12 +142,13 @@ def _target(value: Value, text: str) -> instructions.Target:
         return unresolved(value)
     if not isinstance(value, Record) or not {key for key, _ in value.items} <= set(FIELDS.get(value.kind, ())):
         return UnresolvedTarget(text, "not_understood")
-    keys = JOINTS if value.kind == "POINTJ" else POSITION
+    keys = JOINTS if value.kind in ("POINTJ", "EPOINTJ") else POSITION
     plain = target_numbers([value.get(key) for key in keys], text)
     if isinstance(plain, UnresolvedTarget):
         return plain
+    outer = external_axes(value, OUTER)
     if keys is JOINTS:
-        return instructions.JointTarget(np.radians(plain))
+        return instructions.JointTarget(np.radians(plain), outer)
     given = ((key, value.get(key)) for key in CONFIGURATION)
     configuration = tuple((key, part) for key, part in given if isinstance(part, (int, float, str)))
-    return instructions.PoseTarget(instructions.pose_of(plain, "efort"), configuration)
+    return instructions.PoseTarget(instructions.pose_of(plain, "efort"), configuration, external=outer)

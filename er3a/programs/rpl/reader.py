@@ -29,10 +29,13 @@ from er3a.programs.syntax import (
 MOTIONS = ("MJOINT", "MLIN")
 POSITION = ("x", "y", "z", "a", "b", "c")
 JOINTS = ("j1", "j2", "j3", "j4", "j5", "j6")
+OUTER = ("e1", "e2", "e3", "e4", "e5", "e6")
 CONFIGURATION = ("cfg", "t1", "t2", "t3")
 FIELDS = {
     "POINTJ": JOINTS,
     "POINTC": POSITION + CONFIGURATION,
+    "EPOINTJ": JOINTS + OUTER,
+    "EPOINTC": POSITION + OUTER + CONFIGURATION,
 }
 
 
@@ -111,8 +114,9 @@ def _call(builder: CodeBuilder, place: Place, left: Invocation, text: str) -> No
 
 BREAKS = re.compile(
     r"""(?P<comment>\(\*(?!\s*,)(?s:.*?)\*\)|//[^\n]*)|(?P<text>"[^"\n]*"|'[^'\n]*')|(?P<bad>\(\*(?!\s*,)|["'])"""
-    r"""|(?P<alone>\b(?:ELSE|REPEAT)\b)|(?P<mark>;|\b(?:THEN|DO)\b)|(?P<line>\n)"""
+    r"""|(?P<alone>\b(?:ELSE|REPEAT)\b)|(?P<mark>;|\b(?:THEN|DO|OF)\b)|(?P<line>\n)"""
 )
+CASE_LABEL = re.compile(r"\s*(-?\w+(?:\s*,\s*-?\w+)*)\s*:(?!=)")
 VARIABLE = re.compile(
     r"\s*(Routine|Module|Input|Output|Global|Local)\s+(?:Var|Const|Retain|Persistent)\s+(\w+)\s+(\w+)"
     r"\s*(\[[^\]]*\])?\s*(?::?=\s*(.*?))?\s*;?\s*$",
@@ -169,6 +173,10 @@ def statement(builder: CodeBuilder, place: Place, text: str) -> None:
     InputError
         where a block is ended that was not begun, and where brackets are nested too deeply
     """
+    if builder.inside("switch") and (label := CASE_LABEL.match(text)) is not None:
+        values = [expression(part) for part in label[1].split(",")]
+        builder.case(place, values, label[1])
+        text = text[label.end() :].strip()
     if not text:
         return
     try:
@@ -185,9 +193,11 @@ BLOCKS = {
     "WHILE": ("while", "DO"),
     "FOR": ("for", ":= TO BY DO"),
     "UNTIL": ("until", "END_REPEAT"),
+    "CASE": ("switch", "OF"),
     "EXIT": ("leave", ""),
     "CONTINUE": ("next", ""),
     "END_REPEAT": ("nothing", ""),
+    "END_CASE": ("close switch", ""),
     **{word: (word.lower(), "") for word in ("ELSE", "REPEAT", "RETURN", "GOTO", "LABEL")},
     **{f"END_{word}": (f"close {word.lower()}", "") for word in ("IF", "WHILE", "FOR")},
 }
