@@ -27,7 +27,7 @@ NOT_IN_THE_FILE = frozenset(
 )
 """Why the target of a motion is not in the program's files."""
 
-ADVICE = frozenset(("zone_too_large", "suspect_number", "whole_turn", "joint_jumps", "frame_given_twice"))
+ADVICE = frozenset(("zone_too_large", "suspect_number", "whole_turn", "joint_jumps"))
 """What is said of a motion that is within limits, reach, configuration, rates and clear of the arm itself."""
 
 

@@ -19,9 +19,8 @@ from er3a.finding import Finding, fact
 from er3a.formats.mesh_file import read_link_mesh, read_text
 from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import ProgramText
-from er3a.programs.rpl.xml_reader import LINE, read_xml
 from er3a.robots.masses import no_body
+from er3a.xml_lines import LINE, read_xml
 
 WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
 """Rules of numbers that can't be meant; the others name what is missing or no data."""
@@ -54,7 +53,7 @@ def lint(path: Path) -> tuple[tuple[Finding, Place], ...]:
     text = read_text(path, MAX_BYTES)
     if XACRO in text:
         return ()
-    root = read_xml(ProgramText(path, text))
+    root = read_xml(text, path)
     broken: dict[str, list[tuple[Element, str]]] = {}
     for code, element, name in (*_of_joints(root), *_of_links(path, root)):
         broken.setdefault(code, []).append((element, name))

@@ -9,6 +9,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,12 +42,12 @@ class Times:
 
 @dataclass(frozen=True, eq=False)
 class LegTimes:
-    """How long each leg of a sequence takes, from corner to corner; at a corner that is not rounded it stops.
+    """How long each leg of a sequence takes that stops at all its corners.
 
     Attributes
     ----------
     times : (n,), s
-    ramps : (n,), s, of each ramp of a leg's trapezoid, where it starts from rest or comes to it
+    ramps : (n,), the share of its time that each of the two ramps of a leg's trapezoid takes
     """
 
     times: Reals
@@ -71,6 +72,47 @@ def check_times(t: Reals, start: float, end: float) -> None:
         raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from {start:g} to {end:g} s")
 
 
+POWERS = 6  # of a quintic, 0 to 5
+
+
+def joining(before: Many[Reals | float], after: Many[Reals | float], span: float | Reals) -> Reals:
+    """The quintic piece that takes over value and derivatives on one side and joins those on the other.
+
+    Parameters
+    ----------
+    before, after : value, first and second derivative, each (k,), or one number for all
+    span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
+        values are (m, k)
+
+    Returns
+    -------
+    coefficients : (6, k), of the powers 0 to 5 of the piece's share; (6, m, k) of m pieces
+    """
+    (x0, v0, a0), (x1, v1, a1) = ((x, v * span, a * span**2) for x, v, a in (before, after))
+    # What the cubic, quartic and quintic terms have to add to the parabola of the start values.
+    value, velocity, acceleration = x1 - x0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
+    c3 = 10 * value - 4 * velocity + acceleration / 2
+    c4 = -15 * value + 7 * velocity - acceleration
+    c5 = 6 * value - 3 * velocity + acceleration / 2
+    return np.stack(np.broadcast_arrays(x0, v0, a0 / 2, c3, c4, c5))
+
+
+def polynomial(coefficients: Reals, u: Reals) -> Rates:
+    """Value, first and second derivative of a polynomial, by Horner's rule.
+
+    Parameters
+    ----------
+    coefficients : (n, ...), of the powers from 0 on
+    u : of a shape that goes with that of a coefficient
+    """
+    value = slope = half_bend = np.zeros(())
+    for each in coefficients[::-1]:
+        half_bend = half_bend * u + slope
+        slope = slope * u + value
+        value = value * u + each
+    return value, slope, 2 * half_bend
+
+
 def quintic(
     t: Reals, duration: float, start: Reals, end: Reals, velocities: Ends = (0.0, 0.0), accelerations: Ends = (0.0, 0.0)
 ) -> Rates:
@@ -89,16 +131,8 @@ def quintic(
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     tau = np.asarray(t, float).reshape(np.shape(t) + (1,) * start.ndim) / duration
-    v0, v1 = (np.asarray(velocity) * duration for velocity in velocities)
-    a0, a1 = (np.asarray(acceleration) * duration**2 for acceleration in accelerations)
-    # What the cubic, quartic and quintic terms have to add to the parabola of the start values.
-    position, velocity, acceleration = end - start - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
-    c3 = 10 * position - 4 * velocity + acceleration / 2
-    c4 = -15 * position + 7 * velocity - acceleration
-    c5 = 6 * position - 3 * velocity + acceleration / 2
-    x = start + tau * (v0 + tau * (a0 / 2 + tau * (c3 + tau * (c4 + tau * c5))))
-    dx = v0 + tau * (a0 + tau * (3 * c3 + tau * (4 * c4 + tau * 5 * c5)))
-    ddx = a0 + tau * (6 * c3 + tau * (12 * c4 + tau * 20 * c5))
+    before, after = zip((start, end), map(np.asarray, velocities), map(np.asarray, accelerations))
+    x, dx, ddx = polynomial(joining(before, after, duration), tau)
     return x, dx / duration, ddx / duration**2
 
 

@@ -19,10 +19,13 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 
 from er3a.by_value import ByValue
 from er3a.errors import PathError, PoseError
@@ -30,7 +33,18 @@ from er3a.geometry.transforms import check_poses, exp_rotation, posed
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.planning.moves import Segment, rotation_between
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import FromRestToRest, LegTimes, Rates, TimeLaw, Times, Timetable, times_at
+from er3a.planning.profiles import (
+    POWERS,
+    FromRestToRest,
+    LegTimes,
+    Rates,
+    TimeLaw,
+    Times,
+    Timetable,
+    joining,
+    polynomial,
+    times_at,
+)
 
 ON_A_LINE = 1e-6  # rad; three points this near to a straight line fix no circle
 
@@ -140,7 +154,6 @@ def arc(
     return Arc(T_start, rotation, duration, half_turn, ramp, start + to_centre, normal, float(angle))
 
 
-POWERS = 6  # of a quintic, 0 to 5
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
@@ -175,15 +188,8 @@ class Curve:
     def __call__(self, s: Reals) -> tuple[Reals, Reals, Reals]:
         """Value, first and second derivative by the parameter, each (..., k), at parameters (...,)."""
         i, u = self.piece(s)
-        c, u = self.coefficients[i], u[..., None]
         span = (self.edges[i + 1] - self.edges[i])[..., None]
-        x, dx, ddx = c[..., 5, :], 5 * c[..., 5, :], 20 * c[..., 5, :]
-        for power in range(4, -1, -1):
-            x = c[..., power, :] + u * x
-            if power >= 1:
-                dx = power * c[..., power, :] + u * dx
-            if power >= 2:
-                ddx = power * (power - 1) * c[..., power, :] + u * ddx
+        x, dx, ddx = polynomial(np.moveaxis(self.coefficients[i], -2, 0), u[..., None])
         return x, dx / span, ddx / span**2
 
 
@@ -203,35 +209,9 @@ def straight(start: Reals, end: Reals) -> Reals:
     return found
 
 
-def joining(before: tuple[Reals, Reals, Reals], after: tuple[Reals, Reals, Reals], span: float | Reals) -> Reals:
-    """The quintic piece that takes over value and derivatives on one side and joins those on the other.
-
-    Parameters
-    ----------
-    before, after : value, first and second derivative, each (k,)
-    span : how much of the parameter, by which the derivatives are meant, the piece takes; (m, 1) of m pieces, whose
-        values are (m, k)
-
-    Returns
-    -------
-    coefficients : (6, k), of the powers 0 to 5 of the piece's share; (6, m, k) of m pieces
-    """
-    x0, v0, a0 = before[0], before[1] * span, before[2] * span**2
-    x1, v1, a1 = after[0], after[1] * span, after[2] * span**2
-    value, velocity, acceleration = x1 - x0 - v0 - a0 / 2, v1 - v0 - a0, a1 - a0
-    return np.stack(
-        [
-            x0,
-            v0,
-            a0 / 2,
-            10 * value - 4 * velocity + acceleration / 2,
-            -15 * value + 7 * velocity - acceleration,
-            6 * value - 3 * velocity + acceleration / 2,
-        ]
-    )
-
-
-SMALL = 1e-2  # rad^2; below it the series are exact to rounding
+SERIES = 20  # terms of coefficients of a turn's rates: they are exact to rounding for more than two turns
+OF_TURN = [[(-1.0) ** k / math.factorial(2 * k + first) for k in range(SERIES)] for first in (2, 3)]
+"""(1 - cos) / x and (angle - sin) / (x angle) as series of the squared angle x."""
 
 
 def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
@@ -246,7 +226,8 @@ def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
     omega, its derivative : (..., 3), in the frame that the rotation vector is written in
     """
     x = (w * w).sum(axis=-1, keepdims=True)
-    a, b, da, db = _coefficients(x)
+    a, b = (polyval(x, series) for series in OF_TURN)
+    da, db = (polyval(x, polyder(series)) for series in OF_TURN)
     dx = 2 * (w * dw).sum(axis=-1, keepdims=True)
     first = np.cross(w, dw)
     second = np.cross(w, first)
@@ -254,23 +235,6 @@ def spin(w: Reals, dw: Reals, ddw: Reals) -> tuple[Reals, Reals]:
     third = np.cross(w, ddw)
     slope = ddw + da * dx * first + a * third + db * dx * second + b * (np.cross(dw, first) + np.cross(w, third))
     return omega, slope
-
-
-def _coefficients(x: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-    """(1 - cos) / x and (angle - sin) / (x angle) of the squared angle x, and their derivatives by x."""
-    small = x < SMALL
-    y = np.where(small, 1.0, x)
-    angle = np.sqrt(y)
-    s, c = np.sin(angle), np.cos(angle)
-    a, b = (1 - c) / y, (angle - s) / (y * angle)
-    da, db = (s / (2 * angle) - a) / y, ((1 - c) / (2 * y) - 1.5 * b) / y
-    z = np.where(small, x, 0.0)
-    return (
-        np.where(small, 1 / 2 - z / 24 * (1 - z / 30 * (1 - z / 56 * (1 - z / 90))), a),
-        np.where(small, 1 / 6 - z / 120 * (1 - z / 42 * (1 - z / 72 * (1 - z / 110))), b),
-        np.where(small, -1 / 24 + z / 360 * (1 - 3 * z / 112 * (1 - 2 * z / 135)), da),
-        np.where(small, -1 / 120 + z / 2520 * (1 - z / 48 * (1 - 2 * z / 165)), db),
-    )
 
 
 TURN_LENGTH = 0.1  # m per rad, of a turn on the spot, when time is shared out
@@ -453,14 +417,68 @@ class JointSequence:
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
-    """A piece of a :class:`SegmentPath`, which explains the names."""
+class _Leg:
+    """A straight way of the joints: from ``start`` (n,) by ``step`` (n,), rad."""
 
+    start: Reals
+    step: Reals
+    rotation: ClassVar[Reals] = np.zeros(0)
+
+    def points(self, progress: Reals) -> Reals:
+        return self.start + np.asarray(progress)[..., None] * self.step
+
+    def twists(self, progress: Reals) -> tuple[Reals, Reals]:
+        return self.step, np.zeros_like(self.step)
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A piece of a sequence: of a part between shares of it, or the rounded corner where a part begins.
+
+    Attributes
+    ----------
+    part : number of the part in whose frame it is written
+    span : its length; shares : of the part; None of a corner
+    """
+
+    part: int
     span: float
     coefficients: Reals
-    origin: Reals
-    arc: Arc | None = None
-    arc_shares: tuple[float, float] = (0.0, 1.0)
+    shares: tuple[float, float] | None = None
+
+
+def _pieces(parts: Many[Segment | _Leg], sizes: Reals, blends: Reals) -> tuple[list[_Piece], Reals, Flags]:
+    """Parts with rounded corners.
+
+    Returns
+    -------
+    pieces : one after another
+    off : (m, k), by how much the middle of each rounded corner misses it, after a row of 0
+    runs_on : (n - 1,), where the next part goes on as the one before ends, so that a sharp corner is none
+    """
+    starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
+    pieces: list[_Piece] = []
+    off, runs_on = [0.0 * _beside(parts[0], 0.0, 1.0, 0.0)[0]], []
+    for k, part in enumerate(parts):
+        u = np.array([starts[k], ends[k]])
+        if u[1] - u[0] > RUNS_ON:
+            both = np.hstack([part.points(u), u[:, None] * part.rotation])
+            pieces.append(_Piece(k, (u[1] - u[0]) * sizes[k], straight(*both), (u[0], u[1])))
+        if k + 1 == len(parts):
+            break
+        onward, span = parts[k + 1], 2 * blends[k]
+        if span > 0:
+            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
+            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
+            pieces.append(_Piece(k + 1, span, joining(before, after, span)))
+            middle = 0.5 ** np.arange(POWERS) @ pieces[-1].coefficients
+            off.append(middle - _beside(onward, 0.0, 1.0, 0.0)[0])
+            runs_on.append(False)
+        else:
+            ending = _beside(part, 1.0, sizes[k], 0.0)[1]
+            beginning = _beside(onward, 0.0, sizes[k + 1], 0.0)[1]
+            runs_on.append(np.linalg.norm(ending - beginning) < RUNS_ON * np.linalg.norm(ending))
+    return pieces, np.array(off), np.array(runs_on, bool)
 
 
 def segment_path(
@@ -486,39 +504,19 @@ def segment_path(
     """
     sizes = np.array([max(part.length, part.turned * TURN_LENGTH) for part in segments])
     _check(sizes, blends, 1000.0, "mm")
-    firsts, lasts = ([part.twists(np.array(share)) for part in segments] for share in (0.0, 1.0))
-    runs_on = [
-        np.linalg.norm(last[0] / a - first[0] / b) < RUNS_ON * np.linalg.norm(last[0] / a)
-        for last, first, a, b in zip(lasts, firsts[1:], sizes, sizes[1:])
-    ]
-    starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
-    pieces: list[_Piece] = []
-    misses = np.zeros(2)
-    for k, part in enumerate(segments):
-        origin, u = part.T_start[:3, :3], np.array([starts[k], ends[k]])
-        if u[1] - u[0] > RUNS_ON:
-            ends_of_part = np.hstack([part.points(u), u[:, None] * part.rotation])
-            arc = part if isinstance(part, Arc) else None
-            pieces.append(_Piece((u[1] - u[0]) * sizes[k], straight(*ends_of_part), origin, arc, (u[0], u[1])))
-        if k + 1 < len(segments) and blends[k] > 0:
-            onward = segments[k + 1]
-            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
-            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
-            span = 2 * blends[k]
-            pieces.append(_Piece(span, joining(before, after, span), onward.T_start[:3, :3]))
-            off = _midway(pieces[-1].coefficients) - np.append(onward.T_start[:3, 3], np.zeros(3))
-            misses = np.maximum(misses, [np.linalg.norm(off[:3]), np.linalg.norm(off[3:])])
-    law, duration = _timed(sizes, np.asarray(blends) == 0, np.array(runs_on, bool), timing, ramp)
+    pieces, off, runs_on = _pieces(segments, sizes, blends)
+    law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
+    whose = [(segments[piece.part], piece.shares) for piece in pieces]
     return SegmentPath(
         duration=duration,
         law=law,
-        curve=_curve([piece.span for piece in pieces], [piece.coefficients for piece in pieces]),
-        origins=np.array([piece.origin for piece in pieces]),
-        arcs=tuple(piece.arc for piece in pieces),
-        arc_shares=np.array([piece.arc_shares for piece in pieces]),
+        curve=_curve(pieces),
+        origins=np.array([part.T_start[:3, :3] for part, _ in whose]),
+        arcs=tuple(part if isinstance(part, Arc) and shares else None for part, shares in whose),
+        arc_shares=np.array([shares or (0.0, 1.0) for _, shares in whose]),
         turned=float(sum(part.turned for part in segments)),
         turns=tuple((k + 1, axis) for k, part in enumerate(segments) for _, axis in part.half_turns()),
-        misses=misses,
+        misses=np.array([np.linalg.norm(each, axis=1).max() for each in (off[:, :3], off[:, 3:])]),
     )
 
 
@@ -546,31 +544,9 @@ def joint_sequence(
     steps = np.diff(points, axis=0)
     sizes = np.abs(steps).max(axis=1)
     _check(sizes, blends, np.degrees(1.0), "deg")
-    rates = steps / sizes[:, None]
-    runs_on = np.abs(np.diff(rates, axis=0)).max(axis=1) < RUNS_ON
-    spans, coefficients = [], []
-    still = misses = np.zeros(points.shape[1])
-    cut = np.concatenate([[0.0], blends, [0.0]])
-    for k in range(len(steps)):
-        a, b = points[k] + cut[k] * rates[k], points[k + 1] - cut[k + 1] * rates[k]
-        rest = sizes[k] - cut[k] - cut[k + 1]
-        if rest > RUNS_ON * sizes[k]:
-            spans.append(rest)
-            coefficients.append(straight(a, b))
-        if cut[k + 1] > 0:
-            onward = points[k + 1] + cut[k + 1] * rates[k + 1]
-            span = 2 * cut[k + 1]
-            spans.append(span)
-            coefficients.append(joining((b, rates[k], still), (onward, rates[k + 1], still), span))
-            misses = np.maximum(misses, np.abs(_midway(coefficients[-1]) - points[k + 1]))
+    pieces, off, runs_on = _pieces([_Leg(*leg) for leg in zip(points, steps)], sizes, blends)
     law, duration = _timed(sizes, np.asarray(blends) == 0, runs_on, timing, ramp)
-    return JointSequence(duration, law, _curve(spans, coefficients), misses)
-
-
-def _midway(coefficients: Reals) -> Reals:
-    """Value (k,) of a piece in its middle."""
-    found: Reals = 0.5 ** np.arange(POWERS) @ coefficients
-    return found
+    return JointSequence(duration, law, _curve(pieces), np.abs(off).max(axis=0))
 
 
 def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
@@ -584,18 +560,18 @@ def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
             raise PathError(k + 1, problem + f"{most * unit:.4g} {name}")
 
 
-def _beside(part: Segment, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
-    """Position and rotation vector (6,) of a segment beside a corner, with derivatives by its path length."""
+def _beside(part: Segment | _Leg, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
+    """Position and rotation vector of a part beside a corner, with derivatives by its path length."""
     first, second = part.twists(np.array(share))
     value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
     return value, first / size, second / size**2
 
 
-def _curve(spans: list[float], coefficients: list[Reals]) -> Curve:
-    edges = np.concatenate([[0.0], np.cumsum(spans)])
+def _curve(pieces: Many[_Piece]) -> Curve:
+    edges = np.concatenate([[0.0], np.cumsum([piece.span for piece in pieces])])
     edges /= edges[-1]
     edges[-1] = 1.0
-    return Curve(edges, np.array(coefficients).reshape(len(spans), POWERS, -1))
+    return Curve(edges, np.array([piece.coefficients for piece in pieces]))
 
 
 def _timed(
@@ -605,10 +581,8 @@ def _timed(
     corners = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     corners[-1] = 1.0
     if isinstance(timing, LegTimes):
-        halts = np.flatnonzero(np.concatenate([[True], sharp, [True]]))
-        times = np.concatenate([[0.0], np.cumsum(timing.times)])[halts]
-        ramps = (timing.ramps[halts[:-1]] + timing.ramps[halts[1:] - 1]) / 2 / np.diff(times)
-        return FromRestToRest(times, corners[halts], np.minimum(ramps, 0.5)), float(times[-1])
+        times = np.append(0.0, np.cumsum(timing.times))
+        return FromRestToRest(times, corners, timing.ramps), float(times[-1])
     halt = np.concatenate([[True], sharp & ~runs_on, [True]])
     if isinstance(timing, Times):
         return Timetable(timing.times, corners[timing.corner], halt[timing.corner]), float(timing.times[-1])

@@ -23,8 +23,8 @@ import numpy as np
 
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import Rates, check_times
-from er3a.planning.sequences import POWERS, Curve, joining
+from er3a.planning.profiles import POWERS, Rates, check_times, joining
+from er3a.planning.sequences import Curve
 
 FIT = 3.0  # times the mean rates beside a point, and the part of them, that the rate at the point may be
 NOISE = 0.1  # of the largest mean rate, of a joint for velocities: samples of accelerations that step miss theirs by it

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
@@ -36,7 +35,7 @@ from er3a.planning.commands import (
 from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check.motion_checks import TURN_LENGTH, AssumedRates, CheckRules, MotionPath
+from er3a.program_check.motion_checks import AssumedRates, CheckRules
 from er3a.program_check.program_check_findings import (
     RANKS,
     Level,
@@ -470,13 +469,12 @@ def _cycle(
     return CycleTime(stopping - saved + pauses, stopping + pauses, pauses, waits, again is not None, complete)
 
 
-MAX_MOTION_SHARE = 0.49  # that a rounded corner takes
 SAME_PLACE = 1e-6  # rad or m, by which the start of a motion may be off the end of the one before
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramPart:
-    """A stretch of a program: joint moves with a stop at each target, or lines and arcs.
+    """A stretch of a program, with a stop at each target: joint moves, or lines and arcs.
 
     Attributes
     ----------
@@ -595,61 +593,24 @@ def _goes_on(before: CheckedMotion, motion: CheckedMotion) -> bool:
 def _part(group: list[tuple[int, CheckedMotion]]) -> ProgramPart:
     lines = (group[0][0], group[-1][0])
     motions = [motion for _, motion in group]
-    ways = [motion.path for motion in motions if motion.path is not None]
     start = motions[0].start
     assert start is not None
+    laws = [motion.path.law for motion in motions if motion.path is not None]
+    timing = LegTimes(np.array([law.duration for law in laws]), np.array([law.ramp for law in laws]))
     if motions[0].motion.kind == "joint":
         points = np.stack([start, *(motion.end for motion in motions if motion.end is not None)])
-        joint_moves = JointSequenceCommand(points, 0.0, _leg_times(ways, [0.0] * len(ways)))
-        return ProgramPart("joint_sequence", lines, joint_moves, motions[0].motion.load)
-    blends = [_blend(one, other) for one, other in pairwise(motions)] + [0.0]
-    segments = tuple(_segment(motion, blend) for motion, blend in zip(motions, blends))
-    command = ToolSequenceCommand(Start(joints=start), segments, _leg_times(ways, blends))
+        return ProgramPart("joint_sequence", lines, JointSequenceCommand(points, 0.0, timing), motions[0].motion.load)
+    command = ToolSequenceCommand(Start(joints=start), tuple(map(_segment, motions)), timing)
     return ProgramPart("sequence", lines, command, motions[0].motion.load)
 
 
-def _leg_times(ways: list[MotionPath], blends: list[float]) -> LegTimes:
-    """How long the motions take, as checked, without the ramps that rounded corners (m, at the ends) save."""
-    rounded = [False, *(blend > 0 for blend in blends)]
-    laws = [way.law for way in ways]
-    times = [law.duration - sum(ends) * law.saved_by_blend for law, ends in zip(laws, pairwise(rounded))]
-    return LegTimes(np.array(times), np.array([law.ramp * law.duration for law in laws]))
-
-
-SAME_PACE = 0.01
-
-
-def _blend(motion: CheckedMotion, after: CheckedMotion) -> float:
-    """m, over which the corner between two motions is rounded: a stop if it is none of this size, or the speed changes,
-    since between stops a path has one speed."""
-    zone = motion.motion.zone
-    known = [way for way in (motion.path, after.path) if way is not None]
-    if zone.kind != "distance" or len(known) < 2:
-        return 0.0
-    paces = [_size(way) / (way.law.duration * (1 - way.law.ramp)) for way in known]
-    if not _same_speed(motion, after) and abs(paces[0] - paces[1]) > SAME_PACE * max(paces):
-        return 0.0
-    return min(zone.value, *(MAX_MOTION_SHARE * way.length for way in known))
-
-
-def _same_speed(motion: CheckedMotion, after: CheckedMotion) -> bool:
-    """Whether two motions are to have one speed, though one may be too short to come to it."""
-    speed, turn_speed = motion.motion.speed, motion.motion.turn_speed  # which may decide
-    alike = turn_speed is None and after.motion.turn_speed is None and speed == after.motion.speed
-    return alike and (speed is None or speed.unit != "s")
-
-
-def _size(way: MotionPath) -> float:
-    return max(way.length, TURN_LENGTH * way.turned)
-
-
-def _segment(checked: CheckedMotion, blend: float) -> SegmentCommand:
+def _segment(checked: CheckedMotion) -> SegmentCommand:
     """The motion's end and point, in the frame that the robot's base is placed in."""
     motion, base = checked.motion, checked.base
     via: Reals | None = None
     if motion.kind == "arc" and isinstance(motion.via, PoseTarget) and base is not None:
         via = (base @ motion.via.pose)[:3, 3]
     if isinstance(motion.target, PoseTarget) and base is not None:
-        return SegmentCommand(base @ motion.target.pose, via, blend=blend)
+        return SegmentCommand(base @ motion.target.pose, via)
     assert checked.end is not None
-    return SegmentCommand(forward(checked.arm, checked.end), via, blend=blend)
+    return SegmentCommand(forward(checked.arm, checked.end), via)

@@ -31,6 +31,7 @@ from er3a.robots.whole_turns import LIMIT_TOLERANCE
 TURN_LENGTH = 0.1  # m of the path, as long as which a turn of the tool by 1 rad counts
 POINTS_APART_M, POINTS_APART_RAD = 0.01, 0.05  # of the tool, or of a joint
 MIN_PARTS, MAX_PARTS = 8, 400
+AHEAD = 0.02  # of a way: what is beyond where it ends has no solution, if it ends for want of one
 SHORTEST_PART = 1e-4  # of a way, in which a joint that moves by more jumps
 NO_WAY = 1e-9  # m or rad
 SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does not matter
@@ -158,7 +159,7 @@ class MotionPath(ByValue):
     share : (N,), of the way, rising from 0; q : (N, n), rad or m, up to where it can be followed
     length : m, of the tool point's way; for a joint move of the straight line between its ends
     turned : rad, by which the tool turns, or for a joint move the joint that turns most
-    stop : share of the way beyond which it can't be followed; None where it can
+    ahead : (4, 4), m, T_world_tool a little beyond where it can't be followed; None where it can
     """
 
     arm: Robot
@@ -168,7 +169,7 @@ class MotionPath(ByValue):
     length: float
     turned: float
     of_tool: bool
-    stop: float | None = None
+    ahead: Reals | None = None
 
     @property
     def t(self) -> Reals:
@@ -178,7 +179,7 @@ class MotionPath(ByValue):
     @property
     def end(self) -> Reals | None:
         """Joints (n,) at the end, rad or m; None where that is not come to."""
-        return self.q[-1] if self.stop is None else None
+        return self.q[-1] if self.ahead is None else None
 
     def at(self, share: Reals) -> Reals:
         """Joints at places of the way, straight between its points.
@@ -345,7 +346,8 @@ def tool_path(
     if motion.with_path and turned > SLIGHT_TURN:
         return fact("not_followed", text=motion.form, reason="turns_with_path")
     share, q, stop = _followed(arm, way.poses, start, _parts(length, turned))
-    return MotionPath(arm, tool_law(motion, length, turned, rules.assumed), share, q, length, turned, True, stop)
+    ahead = None if stop is None else way.poses(np.array(min(stop + AHEAD, 1.0)))
+    return MotionPath(arm, tool_law(motion, length, turned, rules.assumed), share, q, length, turned, True, ahead)
 
 
 def _followed(arm: Robot, poses: Poses, start: Reals, parts: int) -> tuple[Reals, Reals, float | None]:
@@ -380,23 +382,20 @@ def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> 
     target : T_world_tool (4, 4), m, of a line's or arc's end; None for a joint move
     """
     found: Shares = {}
-    if path.stop is not None and target is not None:
-        found[_stopped(path, target)] = float(path.share[-1])  # where the arm still is
+    if path.ahead is not None and target is not None:
+        found[_stopped(path, path.ahead, target)] = float(path.share[-1])  # where the arm still is
     found |= limit_findings(path.arm, path.share, path.q)
-    if path.stop is None and len(path.share) > 1:  # towards the end of reach rates grow without bound
+    if path.ahead is None and len(path.share) > 1:  # towards the end of reach rates grow without bound
         found |= _too_fast(path, rules.limits)
         if not rules.limits.acceleration_assumed:
             found |= _accelerates(path, rules.limits.acceleration)
     return found
 
 
-def _stopped(path: MotionPath, target: Reals) -> Finding:
+def _stopped(path: MotionPath, ahead: Reals, target: Reals) -> Finding:
     """Why a line or arc can't be followed on."""
-    assert path.stop is not None
     arm, last, at_mm = path.arm, path.q[-1], path.along_mm(float(path.share[-1]))
-    here = forward(arm, last)
-    ahead = here + (target - here) * min(1.0, 0.02 + path.stop)  # a pose beyond; its rotation is made one again
-    for pose in (target, _proper(ahead)):
+    for pose in (target, ahead):
         try:
             solutions = inverse(arm, pose, last)
         except PoseError:
@@ -408,13 +407,6 @@ def _stopped(path: MotionPath, target: Reals) -> Finding:
     joint = int(np.abs(other).argmax())
     jump = Amount(float(np.degrees(other[joint])), "deg")
     return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, jump=jump)
-
-
-def _proper(T: Reals) -> Reals:
-    u, _, v = np.linalg.svd(T[:3, :3])
-    found = T.copy()
-    found[:3, :3] = u @ v
-    return found
 
 
 def limit_findings(arm: Robot, share: Reals, q: Reals) -> Shares:

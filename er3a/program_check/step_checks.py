@@ -447,7 +447,7 @@ class Obstacles:
         control point. Both are only looked at where the motions themselves are clear.
         """
         zone, before, after = one.motion.zone, one.path, other.path
-        if zone.kind == "fine" or before is None or after is None or before.stop is not None:
+        if zone.kind == "fine" or before is None or after is None or before.ahead is not None:
             return
         shares = [zone_share(zone, path) for path in (before, after)]
         if zone.kind == "distance" and max(shares) > 0.5 + 1e-9:

@@ -591,23 +591,11 @@ def linked(routines: Iterable[Routine]) -> dict[str, Routine]:
     return {name: replace(each, code=_linked(each.code, by_name)) for name, each in by_name.items()}
 
 
-def _plain(operation: Operation) -> bool:
-    """Whether an operation is a motion to values and names alone, as most lines of long programs are."""
-    return (
-        type(operation) is syntax.Move
-        and all(type(each) is Constant for _, each in operation.settings)
-        and all(type(each) is Constant or type(each) is Variable for each in operation.arguments)
-    )
-
-
 def _linked(given: tuple[Operation, ...], known: Container[str]) -> tuple[Operation, ...]:
     code: list[Operation] = []
     starts: list[int] = []
     for operation in given:
         starts.append(len(code))
-        if _plain(operation):
-            code.append(operation)
-            continue
         calls = _Calls(known, operation)
         last = syntax.mapped(operation, calls.out)
         if isinstance(last, Doing) and last.what.function in known:

@@ -357,7 +357,6 @@ class ProgramMemory:
     ----------
     shared, local : values by name
     types : declared types by name
-    kept : what a language caches until the next assignment
     outside : an element that was asked for and that its list has not, with the declared sizes; empty for none
     here : where the arm is
     cell : what is known of the cell
@@ -369,7 +368,6 @@ class ProgramMemory:
         self.shared: dict[str, Value] = {}
         self.local: dict[str, Value] = {}
         self.types: dict[str, str] = {}
-        self.kept: dict[object, object] = {}
         self.outside = ""
 
     def copy(self) -> ProgramMemory:
@@ -422,7 +420,6 @@ class ProgramMemory:
         name : with fields and indices; fields of some variables of KRL (``WITH_FIELDS``) are set with it
         local : whether it is the routine's own, even if the routine has no such variable yet
         """
-        self.kept.clear()
         if name in WITH_FIELDS:
             unknown = tuple((field, Unclear(f"{name}.{field}")) for field in WITH_FIELDS[name])
             parts = value.items if isinstance(value, Record) else unknown
@@ -479,7 +476,6 @@ class ProgramMemory:
         ----------
         variable : its name without fields and indices; the cell's frames of that name become unclear too
         """
-        self.kept.clear()
         for values, more in ((self.local, ()), (self.shared, self.cell.frames)):
             for name in [each for each in (*values, *more) if root(each) == variable]:
                 values[name] = Unclear(name)

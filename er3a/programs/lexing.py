@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from er3a.errors import InputError, given_bytes
 from er3a.programs.syntax import Binary, Constant, Element, Expression, Invocation, Member, Opaque, Unary, Variable
@@ -36,6 +36,7 @@ def ranked(*levels: str) -> dict[str, int]:
     return {sign: rank for rank, level in enumerate(levels, 1) for sign in level.split()}
 
 
+Item = TypeVar("Item")
 Names = Mapping[str, str]
 """Names of a module that others do not see, with those under which the program has them."""
 NO_NAMES: Names = {}
@@ -209,6 +210,27 @@ class Words:
         self._depth -= 1
         return found
 
+    def listed(self, close: str, each: Callable[[], Item]) -> list[Item]:
+        """What is between commas up to a closing bracket, which is passed.
+
+        Parameters
+        ----------
+        each : reads one of them
+
+        Raises
+        ------
+        MisreadError
+            where another word follows, or nothing after a comma
+        """
+        found: list[Item] = []
+        more = not self.accept(close)
+        while more:
+            found.append(each())
+            more = self.accept(",")
+            if not more:
+                self.expect(close)
+        return found
+
     def arguments(self, close: str = ")") -> tuple[tuple[Expression | None, ...], tuple[tuple[str, Expression], ...]]:
         """Arguments of a call up to the closing bracket, which is passed.
 
@@ -364,9 +386,7 @@ def dotted(expression: Expression) -> str:
 
 
 MAX_PROGRAM_BYTES = 32_000_000
-MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 HIGH_RUNS = re.compile(rb"[\x80-\xff]+")
-DECLARED = re.compile(r"""^\s*<\?xml[^>]*?encoding=["']([\w.-]+)["']""")
 
 
 @dataclass(frozen=True)
@@ -393,7 +413,7 @@ def read_program_text(path: Path) -> ProgramText:
     raw = given_bytes(path, MAX_PROGRAM_BYTES, "Programs are small text files")
     if raw.startswith(b"PK\x03\x04"):
         raise InputError(path, None, "is a ZIP archive", "Unpack it, and name a program in its folder")
-    text = decoded(raw, path).replace("\r\n", "\n").replace("\r", "\n")
+    text = decoded(raw).replace("\r\n", "\n").replace("\r", "\n")
     control = re.search(r"[\x00-\x08\x0e-\x19\x1b-\x1f]", text)
     if control is not None:
         line = text.count("\n", 0, control.start()) + 1
@@ -440,23 +460,16 @@ def named_in(folder: Path, wanted: str, order: Callable[[str], Any] = str) -> Pa
     return next((folder / each for each in held if each.lower() == wanted.lower()), None)
 
 
-def decoded(raw: bytes, path: Path | None = None) -> str:
-    """A text by the mark of its encoding, as UTF-8, as GBK, or as Windows-1252.
+def decoded(raw: bytes) -> str:
+    """A text as UTF-16 where a mark says so, as UTF-8, as GBK, or as Windows-1252.
 
-    Raises
-    ------
-    InputError
-        if a file with a mark does not keep to it
+    Parameters
+    ----------
+    raw : what is in none of these becomes control characters, or marks of replacement
     """
-    for mark, encoding in MARKS:
-        if raw.startswith(mark):
-            try:
-                return raw[len(mark) :].decode(encoding)
-            except UnicodeDecodeError as error:
-                problem = f"begins as {encoding}, but is not"
-                raise InputError(path, f"byte {error.start}", problem, "Save the file as UTF-8") from None
     in_pairs = all(len(run) % 2 == 0 for run in HIGH_RUNS.findall(raw))
-    for encoding in ("utf-8", "gb18030") if in_pairs else ("utf-8",):
+    usual = ("utf-8-sig", "gb18030") if in_pairs else ("utf-8-sig",)
+    for encoding in ("utf-16",) if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else usual:
         try:
             return raw.decode(encoding)
         except UnicodeDecodeError:

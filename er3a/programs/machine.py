@@ -117,7 +117,6 @@ class Way:
         others : values of the other way, of the program and of each routine that runs
         here : the key of the other's position; the arm's position is forgotten if they differ
         """
-        self.memory.kept.clear()
         for own, other in zip(self.values, others):
             for name in own.keys() | other.keys():
                 if name not in own or name not in other or own[name] != other[name]:
@@ -187,7 +186,7 @@ class Machine:
             for each in routines.values()
             if each.place.file == file and not each.thread and "@" not in each.name
         ]
-        called = {op.routine for each in own for op in routines[each].code if isinstance(op, Call)}
+        called = syntax.called_by_others(routines)
         for name in (*(each for each in own if each not in called), *own):
             if name not in self.entered:
                 yield name
@@ -306,10 +305,7 @@ class Machine:
             case syntax.Move():
                 self._move(way, operation.place, self.dialect.motion(memory, operation))
             case syntax.Fixed(instruction=instruction):
-                if isinstance(instruction, ArmMotion):
-                    self._move(way, operation.place, instruction)
-                else:
-                    done = instruction
+                done = instruction
             case Assign():
                 done = self._assign(memory, operation)
             case Waiting():
@@ -416,7 +412,6 @@ class Machine:
         outs = tuple((parameter.name, each) for parameter, each in given if parameter.out and variable_of(each))
         way.frames.append(Frame(routine, 0, local, (*way.frames[-1].calls, call.place), call.result, outs))
         memory.local = local
-        memory.kept.clear()
 
     def _return(self, way: Way, operation: Return) -> None:
         memory, frame = way.memory, way.frames.pop()
@@ -424,7 +419,6 @@ class Machine:
         if operation.value is not None:
             value = memory.typed(syntax.RETURNED, memory.value(operation.value))
         memory.local = way.frames[-1].local
-        memory.kept.clear()
         for name, target in frame.outs:
             memory.assign(target, frame.local.get(name, Unclear(name)))
         if frame.result:

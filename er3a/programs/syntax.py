@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 from er3a.by_value import ByValue
 from er3a.finding import Finding
-from er3a.programs.instructions import ArmMotion, Instruction, Place, Rate, RateUnit
+from er3a.programs.instructions import Instruction, Place, Rate, RateUnit
 from er3a.programs.program_names import LanguageName
 
 POSE_KEYS = ("x", "y", "z", "rx", "ry", "rz")
@@ -440,13 +440,23 @@ class Program(ByValue):
 
     def motions(self) -> list[tuple[Place, str]]:
         """The places and texts of all motion instructions, each once."""
-        found = [(each.place, each.text) for each in self.operations() if isinstance(each, Move)]
-        found += [
-            (each.place, each.instruction.form)
-            for each in self.operations()
-            if isinstance(each, Fixed) and isinstance(each.instruction, ArmMotion)
-        ]
+        found = ((each.place, each.text) for each in self.operations() if isinstance(each, Move))
         return list(dict.fromkeys(found))
+
+
+def called_by_others(routines: Mapping[str, Routine]) -> set[str]:
+    """Names of the routines that another one calls.
+
+    Parameters
+    ----------
+    routines : by their names, linked: their calls are operations
+    """
+    return {
+        operation.routine
+        for name, each in routines.items()
+        for operation in each.code
+        if isinstance(operation, Call) and operation.routine != name
+    }
 
 
 Each = Callable[[Expression], Expression]

@@ -311,19 +311,18 @@ def test_joint_moves_of_a_stretch_keep_the_times_of_the_program(tmp_path):
     assert speed[t > 1.72].max() == pytest.approx(0.02)
 
 
-@pytest.mark.parametrize(("speed", "seconds"), [(0.1, 2.0), (0.01, 1.1 + 10.01)])
-def test_lines_of_a_stretch_keep_the_times_of_the_program(tmp_path, speed, seconds):
-    """100 mm each at 0.1 m/s and 1 m/s2: 1.1 s from rest to rest. Of two in one go the ramps between them are saved."""
+@pytest.mark.parametrize("speed", [0.1, 0.01])
+def test_lines_of_a_stretch_keep_the_times_of_the_program(tmp_path, speed):
+    """100 mm each at 0.1 m/s and 1 m/s2: 1.1 s from rest to rest, whatever rounds the corner between them."""
     poses = ("p[0.4,0,0.4,3.1,0,0]", "p[0.4,0,0.5,3.1,0,0]", "p[0.4,0.1,0.5,3.1,0,0]")
     speeds = (0.1, 0.1, speed)
     (made,), found = stretches(
         tmp_path, *(f"movel({pose}, a=1, v={v}, r={r})" for pose, v, r in zip(poses, speeds, (0, 0.02, 0)))
     )
     first = list(found.motions.values())[1].path.law.duration
-    assert made.duration == pytest.approx(first + seconds + (0.1 if speed == 0.1 else 0))
+    assert made.duration == pytest.approx(first + 1.1 + 0.1 / speed + speed)
     t = np.linspace(first + 1.2, made.duration, 2001)
-    progress = made.tool.progress(t)[1] * made.tool.length
-    assert progress.max() == pytest.approx(speed, rel=0.05)  # the rounding is shorter than the corner
+    assert (made.tool.progress(t)[1] * made.tool.length).max() == pytest.approx(speed, rel=1e-3)
 
 
 @pytest.mark.long

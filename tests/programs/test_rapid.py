@@ -151,10 +151,6 @@ VALUES = {  # what stands behind n:=, and the number
     "sine": ("Sin(30)", 0.5),
     "atan2": ("ATan2(1,-1)", 135),
     "acos": ("ACos(0.5)", 60),
-    "power": ("Pow(2,10)", 1024),
-    "truncated": ("Trunc(-2.7)", -2),
-    "rounded_from_zero": ("Round(-2.5)", -3),
-    "euler_z": ("EulerZYX(\\Z,turned.rot)", 90),
     "element": ("list{2}", 20),
     "exponent": ("1E1+.5", 10.5),
 }

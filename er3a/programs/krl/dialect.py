@@ -18,6 +18,7 @@ from er3a.programs.evaluation import (
     evaluated,
     external_axes,
     root,
+    target_numbers,
     unresolved,
 )
 from er3a.programs.instructions import (
@@ -195,19 +196,12 @@ def _position(memory: ProgramMemory, value: Value, text: str) -> Record | Unreso
 
 def _components(value: Record, keys: tuple[str, ...], text: str) -> list[float | None] | UnresolvedTarget:
     """Numbers of a record, None for what it leaves out."""
-    found: list[float | None] = []
-    given = dict(value.items)
-    for key in keys:
-        part = given.get(key)
-        if isinstance(part, Unclear):
-            return unresolved(part)
-        plain = syntax.number(part)
-        if part is not None and plain is None:
-            return UnresolvedTarget(text, "not_understood")
-        if plain is not None and not math.isfinite(plain):
-            return UnresolvedTarget(text, "not_finite")
-        found.append(plain)
-    return found
+    parts = [value.get(key) for key in keys]
+    plain = target_numbers([each for each in parts if each is not None], text)
+    if isinstance(plain, UnresolvedTarget):
+        return plain
+    given = iter(plain)
+    return [None if each is None else next(given) for each in parts]
 
 
 def _joints(memory: ProgramMemory, value: Record, text: str, missing: Reals) -> Target:
@@ -264,9 +258,7 @@ def _frame(memory: ProgramMemory, variable: str) -> NamedFrame:
     elif pose is None and is_frame(value):
         name = shown(value)
     mapped = memory.cell.frames.get(name)
-    if pose is None or (mapped is not None and value == frame_record(mapped)):
-        pose = mapped
-    return NamedFrame(name, pose)
+    return NamedFrame(name, mapped if pose is None else pose)
 
 
 def _field(data: Value | None, name: str, kept_as: str, usual: Value | None = None) -> Value:
@@ -662,7 +654,6 @@ class KrlDialect(Dialect):
                 other = name
         found = self._motion(memory, move)
         memory.shared = kept
-        memory.kept.clear()
         return replace(found, not_followed=found.not_followed or other)
 
     def _motion(self, memory: ProgramMemory, move: Move) -> ArmMotion:
@@ -741,27 +732,22 @@ def _left_out(memory: ProgramMemory, argument: Expression | None, value: Value) 
 
 
 def _settings(memory: ProgramMemory, kind: MotionKind, move: Move) -> ArmMotion:
-    """A motion with all that is set for it; it is kept, because most motions follow one whose settings are the same."""
-    key = (kind, move.words)
-    found = memory.kept.get(key)
-    if not isinstance(found, ArmMotion):
-        load, part = memory.read("$LOAD"), memory.read("$LOAD.M")
-        given = load_of(load)
-        if part is not None and not isinstance(load, Record):  # of a load whose whole is not known
-            given = UnclearLoad("$LOAD.M", syntax.number(part))
-        found = ArmMotion(
-            kind,
-            UnresolvedTarget(move.text, "undefined"),
-            speed=_speed(memory, kind),
-            acceleration=_acceleration(memory, kind),
-            zone=_zone(memory, kind, move.words),
-            tool=_frame(memory, "$TOOL"),
-            base=_frame(memory, "$BASE"),
-            load=given,
-            turn_speed=None if kind == "joint" else _turn_speed(memory),
-        )
-        memory.kept[key] = found
-    return found
+    """A motion with all that is set for it, but for its target."""
+    load, part = memory.read("$LOAD"), memory.read("$LOAD.M")
+    given = load_of(load)
+    if part is not None and not isinstance(load, Record):  # of a load whose whole is not known
+        given = UnclearLoad("$LOAD.M", syntax.number(part))
+    return ArmMotion(
+        kind,
+        UnresolvedTarget(move.text, "undefined"),
+        speed=_speed(memory, kind),
+        acceleration=_acceleration(memory, kind),
+        zone=_zone(memory, kind, move.words),
+        tool=_frame(memory, "$TOOL"),
+        base=_frame(memory, "$BASE"),
+        load=given,
+        turn_speed=None if kind == "joint" else _turn_speed(memory),
+    )
 
 
 def _speed(memory: ProgramMemory, kind: MotionKind) -> Rate | None:

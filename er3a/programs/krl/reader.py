@@ -38,7 +38,6 @@ from er3a.programs.syntax import (
     Opaque,
     Operation,
     Program,
-    Record,
     Routine,
     RoutineParameter,
     Unclear,
@@ -74,22 +73,23 @@ class KrlWords(Words):
         if self.kind == "name" and self.texts[self.at + 1] == ":":
             kind = self.take()
             self.take()
-        items: list[tuple[str, Expression]] = []
-        more = not self.accept("}")
-        while more:
-            name = self.name()
-            if any(name == other for other, _ in items):
-                raise MisreadError(f"{name} is given twice")
-            if self.accept("["):
-                self.expect("]")
-            items.append((name, self.expression()))
-            more = self.accept(",")
-            if not more:
-                self.expect("}")
-        values = tuple((name, each.value) for name, each in items if isinstance(each, Constant))
-        if len(values) == len(items):
-            return Constant(Record(kind, values))
+        items = self.listed("}", self._field)
+        if len(dict(items)) < len(items):
+            raise MisreadError("a field is given twice")
         return Aggregate(kind, tuple(items))
+
+    def _field(self) -> tuple[str, Expression]:
+        name = self.name()
+        if self.accept("["):
+            self.expect("]")
+        return name, self.expression()
+
+    def parameter(self) -> RoutineParameter:
+        """A parameter of a routine's head, which is set for the caller too unless it is ``IN``."""
+        name = self.name()
+        if self.accept("["):
+            self.arguments("]")
+        return RoutineParameter(name, not (self.accept(":") and self.name() == "IN"))
 
 
 WORDS_OF_MOTIONS = """
@@ -408,17 +408,8 @@ class _KrlReader:
                 if words.accept("["):
                     words.arguments("]")
             name = words.name()
-            parameters: list[RoutineParameter] = []
             words.expect("(")
-            while not words.accept(")"):
-                parameter = words.name()
-                if words.accept("["):
-                    words.arguments("]")
-                out = not (words.accept(":") and words.name() == "IN")
-                parameters.append(RoutineParameter(parameter, out))
-                if not words.accept(","):
-                    words.expect(")")
-                    break
+            parameters = words.listed(")", words.parameter)
         except MisreadError as error:
             raise fault(place, f"this head of a routine can't be read ({error})", "Write DEF NAME ( )") from None
         builder = CodeBuilder(name, tuple(parameters), place)

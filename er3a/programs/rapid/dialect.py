@@ -6,13 +6,13 @@ Sources are named as in :mod:`er3a.programs.rapid.data_types`: "2 RelTool" is th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from er3a.geometry.transforms import rpy_of, transform
+from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.programs import syntax
 from er3a.programs.evaluation import IN_DEGREES, Dialect, Position, ProgramMemory, evaluated, unresolved
@@ -43,15 +43,6 @@ SLOWEST_RAMP = 20.0  # percent; 1 AccSet: smaller values count as 20
 FULL_SPEED = 5000.0  # mm/s, of VelSet where a program sets none
 OPTIONS = frozenset(("ID", "INPOS", "NOEOFFS", "T", "WOBJ"))
 """Optional arguments of motions that are followed, or leave them as they are."""
-MATHEMATICS: Mapping[str, Callable[..., float]] = {
-    **IN_DEGREES,
-    "EXP": math.exp,
-    "POW": math.pow,
-    "NUMTODNUM": lambda x: x,
-    "DNUMTONUM": lambda x: x,
-    "TRUNC": math.trunc,
-    "ROUND": lambda x: math.copysign(math.floor(abs(x) + 0.5), x),
-}
 OTHERS = ("WOBJDATA", "TOOLDATA")
 """What is no tool, and what is no work object."""
 UNCLEAR = Unclear("")
@@ -102,9 +93,8 @@ class RapidDialect(Dialect):
         found: Value | None = None
         if name in ("CROBT", "CPOS") and not values and named.keys() <= {"TOOL", "WOBJ"}:
             found = _of_position(memory, name, named, dict(given.keywords))
-        elif name in MATHEMATICS and not named:
-            found = evaluated(MATHEMATICS[name], values)
-            found = int(found) if name in ("TRUNC", "ROUND") and isinstance(found, float) else found
+        elif name in IN_DEGREES and not named:
+            found = evaluated(IN_DEGREES[name], values)
         else:
             found = _of_data(name, values, named)
         if found is not None:
@@ -361,10 +351,6 @@ def _of_data(name: str, values: tuple[Value, ...], named: Mapping[str, Value]) -
             return pose_record(poses[0] @ poses[1])
         case "ORIENTZYX", 3 if plain is not None:  # about z, then the new y, then the new x
             return pose_record(transform(np.zeros(3), np.radians(plain[::-1]))).values()[1]
-        case "EULERZYX", 1:
-            turn = pose_matrix(((0.0, 0.0, 0.0), values[0]))
-            axis = next((i for i, letter in enumerate("XYZ") if letter in named), None)
-            return None if turn is None or axis is None else float(np.degrees(rpy_of(turn)[axis]))
     return None
 
 

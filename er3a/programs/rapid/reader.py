@@ -79,14 +79,7 @@ class RapidWords(Words):
             return syntax.Opaque(self.take())
         if not self.accept("["):
             return None
-        items: list[Expression] = []
-        while not self.accept("]"):
-            items.append(self.expression())
-            if not self.accept(","):
-                self.expect("]")
-                break
-        values = tuple(each.value for each in items if isinstance(each, Constant))
-        return Constant(values) if len(values) == len(items) else syntax.Listed("", tuple(items))
+        return syntax.Listed("", tuple(self.listed("]", self.expression)))
 
     def parts_of(self, found: Expression) -> Expression:
         """An expression with the fields and arguments after it, and elements in braces.
@@ -104,16 +97,8 @@ class RapidWords(Words):
             found = super().parts_of(found) if self.next != "[" else found
             if not self.accept("{"):
                 return found
-            for index in self.in_braces():
+            for index in self.listed("}", self.expression):
                 found = syntax.Element(found, (index,))
-
-    def in_braces(self) -> list[Expression]:
-        """Expressions up to a closing brace."""
-        found = [self.expression()]
-        while self.accept(","):
-            found.append(self.expression())
-        self.expect("}")
-        return found
 
     def arguments(self, close: str = ")") -> Given:
         """Arguments by place and, after a backslash, by name.
@@ -179,8 +164,7 @@ def read_rapid(source: ProgramText) -> Program:
 def _entry(own: list[Routine], routines: Mapping[str, Routine]) -> str:
     if "MAIN" in routines:
         return "MAIN"
-    calls = ((name, op) for name, each in routines.items() for op in each.code if isinstance(op, syntax.Call))
-    called = {op.routine for name, op in calls if name != op.routine}
+    called = syntax.called_by_others(routines)
     starts = [each for each in own if not each.parameters and "/" not in each.name]
     free = [each for each in starts if each.name not in called] or starts or own
     return free[0].name if free else ""
@@ -310,7 +294,7 @@ def _declare(builder: CodeBuilder, place: Place, words: RapidWords, text: str, l
         elsewhere = words.take() == "PERS"  # where it has no value here
         kind, name = words.name(), words.name()
         initial = starting(kind)
-        for size in reversed(words.in_braces() if words.accept("{") else []):
+        for size in reversed(words.listed("}", words.expression) if words.accept("{") else []):
             kind += "[]"
             count = syntax.number(size.value) if isinstance(size, Constant) else None
             known = count is not None and 0 < count <= MAX_ELEMENTS

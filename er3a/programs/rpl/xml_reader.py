@@ -5,12 +5,10 @@ Elements that are not understood are kept; a loop's body is another ``Pou`` that
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping
 from functools import partial
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 from er3a.errors import InputError
 from er3a.programs.code_builder import CodeBuilder, fault, linked
@@ -18,61 +16,7 @@ from er3a.programs.instructions import Place
 from er3a.programs.lexing import ProgramText
 from er3a.programs.rpl.reader import expression, initial, statement
 from er3a.programs.syntax import Assign, Program, Return, Routine, RoutineParameter, Variable
-
-DEEPEST_ELEMENT = 100
-DECLARATION = re.compile(r"\s*<\?xml[^>]*\?>")
-
-
-LINE = "line of the file"
-"""Attribute of every element in memory; no attribute of XML has such a name."""
-
-
-def read_xml(source: ProgramText) -> Element:
-    """The top element.
-
-    Returns
-    -------
-    top : all elements have their line as the attribute ``LINE``
-
-    Raises
-    ------
-    InputError
-        for text that is not XML, holds a document type or entities, or is nested too deeply
-    """
-    tree, depth = TreeBuilder(), 0
-    parser = expat.ParserCreate("utf-8")
-    parser.buffer_text = True
-
-    def refuse(*_: object, problem: str = "holds a document type or entities") -> int:
-        remedy = "A program needs none, and few elements within each other"
-        raise InputError(source.path, f"line {parser.CurrentLineNumber}", problem, remedy)
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > DEEPEST_ELEMENT:
-            refuse(problem=f"more than {DEEPEST_ELEMENT} elements within each other")
-        tree.start(tag, {**attributes, LINE: str(parser.CurrentLineNumber)})
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        tree.end(tag)
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
-    parser.ExternalEntityRefHandler = refuse
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = tree.data
-    text = DECLARATION.sub(lambda match: "\n" * match.group().count("\n"), source.text, count=1)
-    try:
-        parser.Parse(text.encode("utf-8", "surrogatepass"), True)
-    except expat.ExpatError as error:
-        problem = f"not valid XML ({expat.ErrorString(error.code)})"
-        remedy = "Correct the file, or save it on the pendant again"
-        raise InputError(source.path, f"line {error.lineno}", problem, remedy) from None
-    return tree.close()
+from er3a.xml_lines import LINE, read_xml
 
 
 def _text(element: Element, tag: str) -> str:
@@ -118,7 +62,7 @@ def read_xpl(source: ProgramText) -> Program:
     if not source.text.lstrip().startswith("<"):
         problem = "is text, not XML: the controller refuses it (alarm 4902)"
         raise InputError(source.path, None, problem, "Save it as .pgm, or export it from the pendant")
-    top = read_xml(source)
+    top = read_xml(source.text, source.path)
     environment = top.find("XplEnvironment")
     if top.tag != TOP or environment is None:
         problem = f"the top element is <{top.tag}>" if top.tag != TOP else "holds no <XplEnvironment>"
@@ -240,8 +184,6 @@ def text_of(element: Element) -> str:
         case "for":
             step = f" BY {inner('by')}" if element.find("by") is not None else ""
             return f"FOR {inner('var')} := {inner('from')} TO {inner('to')}{step} DO"
-        case "rem":
-            return f"(* {inner('text')} *)"
         case "call":
             name = "".join(_text(each, "name") for each in element.findall("subroutine"))
             arguments = ", ".join(map(_own_text, element.findall("subroutine/args/arg")))

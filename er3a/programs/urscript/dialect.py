@@ -7,9 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from er3a.geometry.transforms import transform
 from er3a.numerics.arrays import Reals
 from er3a.programs.evaluation import Dialect, Position, ProgramMemory, evaluated, target_numbers
 from er3a.programs.instructions import (
@@ -79,7 +77,7 @@ is_within_safety_limits modbus_add_rtu_signal modbus_add_signal modbus_delete_si
 modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_request_update_signal_value
 modbus_send_custom_command modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
 modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency popup pose_dist powerdown
-interpolate_pose rotvec2rpy make_list size
+interpolate_pose rotvec2rpy rpy2rotvec make_list size log
 stopj stopl
 random read_input_boolean_register read_input_float_register read_input_integer_register
 read_output_boolean_register read_output_float_register read_output_integer_register read_port_bit
@@ -125,7 +123,6 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     "pose_sub": ("p_to", "p_from"),
     "pose_inv": ("p_from",),
     "point_dist": ("p_from", "p_to"),
-    "rpy2rotvec": ("rpy_vector",),
     "norm": ("a",),
     "normalize": ("v",),
     "length": ("v",),
@@ -133,7 +130,6 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil", "abs"), ("f",)),
     "atan2": ("x", "y"),
     "pow": ("base", "exponent"),
-    "log": ("b", "f"),
     "d2r": ("d",),
     "r2d": ("r",),
 }
@@ -144,7 +140,6 @@ PLAIN: dict[str, Callable[..., float]] = {
     "ceil": math.ceil,
     "d2r": math.radians,
     "r2d": math.degrees,
-    "log": lambda base, x: math.log(x, base),
     "abs": abs,
 }
 Values = dict[str, Value]
@@ -404,9 +399,6 @@ def _of_values(name: str, values: list[Value]) -> Value | None:
         case "norm" | "normalize" if plain and finite(plain):
             size = math.hypot(*plain)
             return size if name == "norm" else tuple(each / size for each in plain) if size > 0 else None
-        case "rpy2rotvec" if plain is not None and len(plain) == 3 and finite(plain):
-            turn = transform(np.zeros(3), np.array(plain))[:3, :3]
-            return tuple(map(float, scipy.spatial.transform.Rotation.from_matrix(turn).as_rotvec()))
         case "pose_inv" if len(poses) == 1:
             return _record(np.asarray(np.linalg.inv(poses[0]), np.float64))
         case "pose_trans" if len(poses) == 2:

@@ -7,16 +7,15 @@ it; blocks, brackets and texts without an end are errors.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from dataclasses import replace
 
 from er3a.programs import syntax
 from er3a.programs.code_builder import CodeBuilder, block, fault, linked, statements
 from er3a.programs.instructions import Place
-from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, as_number, ranked
+from er3a.programs.lexing import NUMBER, MisreadError, ProgramText, Words, ranked
 from er3a.programs.syntax import (
-    POSE_KEYS,
     Assign,
-    Constant,
+    Call,
     Element,
     Expression,
     Invocation,
@@ -25,6 +24,7 @@ from er3a.programs.syntax import (
     Program,
     Routine,
     Variable,
+    called_by_others,
 )
 
 MOTIONS = frozenset(("movej", "movel", "movep", "movec"))
@@ -53,6 +53,11 @@ class UrWords(Words):
         self.accept(";")
         super().finish()
 
+    def parameter(self) -> syntax.RoutineParameter:
+        """A parameter of a routine's head, with the value that it has if the caller gives none."""
+        name = self.name()
+        return syntax.RoutineParameter(name, False, self.expression() if self.accept("=") else None)
+
     def special(self) -> Expression | None:
         """Lists and poses, with an index after them."""
         found = self._list()
@@ -65,41 +70,12 @@ class UrWords(Words):
         elif self.next != "[" or self.kind == "text":
             return None
         self.take()
-        numbers = self._numbers()
-        if numbers is not None and not kind:
-            return Constant(numbers)
-        if numbers is not None and len(numbers) == len(POSE_KEYS):
-            return Constant(syntax.Record("p", tuple(zip(POSE_KEYS, numbers))))
-        if numbers is not None:
-            return self._pose_or_element(tuple(map(Constant, numbers)))
         placed, _ = self.arguments("]")
         if None in placed:
             raise MisreadError("an element is missing")
         given = tuple(each for each in placed if each is not None)
-        return self._pose_or_element(given) if kind else Listed(kind, given)
-
-    def _pose_or_element(self, given: tuple[Expression, ...]) -> Expression:
-        """``p[...]``: a pose has six numbers; with one it is an element of a variable of this name."""
-        return Element(Variable("p"), given) if len(given) == 1 else Listed("p", given)
-
-    def _numbers(self) -> tuple[int | float, ...] | None:
-        """Numbers alone up to the closing bracket, which is passed; None, with nothing passed, for anything else."""
-        kinds, texts, at = self.kinds, self.texts, self.at
-        found: list[int | float] = []
-        while True:
-            minus = texts[at] == "-"
-            at += minus
-            if kinds[at] != "number" or texts[at][:2] == "0x":
-                return None
-            value = as_number(texts[at])
-            found.append(-value if minus else value)
-            at += 1
-            if texts[at] == "]":
-                self.at = at + 1
-                return tuple(found)
-            if texts[at] != ",":
-                return None
-            at += 1
+        # ``p[...]``: a pose has six numbers; with one it is an element of a variable of this name.
+        return Element(Variable("p"), given) if kind and len(given) == 1 else Listed(kind, given)
 
 
 def read_urscript(source: ProgramText) -> Program:
@@ -111,8 +87,7 @@ def read_urscript(source: ProgramText) -> Program:
         for texts, brackets and blocks without an end
     """
     reader = _UrReader(source)
-    by_name = linked(reader.read())
-    return Program("urscript", source.path.stem, source.path, by_name, "", lines=source.lines)
+    return Program("urscript", source.path.stem, source.path, reader.read(), "", lines=source.lines)
 
 
 class _UrReader:
@@ -122,7 +97,7 @@ class _UrReader:
         self.outermost: list[str] = []
         self.open = [CodeBuilder("", (), Place(source.path, 1))]
 
-    def read(self) -> list[Routine]:
+    def read(self) -> dict[str, Routine]:
         """All routines; the one without a name holds what is outside of the others."""
         place = Place(self.source.path, 1)
         for place, text, is_comment in statements(self.source, BREAKS, _is_over):
@@ -135,17 +110,17 @@ class _UrReader:
             if builder.blocks:
                 builder.routine(place)
             raise fault(builder.place, f"{builder.name} has no end", "Close it with end")
-        top = self.open[0]
-        names = {each.name for each in self.routines}
-        if not any(isinstance(each, Move) or names & set(_called(each)) for each in top.code):
-            called = {
-                name for each in self.routines for step in each.code for name in _called(step) if name != each.name
-            }
-            outermost = [each for each in self.routines if each.name in self.outermost and not each.thread]
-            starts = [each for each in outermost if each.name not in called] or outermost
-            if starts:
-                top.add(syntax.Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START))
-        return [*self.routines, top.routine(place)]
+        return self._begun(linked([*self.routines, self.open[0].routine(place)]))
+
+    def _begun(self, routines: dict[str, Routine]) -> dict[str, Routine]:
+        """The routines; the one without a name calls the first of the others if it has nothing to do itself."""
+        top, called = routines[""], called_by_others(routines)
+        outermost = [each for name in self.outermost if not (each := routines[name]).thread]
+        starts = [each for each in outermost if each.name not in called] or outermost
+        if starts and not any(isinstance(each, Move | Call) for each in top.code):
+            start = Call(starts[0].place, starts[0].name, (), (), starts[0].name, syntax.START)
+            routines[""] = replace(top, code=(*top.code[:-1], start, top.code[-1]))
+        return routines
 
     def _statement(self, place: Place, text: str) -> None:
         builder = self.open[-1]
@@ -185,15 +160,8 @@ class _UrReader:
     def _begin(self, words: UrWords, place: Place) -> None:
         kind = words.take()
         name = words.name()
-        parameters = []
         words.expect("(")
-        while not words.accept(")"):
-            parameter = words.name()
-            default = words.expression() if words.accept("=") else None
-            parameters.append(syntax.RoutineParameter(parameter, False, default))
-            if not words.accept(","):
-                words.expect(")")
-                break
+        parameters = words.listed(")", words.parameter)
         words.accept(":")
         words.finish()
         self.open.append(CodeBuilder(name, tuple(parameters), place, thread=kind in ("thread", "sec")))
@@ -264,8 +232,3 @@ def _method(builder: CodeBuilder, call: Invocation, place: Place, text: str) -> 
         return False
     builder.unclear(place, Variable(name), text)
     return True
-
-
-def _called(operation: syntax.Operation) -> Iterator[str]:
-    """Functions that an operation calls."""
-    return (each.function for each in syntax.parts(operation) if isinstance(each, Invocation))

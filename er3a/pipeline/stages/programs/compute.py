@@ -86,7 +86,6 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
             verdict=_verdict(summaries).with_assumed_shapes(assumed),
             figures=_figures(summaries),
             scene=scene.title if scene else None,
-            assumed_speed=tuple(bool(value) for value in ~speeds_given(robot)),
             programs=tuple(summaries),
             checked=_checked(summaries, covered),
             assumed=(
@@ -150,8 +149,6 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         language=check.execution.program.language,
         outcome=OUTCOMES[check.level],
         expect=entry.expect,
-        complete=check.execution.complete,
-        ways=sum(each.entry == check.execution.program.entry for each in check.execution.endings),
         motions=len(levels),
         passed=levels.count("pass"),
         caution=levels.count("caution"),

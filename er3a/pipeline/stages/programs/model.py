@@ -32,7 +32,6 @@ class FindingAt:
 
     file: str
     line: int
-    element: str
     level: Level
     times: int
     finding: Finding
@@ -52,7 +51,6 @@ def finding_at(each: LocatedFinding, starts: Mapping[int, float] = NO_STEPS) -> 
     return FindingAt(
         each.place.file.name if each.place.file else "",
         each.place.line,
-        each.place.element,
         each.level,
         each.times,
         _without_path(each.finding),
@@ -74,8 +72,6 @@ class ProgramSummary:
     ----------
     file : as the study names it
     outcome : of what was checked; expect : the outcome that its file expects
-    complete : whether every way through it was followed to its end, or until it repeats
-    ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
     not_examined : lines of motions that were not followed each time, and of instructions that were not
     """
@@ -86,8 +82,6 @@ class ProgramSummary:
     language: LanguageName
     outcome: ProgramOutcome
     expect: ProgramOutcome | None
-    complete: bool
-    ways: int
     motions: int
     passed: int
     caution: int
@@ -104,7 +98,6 @@ class ProgramsSummary(Summary):
     needs = ("limits", "singularity", "self_collision", "scene_collision", *OF_MOTIONS)
 
     scene: str | None
-    assumed_speed: tuple[bool, ...]
     programs: tuple[ProgramSummary, ...]
 
 
