@@ -13,7 +13,7 @@ from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_tab
 from er3a.files.printed_table import table_text
 from er3a.files.robot_library import URDF, holds_table, load_robot, robot_of
 from er3a.formats.urdf import import_urdf, urdf_table
-from er3a.formats.urdf_tree import plain_urdf, tip_after
+from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
 from er3a.robots.robot import Convention, Robot, robot_name
 
 READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
@@ -44,6 +44,7 @@ def read_arm(
     as_printed: bool = False,
     columns: Sequence[str] = (),
     whole: bool = False,
+    srdf: Path | None = None,
 ) -> ReadArm:
     """Read an arm's table, limits and speeds.
 
@@ -57,6 +58,7 @@ def read_arm(
     columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
     whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
     base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
+    srdf : from which a whole URDF's home is taken, see :func:`er3a.formats.urdf_tree.srdf_home`
     joints : of a URDF without a ``tip``, the one chain with so many joints is taken, if there is one
 
     Raises
@@ -65,6 +67,8 @@ def read_arm(
         naming file, field and remedy
     """
     path = Path(source)
+    if srdf is not None and path.suffix not in URDF:
+        raise InputError(srdf, "--srdf", f"{source} is no URDF", "Give the URDF that the SRDF belongs to, or home_deg")
     if holds_table(source):
         form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns, "text": table_text(path)}
         content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
@@ -76,7 +80,8 @@ def read_arm(
                 tip = tip_after(plain, base, joints)
             if whole:
                 imported = import_urdf(plain, base=base, tip=tip)
-                return ReadArm(imported.robot.replace(name=robot_name(path)), False, imported.notes)
+                home = None if srdf is None else srdf_home(srdf, imported.joints)
+                return ReadArm(imported.robot.replace(name=robot_name(path), home=home), False, imported.notes)
             robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
         units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
         return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)

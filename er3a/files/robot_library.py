@@ -222,6 +222,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         row.theta_deg if slides else zero.offset_deg for row, zero, slides in zip(rows, content.zero.rows, sliding)
     ]
     limits = np.array([_limits(row) for row in content.limits.rows])
+    shapes = content.envelopes or robot_file.Envelopes.model_construct()
     robot = Robot(
         name=content.name,
         title=content.title,
@@ -234,7 +235,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         offset=np.radians([offset or 0.0 for offset in offsets]),
         lower=limits[:, 0],
         upper=limits[:, 1],
-        speed=np.array([_speed(row) for row in content.speeds.rows] if content.speeds else []),
+        speed=np.array([_si(row.speed_deg_s, row.speed_mm_s) for row in content.speeds.rows] if content.speeds else []),
         sliding=np.array(sliding),
         coupling=robot_file.coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
         continuous=np.array([row.continuous for row in content.limits.rows]),
@@ -244,8 +245,13 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
         references=tuple(content.references),
-        envelopes=_envelopes(content.envelopes),
-        hulls=_hulls(content.envelopes),
+        envelopes=tuple(
+            Envelope(each.link, _metres(each.from_mm), _metres(each.to_mm), each.radius_mm / 1000)
+            for each in shapes.capsules
+        ),
+        hulls=tuple(
+            ConvexPiece(each.link, tuple(map(_metres, each.points_mm)), each.margin_mm / 1000) for each in shapes.hulls
+        ),
         meshes=_surfaces(content),
         visuals=tuple(each.visual() for each in content.visuals),
         pair_rules=content.collision.rules() if content.collision else (),
@@ -287,14 +293,10 @@ def with_near_rows(robot: Robot) -> Robot:
 
 
 def _si(degrees: float | None, millimetres: float | None) -> float:
-    """The one that is given, in rad or m."""
-    return float(np.radians(degrees)) if degrees is not None else (millimetres or 0.0) / 1000
-
-
-def _speed(row: robot_file.JointSpeedRow) -> float:
-    """rad/s or m/s; NaN where it is unknown."""
-    unknown = row.speed_deg_s is None and row.speed_mm_s is None
-    return np.nan if unknown else _si(row.speed_deg_s, row.speed_mm_s)
+    """The one that is given, in rad or m; NaN where none is."""
+    if degrees is not None:
+        return float(np.radians(degrees))
+    return np.nan if millimetres is None else millimetres / 1000
 
 
 def _limits(row: robot_file.JointLimitRow | robot_file.CombinedLimitRow) -> tuple[float, float]:
@@ -332,22 +334,9 @@ def _origins(content: robot_file.RobotFile) -> dict[str, str]:
     return found
 
 
-def _envelopes(group: robot_file.Envelopes | None) -> tuple[Envelope, ...]:
-    def metres(values: list[float]) -> tuple[float, float, float]:
-        x, y, z = values
-        return x / 1000, y / 1000, z / 1000
-
-    capsules = group.capsules if group else []
-    return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
-
-
-def _hulls(group: robot_file.Envelopes | None) -> tuple[ConvexPiece, ...]:
-    return tuple(
-        ConvexPiece(
-            hull.link, tuple((x / 1000, y / 1000, z / 1000) for x, y, z in hull.points_mm), hull.margin_mm / 1000
-        )
-        for hull in (group.hulls if group else ())
-    )
+def _metres(point: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = point
+    return x / 1000, y / 1000, z / 1000
 
 
 def _surfaces(content: robot_file.RobotFile) -> tuple[LinkMesh, ...]:

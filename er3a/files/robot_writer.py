@@ -93,14 +93,14 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
     for k, sliding in enumerate(robot.sliding):
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
         zero = {"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]}
-        zero_rows.append({"joint": k + 1, **zero, **_origins(robot, "zero", k + 1)})
+        zero_rows.append(zero)
         row: dict[str, Any] = {
             "a_mm": _tidy(robot.a[k] * 1000),
             "alpha_deg": angles["alpha"],
             "d_mm": _tidy(robot.d[k] * 1000),
         }
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
-        dh_rows.append({"joint": k + 1, **row, "beta_deg": angles["beta"] or None, **_origins(robot, "dh", k + 1)})
+        dh_rows.append(row | {"beta_deg": angles["beta"] or None})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
     content = {
         "kind": "robot",
@@ -112,9 +112,9 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         | {
             "convention": robot.convention,
             "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
-            "rows": dh_rows,
+            "rows": _rows(robot, "dh", dh_rows),
         },
-        "zero": sourced("zero") | {"rows": zero_rows},
+        "zero": sourced("zero") | {"rows": _rows(robot, "zero", zero_rows)},
         "limits": sourced("limits")
         | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
     }
@@ -160,19 +160,18 @@ def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
 
 def _speed_rows(robot: Robot) -> list[dict]:
     """A row for each joint, with its speed where one is known."""
-    keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
-    return [
-        {"joint": k + 1, **({keys[k]: _tidy(value)} if np.isfinite(value) else {}), **_origins(robot, "speeds", k + 1)}
-        for k, value in enumerate(shown(robot, robot.speed))
-    ]
+    speeds = zip(np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist(), shown(robot, robot.speed))
+    return _rows(robot, "speeds", [{key: _tidy(value)} if np.isfinite(value) else {} for key, value in speeds])
 
 
 def _limit_rows(robot: Robot) -> list[dict]:
-    found = []
-    for k, (lower, upper) in enumerate(zip(robot.lower, robot.upper)):
-        limits = {"continuous": True} if robot.continuous[k] else _ends(lower, upper, robot.slides[k])
-        found.append({"joint": k + 1, **limits, **_origins(robot, "limits", k + 1)})
-    return found
+    ends = zip(robot.lower, robot.upper, robot.slides, robot.continuous)
+    return _rows(robot, "limits", [{"continuous": True} if endless else _ends(*each) for *each, endless in ends])
+
+
+def _rows(robot: Robot, group: str, rows: list[dict[str, Any]]) -> list[dict]:
+    """The rows of a group, with the numbers of their joints, and the documents of those that have their own."""
+    return [{"joint": k, **row, **_origins(robot, group, k)} for k, row in enumerate(rows, start=1)]
 
 
 def _ends(lower: float, upper: float, slides: bool) -> dict[str, Any]:

@@ -193,10 +193,7 @@ class SceneFile(InputFile):
         if not seen:
             raise ValueError(f"the scene is empty | Add an obstacle under {', '.join(SHAPES)}")
         links = ["base", *(f"link_{k}" for k in range(1, MAX_LINKS + 1))]
-        try:
-            self.collision.check({*seen, *links})
-        except ValueError as error:
-            raise ValueError(f"collision.{error}") from None
+        self.collision.check({*seen, *links})
         return self
 
 

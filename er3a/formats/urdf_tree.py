@@ -434,7 +434,7 @@ def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
 
     Parameters
     ----------
-    path : the SRDF, expanded if it is xacro
+    path : the SRDF, or xacro of it
     joints : names, in the order of the values
 
     Returns
@@ -447,7 +447,9 @@ def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
         for a file that is none, and one in which no state gives all joints
     """
     states: dict[str, Reals] = {}
-    for state in _robot_element(path).iter("group_state"):
+    with plain_urdf(path) as plain:
+        root = _robot_element(plain)
+    for state in root.iter("group_state"):
         name, values = state.get("name", ""), {each.get("name"): each for each in state.iter("joint")}
         if values.keys() >= set(joints):
             given = [numbers_of(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]

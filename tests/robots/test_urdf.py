@@ -13,11 +13,13 @@ from scipy.spatial.transform import Rotation
 from er3a.collision.shapes import arm_shapes
 from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import InputError
+from er3a.files.arm_file import read_arm
 from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.formats.urdf_tree import srdf_home
 from er3a.kinematics.forward import forward, frames
+from er3a.pipeline.new_study.arms import arm_of
 from er3a.robots.masses import Masses
 from er3a.robots.robot import Robot
 
@@ -367,12 +369,15 @@ def test_a_group_state_of_an_srdf_becomes_the_home_of_the_robot_file(tmp_path):
     found = import_urdf(tmp_path / "arm.urdf")
     for given, expected in ((states(folded, home), home), (states(folded, []), folded)):
         (tmp_path / "arm.srdf").write_text(given, encoding="utf-8")
-        robot = found.robot.replace(name="arm", home=srdf_home(tmp_path / "arm.srdf", found.joints))
+        robot = read_arm(str(tmp_path / "arm.urdf"), whole=True, srdf=tmp_path / "arm.srdf").robot
         write_robot(robot, tmp_path / "arm.yaml")
         np.testing.assert_allclose(load_robot(tmp_path / "arm.yaml").home, expected, atol=1e-9)
     with pytest.raises(InputError) as caught:
         write_robot(robot.replace(home=out), tmp_path / "arm.yaml")
     assert caught.value.field == "home_deg"
+    with pytest.raises(InputError) as caught:
+        arm_of("ur5e", srdf=tmp_path / "arm.srdf")  # of which no URDF is given
+    assert caught.value.field == "--srdf"
     (tmp_path / "arm.srdf").write_text(states([], []), encoding="utf-8")
     with pytest.raises(InputError) as caught:
         srdf_home(tmp_path / "arm.srdf", found.joints)

@@ -87,6 +87,9 @@ Columns = Annotated[
     typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (-: not read)"),
 ]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
+Srdf = Annotated[
+    Path | None, typer.Option(help="an SRDF beside the URDF, whose state home, else the first of all joints, is home")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 

@@ -122,6 +122,7 @@ def teach(
     base: options.Base = None,
     tip: options.Tip = None,
     xacro: options.Xacro = None,
+    srdf: options.Srdf = None,
 ):
     """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
@@ -132,7 +133,7 @@ def teach(
     from er3a.robots.robot import robot_name
 
     given: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    given |= {"base": base, "tip": tip, "xacro": xacro or ()}
+    given |= {"base": base, "tip": tip, "xacro": xacro or (), "srdf": srdf}
     if robot == "-" or Path(robot).suffix or (robot in known_arms() and (output or not study.is_file())):
         _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"), given)
         return

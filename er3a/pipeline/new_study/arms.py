@@ -58,7 +58,7 @@ def arm_of(source: str | Path, name: str | None = None, **form: Any) -> Arm:
         allowed = "small letters, digits, - and _, a letter or digit first, 64 at most"
         raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
     path = Path(source)
-    if not (holds_table(source) or path.suffix in URDF or known_arm(str(source))):
+    if not (holds_table(source) or path.suffix in URDF or known_arm(str(source)) or form.get("srdf")):
         return _of_file(robot_path(source), name)
     arm = read_arm(str(source), whole=True, **form)
     content = robot_file(arm.robot.replace(name=name or arm.robot.name), path)
