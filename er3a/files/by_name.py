@@ -22,10 +22,10 @@ from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, start
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
-from er3a.files.csv_file import CsvColumn, columns_of, read_csv, read_header
+from er3a.files.csv_file import METRES, CsvColumn, columns_of, read_csv, read_header, refuse_unit
 from er3a.files.orientations import POSITION
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import MIN_SPAN_MM, joint_names, refuse_radians
+from er3a.files.units import joint_names, refuse_radians
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
@@ -104,6 +104,7 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             raise InputError(path, where, problem, remedy)
         pose = tuple(fields[name] for name in joints)
         rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names))
+    refuse_unit(path, table, POSITION, METRES, mixed=False)
     _check_units(path, rows, joints)
     if robot is not None:
         _check_scale(path, rows, robot)
@@ -130,11 +131,6 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
 
 
 def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> None:
-    whole = [row for row in rows if None not in row.xyz_mm]
-    span = max((abs(value) for row in whole for value in row.xyz_mm if value is not None), default=0.0)
-    if whole and span < MIN_SPAN_MM:
-        problem = f"all points are within {span:g} mm of the frame's origin, which can only be metres"
-        raise InputError(path, f"row {whole[0].row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
     turning = np.array([name.endswith("_deg") for name in joints])
     poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(joints))
     refuse_radians(path, f"columns {joints[0]} to {joints[-1]}", poses[:, turning])

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
@@ -28,7 +28,16 @@ import scipy
 from pydantic import BeforeValidator, Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
+from er3a.files.csv_file import (
+    CHECKED_COLUMN,
+    METRES,
+    UNITS_CHECKED,
+    CsvColumn,
+    is_own,
+    read_csv,
+    read_header,
+    refuse_unit,
+)
 from er3a.files.kept_files import given_file
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Name, Text
@@ -38,7 +47,6 @@ from er3a.files.units import (
     PositionMm,
     Triple,
     check_degrees,
-    check_millimetres,
     doubt_degrees,
     joint_names,
     joint_rates,
@@ -279,34 +287,24 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
 
 
 def _poses(path: Path, rows: list[dict[str, Any]], form: str) -> Reals:
-    _block(path, rows, POSITION, check_millimetres)
+    refuse_unit(path, rows, POSITION, METRES)
     if form in ("rpy_deg", "zyz_deg"):
         _block(path, rows, FORMS[form])
     return poses_of(path, rows, form)
 
 
-def _block(
-    path: Path,
-    rows: list[dict[str, Any]],
-    names: Sequence[str],
-    check: Callable[[Sequence[float]], None] = check_degrees,
-) -> Reals:
-    """The values of columns of one kind, their unit judged by the largest row: others may well be small."""
+def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str]) -> None:
+    """Judge the unit of columns of angles by the largest row: others may well be small."""
     values = np.array([[row[name] for name in names] for row in rows])
     top = int(np.argmax(np.abs(values).max(axis=1)))
-    where, largest = _where(rows[top]["row"], names), values[top].tolist()
+    where, largest = f"row {rows[top]['row']}, column {', '.join(names)}", values[top].tolist()
     try:
-        check(largest)
+        check_degrees(largest)
     except ValueError as error:
         problem, _, remedy = str(error).partition(" | ")
         raise InputError(path, where, problem, remedy) from None
-    if check is check_degrees and not all(row[UNITS_CHECKED] for row in rows):
+    if not all(row[UNITS_CHECKED] for row in rows):
         doubt_degrees(largest, key=where, file=path)
-    return values
-
-
-def _where(row: int, names: Sequence[str]) -> str:
-    return f"row {row}, column {', '.join(names)}"
 
 
 def _points(count: int) -> str:

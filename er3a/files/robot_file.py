@@ -309,7 +309,7 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
     own = np.tile(np.eye(4), (robot.rows + 1, 1, 1))
     for k in range(1, robot.rows + 1 if inertia.frame == "dh" else 1):
         links = constant_links(placed, k)
-        joint, row = _at_zero(placed, constant_links(placed)[: k + 1]), _at_zero(placed, links[:-1]) @ links[-1]
+        joint, row = _at_zero(placed, constant_links(placed)[:k]), _at_zero(placed, links[:-1]) @ links[-1]
         # Both frames of a link move together, so how they lie to each other with the joints at 0 holds always.
         own[k] = np.linalg.inv(joint) @ row
     return tuple(LinkMass(row.link, moved(row.body, own[row.link])) for row in inertia.links)

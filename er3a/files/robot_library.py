@@ -21,7 +21,6 @@ from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
 from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import plain_urdf
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.joint_limits import meant
@@ -60,8 +59,7 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     if holds_table(name_or_path):
         return read_table(name_or_path, convention)
     if Path(name_or_path).suffix in URDF:
-        with plain_urdf(Path(name_or_path)) as plain:
-            imported = import_urdf(plain)
+        imported = import_urdf(name_or_path)
         if imported.notes:
             warnings.warn(f"{name_or_path}: {'; '.join(imported.notes)}", InputWarning, stacklevel=2)
         return imported.robot.replace(name=robot_name(Path(name_or_path)))
@@ -222,7 +220,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         row.theta_deg if slides else zero.offset_deg for row, zero, slides in zip(rows, content.zero.rows, sliding)
     ]
     limits = np.array([_limits(row) for row in content.limits.rows])
-    shapes = content.envelopes or robot_file.Envelopes.model_construct()
+    shapes = content.envelopes
     robot = Robot(
         name=content.name,
         title=content.title,
@@ -247,10 +245,11 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         references=tuple(content.references),
         envelopes=tuple(
             Envelope(each.link, _metres(each.from_mm), _metres(each.to_mm), each.radius_mm / 1000)
-            for each in shapes.capsules
+            for each in (shapes.capsules if shapes else ())
         ),
         hulls=tuple(
-            ConvexPiece(each.link, tuple(map(_metres, each.points_mm)), each.margin_mm / 1000) for each in shapes.hulls
+            ConvexPiece(each.link, tuple(map(_metres, each.points_mm)), each.margin_mm / 1000)
+            for each in (shapes.hulls if shapes else ())
         ),
         meshes=_surfaces(content),
         visuals=tuple(each.visual() for each in content.visuals),

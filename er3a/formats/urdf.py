@@ -77,6 +77,7 @@ def import_urdf(
     base: str | None = None,
     tip: str | None = None,
     snap: bool = True,
+    xacro: Sequence[str] = (),
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
 
@@ -89,17 +90,22 @@ def import_urdf(
 
     Parameters
     ----------
-    path : a URDF, or expanded xacro
+    path : a URDF or xacro
     base, tip : links at which the arm begins and ends; None if the file has only one arm
     snap : take angles that the file shows rounded (1.571, 0.785) as the multiples of 45 deg that they stand for; one
         note says how many, and by how much that moves the flange
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Raises
     ------
     InputError
         if the file is not a URDF, has several arms (candidates are named), or no arm of 1 to 10 joints
     """
-    path = Path(path)
+    with urdf_tree.plain_urdf(Path(path), xacro) as plain:
+        return _imported(plain, base, tip, snap)
+
+
+def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfImport:
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]

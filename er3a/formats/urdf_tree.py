@@ -61,8 +61,6 @@ FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
 CONTROLLER_BASE = "base"
-EXPAND = "Expand it first: xacro FILE > arm.urdf"
-DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
 MAX_TURNED = 20 * math.pi
@@ -421,7 +419,7 @@ def urdf_root(path: Path) -> ElementTree.Element:
     Raises
     ------
     InputError
-        for a file that is not a URDF, such as xacro that is not expanded
+        for a file that is not a URDF
     """
     root = _robot_element(path)
     if root.find("joint") is None:
@@ -474,28 +472,7 @@ def _robot_element(path: Path) -> ElementTree.Element:
             raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
     if root.tag != "robot":
         raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
-    if (where := _xacro(root)) is not None:
-        raise InputError(path, where or None, "is xacro, which has to be expanded to a URDF", EXPAND)
     return root
-
-
-def _xacro(root: ElementTree.Element) -> str | None:
-    """Where a file is xacro: macros, or expressions in what is read of joints and links; None where it is not.
-
-    Definitions alone are left over in many URDFs and change nothing.
-    """
-    for element in root.iter():
-        name = element.tag.rpartition("}")[2].removeprefix("xacro_")
-        prefixed = "xacro" in element.tag
-        if (prefixed and name not in DEFINITIONS) or (name in ("include", "macro") and element in list(root)):
-            return f"xacro:{name}"
-    for part in [*root.findall("joint"), *root.findall("link/inertial/.."), *root.findall("link/collision/..")]:
-        named = f"{part.tag} {part.get('name', '?')}"
-        read = [part, *(each for child in part if child.tag != "visual" for each in child.iter())]
-        for value in (value for each in read for value in each.attrib.values()):
-            if "${" in value or "$(" in value:
-                return f"{named}, '{value[:60]}'"
-    return None
 
 
 def _link(path: Path, element: ElementTree.Element, role: str) -> str:
@@ -998,6 +975,8 @@ def _in_package(path: Path, name: str) -> Iterator[Path]:
 
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+MACRO, EXPRESSION = re.compile(r"<xacro:(?!property\b|arg\b)"), re.compile(r"\$[({]")
+"""What of xacro has to be expanded; definitions alone are left over in many URDFs and change nothing."""
 EXPANDING_S = 30  # the largest public ones take two
 UNBOUNDED = "Look for an expression without end, such as 9**9**9"
 ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
@@ -1020,7 +999,8 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
         for arguments of another form or to a file that is not xacro, without xacrodoc, or for what it can't expand; it
         names ``path`` for what the expanded file is refused for, too
     """
-    if "<xacro:" not in COMMENT.sub("", read_text(path, MAX_BYTES)):
+    text = COMMENT.sub("", read_text(path, MAX_BYTES))
+    if not MACRO.search(text) and not ("<xacro:" in text and EXPRESSION.search(text)):
         if arguments:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path

@@ -181,7 +181,7 @@ BAD = {
     "two forms": (RPY + ",qw,qx,qy,qz", [POSES[0] + [1, 0, 0, 0]], "header", "two forms of orientation"),
     "joints and poses": (RPY + ",q1_deg", [POSES[0] + [0]], "header", "both joint angles and poses"),
     "metres in the name": (RPY.replace("x_mm", "x_m"), [POSES[0]], "column x_m", "not a unit"),
-    "metres": (RPY, [[0.3, 0, 0.25, 180, 0, 0], [0.4, 0, 0.25, 180, 0, 0]], "row 3, column x_mm", "only be metres"),
+    "metres": (RPY, [[0.3, 0, 0.25, 180, 0, 0], [0.4, 0, 0.25, 180, 0, 0]], "columns x_mm", "only be metres"),
     "quaternion": (
         "x_mm,y_mm,z_mm,qw,qx,qy,qz",
         [[300, 0, 250, 1, 0, 0, 0], [310, 0, 250, 1, 0, 0, 0.1]],

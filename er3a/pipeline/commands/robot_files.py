@@ -50,11 +50,11 @@ def import_urdf(
     """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.urdf_tree import plain_urdf, srdf_home
+    from er3a.formats.urdf_tree import srdf_home
     from er3a.robots.robot import robot_name
 
-    with shown_work(f"{file}: reading the arm"), plain_urdf(file, xacro or ()) as plain:
-        imported = read_urdf(plain, base=base, tip=tip, snap=snap)
+    with shown_work(f"{file}: reading the arm"):
+        imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or ())
     robot = imported.robot
     if srdf is not None:
         robot = robot.replace(home=srdf_home(srdf, imported.joints))
