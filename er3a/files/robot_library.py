@@ -1,26 +1,30 @@
-"""Makes a :class:`Robot` from a robot file."""
+"""Arms by name or by any kind of file that describes one, and the :class:`Robot` that a robot file makes."""
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
 from er3a.files.arm_catalogue import KnownArm, known_arms
-from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
+from er3a.files.printed_table import table_text
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
-from er3a.formats.urdf import import_urdf
+from er3a.formats.urdf import import_urdf, urdf_table
+from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.joint_limits import meant
@@ -41,6 +45,100 @@ from er3a.robots.robot import (
 URDF = (".urdf", ".xacro", ".xml")
 ROBOTS = ROOT / "data" / "robots"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
+READ = (".csv", ".yaml", ".yml", ".urdf", ".xacro")
+
+
+@dataclass(frozen=True)
+class ReadArm:
+    """``printed``: whether the table was given, not derived; ``notes``: assumptions; ``beside``: what the file gives
+    that a comparison doesn't look at; ``units``: of columns, as their headings say them."""
+
+    robot: Robot
+    printed: bool
+    notes: tuple[str, ...] = ()
+    beside: frozenset[Uncompared] = frozenset()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_arm(
+    source: str,
+    *,
+    convention: Convention = "standard",
+    length_unit: LengthUnit | None = None,
+    angle_unit: AngleUnit | None = None,
+    base: str | None = None,
+    tip: str | None = None,
+    joints: int | None = None,
+    xacro: Sequence[str] = (),
+    as_printed: bool = False,
+    columns: Sequence[str] = (),
+    whole: bool = False,
+    srdf: Path | None = None,
+) -> ReadArm:
+    """Read an arm's table, limits and speeds.
+
+    Parameters
+    ----------
+    source : a robot's name, or a path: of a robot file (.yaml), a URDF (.urdf, .xacro), or any other file with a D-H
+        table; ``-`` is standard input, and several lines are the table itself
+    convention : of a D-H table; a column ``convention`` in the table takes precedence
+    length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
+    as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
+    columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
+    base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
+    srdf : from which a whole URDF's home is taken, see :func:`er3a.formats.urdf_tree.srdf_home`
+    joints : of a URDF without a ``tip``, the one chain with so many joints is taken, if there is one
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    text = source if "\n" in source else None
+    path = Path("table" if text else source)
+    if srdf is not None and path.suffix not in URDF:
+        raise InputError(srdf, "--srdf", f"{source} is no URDF", "Give the URDF that the SRDF belongs to, or home_deg")
+    if holds_table(source):
+        form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
+        form["text"] = text or table_text(path)
+        content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
+        robot = robot_of(content)
+        return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
+    if path.suffix in URDF:
+        with plain_urdf(path, xacro) as plain:
+            if tip is None and joints is not None:
+                tip = tip_after(plain, base, joints)
+            if whole:
+                imported = import_urdf(plain, base=base, tip=tip)
+                home = None if srdf is None else srdf_home(srdf, imported.joints)
+                return ReadArm(imported.robot.replace(name=robot_name(path), home=home), False, imported.notes)
+            robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
+        units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
+        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
+    robot = known.robot if (known := known_arm(source)) else robot_of(read_robot(robot_path(source)))
+    return ReadArm(robot, True, beside=beside_the_table(robot))
+
+
+def read_arms(folder: Path, **options: str | int | None) -> tuple[dict[str, ReadArm], tuple[str, ...]]:
+    """All arms in a folder, by file name, and the files that were not read, with the reason.
+
+    Raises
+    ------
+    InputError
+        if the folder holds none
+    """
+    found, left_out = dict[str, ReadArm](), list[str]()
+    for path in sorted(folder.iterdir()):
+        if path.suffix not in READ or not path.is_file():
+            continue
+        try:
+            found[path.name] = read_arm(str(path), **options)  # type: ignore[arg-type]
+        except InputError as error:
+            left_out.append(str(error))
+    if not found:
+        raise InputError(folder, None, "the folder holds no arm", f"Put files in it that end in {', '.join(READ)}")
+    return found, tuple(left_out)
 
 
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
@@ -56,16 +154,15 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     InputError
         naming file, field and remedy
     """
-    if holds_table(name_or_path):
-        return read_table(name_or_path, convention)
-    if Path(name_or_path).suffix in URDF:
-        imported = import_urdf(name_or_path)
-        if imported.notes:
-            warnings.warn(f"{name_or_path}: {'; '.join(imported.notes)}", InputWarning, stacklevel=2)
-        return imported.robot.replace(name=robot_name(Path(name_or_path)))
-    if known := known_arm(str(name_or_path)):
-        return known.robot
-    return robot_of(read_robot(robot_path(name_or_path)))
+    return _warned(name_or_path, read_arm(str(name_or_path), convention=convention, whole=True))
+
+
+def _warned(source: str | Path, arm: ReadArm) -> Robot:
+    """The arm, with a warning of what was assumed about it."""
+    if arm.notes:
+        named = "table" if "\n" in str(source) else source
+        warnings.warn(f"{named}: {'; '.join(arm.notes)}", InputWarning, stacklevel=3)
+    return arm.robot
 
 
 def known_arm(name: str) -> KnownArm | None:
@@ -137,13 +234,8 @@ def read_table(
     InputError
         naming the row, column or cell that can't be read, or that can be read in two ways, with both
     """
-    text = str(source) if "\n" in str(source) else None
-    path = Path("table" if text else source)
     units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
-    content, notes = read_dh_table(path, robot_name(path), convention, text=text, **units)
-    if notes:
-        warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=3)
-    return robot_of(content)
+    return _warned(source, read_arm(str(source), convention=convention, **units))
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:

@@ -325,15 +325,13 @@ def tip_after(path: Path, base: str | None, joints: int) -> str | None:
         as for :func:`tree_of`
     """
     tree = tree_of(path, False)
-    todo, found = [(base or _root(tree), 0)], list[str]()
-    while todo:
-        link, count = todo.pop()
-        for joint in tree.onward(link)[0] or tree.by_parent.get(link, []):
-            reached = count + joint.independent
-            if joint.independent and reached == joints:
-                found.append(tree._tail(joint.child))
-            elif reached < joints:
-                todo.append((joint.child, reached))
+    root, found = base or _root(tree), list[str]()
+    for last in tree.by_name.values():
+        chain = tree.up_from(last.child)
+        above = [joint.parent for joint in chain]
+        moving = [joint for joint in chain[above.index(root) :] if joint.independent] if root in above else []
+        if len(moving) == joints and moving[-1:] == [last]:
+            found.append(tree._tail(last.child))
     ending = [link for link in found if not tree.onward(link)[1]] if len(found) > 1 else found
     return ending[0] if len(ending) == 1 else None
 

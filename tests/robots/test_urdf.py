@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 from er3a.collision.shapes import arm_shapes
 from er3a.comparison.axis_table import table_from_axes
 from er3a.errors import InputError
-from er3a.files.arm_file import read_arm
-from er3a.files.robot_library import load_robot
+from er3a.files.robot_library import load_robot, read_arm
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.formats.urdf_tree import srdf_home

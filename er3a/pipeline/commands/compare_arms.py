@@ -30,7 +30,7 @@ from er3a.robots.robot import Convention, Robot
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
-    from er3a.files.arm_file import ReadArm
+    from er3a.files.robot_library import ReadArm
 
 Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
 """An arm as it was read, and doubts about its units."""
@@ -166,7 +166,7 @@ def compare_two(
 
 def _read(source: str, asked: CompareRequest) -> Read:
     """An arm, and the numbers of its file whose units are in doubt."""
-    from er3a.files.arm_file import read_arm
+    from er3a.files.robot_library import read_arm
     from er3a.files.units import noted_doubts
 
     with noted_doubts() as doubtful:
@@ -278,7 +278,7 @@ def _refuse_wrong(tolerances: dict[str, float], output: Path | None) -> None:
 
 def _others(source: str, xacro: Sequence[str], options: dict[str, Any]) -> dict[str, ReadArm]:
     """The arm to compare with, or all of a folder by their files, with notes on those that are unreadable."""
-    from er3a.files.arm_file import read_arm, read_arms
+    from er3a.files.robot_library import read_arm, read_arms
 
     if not Path(source).is_dir():
         return {source: read_arm(source, xacro=xacro, **options)}

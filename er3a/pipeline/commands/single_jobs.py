@@ -147,8 +147,8 @@ def teach(
 def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
     """Write the panel of an arm that is given as a file, read as the options say."""
     from er3a.files.arm_catalogue import ARMS
-    from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
+    from er3a.files.robot_library import read_arm
     from er3a.pipeline.code_digest import code_digest
     from er3a.pipeline.results import Input, Provenance
     from er3a.pipeline.teach.panel import write_panel
