@@ -124,14 +124,14 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
         "inertia": bool(robot.masses.links),
         "drives": robot.masses.drives is not None,
     }
-    but = {}
+    but, guessed = dict[str, str](), ("envelopes",) if lost else ()
     if lost:
         but["envelopes"] = f", but for shapes of {', '.join(lost)} that could not be read"
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
     more = {
-        group: Source(f"As {path.name} states it{but.get(group, '')}", "inferred" if group in but else "export")
+        group: Source(f"As {path.name} states it{but.get(group, '')}", "inferred" if group in guessed else "export")
         for group, there in stated.items()
         if there
     }
