@@ -125,15 +125,17 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
     unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(joints).items()}
     table = read_csv(path, unread | columns_of(" ".join(joints)))
     rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
-    _check_units(path, rows, joints)
+    values = _check_units(path, rows, joints)
     check_poses(rows, robot, path)
-    return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
+    return meant(robot, values)
 
 
-def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> None:
+def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> Reals:
+    """The joint values (P, n), deg and mm, of which none can be radians."""
     turning = np.array([name.endswith("_deg") for name in joints])
     poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(joints))
     refuse_radians(path, f"columns {joints[0]} to {joints[-1]}", poses[:, turning])
+    return poses
 
 
 def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:

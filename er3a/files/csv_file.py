@@ -138,23 +138,6 @@ def is_own(path: str | Path) -> bool:
     return OWN_HEAD.match(read_text(Path(path), MAX_BYTES)) is not None
 
 
-def read_column(path: str | Path, column: str) -> list[str]:
-    """The texts in one column of a CSV file that has been checked before.
-
-    Returns
-    -------
-    texts : one per row below the header, without surrounding spaces; [] if the file has no such column
-
-    Raises
-    ------
-    InputError
-        if the file is missing, too large or not CSV
-    """
-    (_, header), *rows = read_lines(Path(path))
-    names = [name.strip() for name in header]
-    return [line[names.index(column)].strip() for _, line in rows] if column in names else []
-
-
 def csv_text(path: Path) -> str:
     """The text of a CSV file, in UTF-8 or UTF-16.
 

@@ -213,7 +213,6 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
     table = path.parent / head.samples
     rows, header = sample_rows(table)
     flange, q = _flange(table, rows, header, robot)
-    of_joints = q is not None
     names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
     if head.images is not None:
         images = _targets_of_images(table, rows, names, head.images)
@@ -236,7 +235,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         touched=_touched(path.parent / head.touched, robot) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
         shared=shared,
-        of_joints=of_joints,
+        of_joints=q is not None,
     )
     return samples, images
 

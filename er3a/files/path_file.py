@@ -38,7 +38,7 @@ from er3a.files.csv_file import (
     read_header,
     refuse_unit,
 )
-from er3a.files.kept_files import given_file
+from er3a.files.kept_files import own_or_shipped
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import KNOWN_FORMS, PoseEntry
@@ -104,7 +104,7 @@ def read_path_table(path: str | Path) -> PathTable:
         naming row and column: no known columns, too few points, NaN, times that do not rise, wrong units, an invalid
         orientation
     """
-    path = given_file(Path(path))
+    path = own_or_shipped(path)
     if path.suffix in TRAJECTORIES:
         at, values, rates = _ros_trajectory(path)
         _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
@@ -127,11 +127,13 @@ def read_path_table(path: str | Path) -> PathTable:
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in (*columns, *sorted(beside))} | CHECKED_COLUMN)
     if len(rows) < 2:
-        raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
+        raise InputError(path, None, "the path has fewer than two points", "Give at least two rows")
     if len(rows) > MAX_ROWS:
         raise InputError(path, None, f"{len(rows)} rows are more than {MAX_ROWS}", "Split the path")
     lines = np.array([row["row"] for row in rows])
-    times = _times(path, lines, rows) if timed else None
+    times = np.array([row["t_s"] for row in rows]) if timed else None
+    if times is not None:
+        _check_times(path, [f"row {line}, column t_s" for line in lines], times)
     if of_joints:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
@@ -270,12 +272,6 @@ def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) 
     return q
 
 
-def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:
-    times = np.array([row["t_s"] for row in rows])
-    _check_times(path, [f"row {line}, column t_s" for line in lines], times)
-    return times
-
-
 def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
     if times[0] != 0:
         raise InputError(path, places[0], f"the path starts at {times[0]:g} s", "Start at 0")
@@ -305,10 +301,6 @@ def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str]) -> None
         raise InputError(path, where, problem, remedy) from None
     if not all(row[UNITS_CHECKED] for row in rows):
         doubt_degrees(largest, key=where, file=path)
-
-
-def _points(count: int) -> str:
-    return "no point" if count == 0 else "one point"
 
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down

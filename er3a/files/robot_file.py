@@ -30,7 +30,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, in_si, is_part_of_pi
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot
+from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot, slides_of
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
@@ -240,10 +240,9 @@ def check_masses(drives: DriveGroup | None, wrist: WristLoadGroup | None, slides
         as ``field: problem | remedy``: repeated or unknown joints, moments about a joint that slides, units of the
         other type of joint, or a peak below the rated value
     """
-    rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
-    rows.append(("wrist_load", wrist.rows if wrist else []))
-    for group, listed in rows:
-        joints = [row.joint for row in listed]
+    groups: dict[str, DriveGroup | WristLoadGroup | None] = {"drives": drives, "wrist_load": wrist}
+    for group, listed in groups.items():
+        joints = [row.joint for row in listed.rows] if listed else []
         if joints and (max(joints) > len(slides) or len(set(joints)) != len(joints)):
             raise ValueError(f"{group}.rows: the joints come as {joints} | Write one row for each joint of the arm")
     for i, about in enumerate(wrist.rows if wrist else []):
@@ -652,9 +651,11 @@ class CollisionPairs(StrictModel):
 
     def rules(self) -> tuple[PairRule, ...]:
         """As the library takes them."""
-        return (
-            *(PairRule(entry.pair[0], entry.pair[1], "allow", entry.reason) for entry in self.allow),
-            *(PairRule(entry.pair[0], entry.pair[1], "watch", entry.reason) for entry in self.watch),
+        decided: dict[Literal["allow", "watch"], list[DecidedPair]] = {"allow": self.allow, "watch": self.watch}
+        return tuple(
+            PairRule(entry.pair[0], entry.pair[1], rule, entry.reason)
+            for rule, entries in decided.items()
+            for entry in entries
         )
 
     def check(self, known: Collection[str]) -> None:
@@ -795,9 +796,8 @@ class RobotFile(InputFile):
         """Whether each joint is a distance; see :attr:`er3a.robots.robot.Robot.slides`."""
         sliding = np.array([row.type == "prismatic" for row in self.dh.rows])
         joints = len(self.limits.rows)
-        moves = coupling_matrix(self.coupling, len(sliding), joints) if self.coupling else np.eye(len(sliding), joints)
-        moved = (moves[sliding] != 0).any(axis=0)
-        return [bool(each) for each in np.where(moves.diagonal() != 0, sliding[:joints], moved)]
+        coupling = coupling_matrix(self.coupling, len(sliding), joints) if self.coupling else None
+        return [bool(each) for each in slides_of(sliding, coupling)]
 
     @model_validator(mode="after")
     def _check_links(self):

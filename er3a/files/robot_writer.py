@@ -85,10 +85,6 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         if the robot's values make no acceptable file; it names ``path``
     """
 
-    def sourced(group: str) -> dict:
-        source = robot.sources.get(group, _UNKNOWN)
-        return {"source": source.source, "grade": source.grade, "origin": source.origin or None}
-
     zero_rows, dh_rows = list[dict[str, Any]](), list[dict[str, Any]]()
     for k, sliding in enumerate(robot.sliding):
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
@@ -102,38 +98,37 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
         dh_rows.append(row | {"beta_deg": angles["beta"] or None})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
-    content = {
+    groups: dict[str, dict[str, Any]] = {
+        "dh": {
+            "convention": robot.convention,
+            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
+            "rows": _rows(robot, "dh", dh_rows),
+        },
+        "zero": {"rows": _rows(robot, "zero", zero_rows)},
+        "limits": {"rows": _limit_rows(robot), "combined": [_combined_row(robot, each) for each in robot.combined]},
+        **mass_groups(robot),
+        **dict(_placements(robot)),
+    }
+    if np.isfinite(robot.speed).any():
+        groups["speeds"] = {"rows": _speed_rows(robot)}
+    if robot.coupling is not None:
+        groups["coupling"] = {"rows": _coupling_rows(robot.coupling)}
+    if robot.envelopes or robot.hulls or robot.meshes:
+        groups["envelopes"] = _shapes(robot)
+    content: dict[str, Any] = {
         "kind": "robot",
         "name": robot.name,
         "title": robot.title,
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
-        "dh": sourced("dh")
-        | {
-            "convention": robot.convention,
-            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
-            "rows": _rows(robot, "dh", dh_rows),
-        },
-        "zero": sourced("zero") | {"rows": _rows(robot, "zero", zero_rows)},
-        "limits": sourced("limits")
-        | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
+        "visuals": [link_visual(each) for each in robot.visuals],
+        "home_deg": None if robot.home is None else [_tidy(value) for value in shown(robot, robot.home)],
     }
-    if np.isfinite(robot.speed).any():
-        content["speeds"] = sourced("speeds") | {"rows": _speed_rows(robot)}
-    if robot.coupling is not None:
-        content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
-    if robot.envelopes or robot.hulls or robot.meshes:
-        content["envelopes"] = sourced("envelopes") | _shapes(robot)
-    if robot.visuals:
-        content["visuals"] = [link_visual(each) for each in robot.visuals]
-    if robot.home is not None:
-        content["home_deg"] = [_tidy(value) for value in shown(robot, robot.home)]
     if robot.pair_rules:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
-    for group, fields in mass_groups(robot).items():
-        content[group] = sourced(group) | fields
-    for key, placement in _placements(robot):
-        content[key] = sourced(key) | placement
+    for group, fields in groups.items():
+        source = robot.sources.get(group, _UNKNOWN)
+        content[group] = fields | {"source": source.source, "grade": source.grade, "origin": source.origin or None}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
         return parse(RobotFile, content, path).with_surfaces(robot.meshes)
 

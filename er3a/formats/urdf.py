@@ -241,7 +241,7 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     for joint, _, T in _along(found.joints, shift[None]):
         place[joint.child] = T[0], place[joint.parent][1] + joint.moves
 
-    def placed(name: str, carried: bool = False) -> tuple[Reals, int] | None:
+    def placed(name: str, carried: bool) -> tuple[Reals, int] | None:
         behind, fixed = np.eye(4), True
         while name not in place and name in above and (carried or not above[name].moves):
             fixed &= not above[name].moves

@@ -26,12 +26,11 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import scipy
@@ -592,10 +591,8 @@ def _unrounded(rpy: Reals, words: Sequence[str]) -> Reals:
     return np.where(np.abs(rpy - meant) <= shown, meant, rpy)
 
 
-class LinkPlaces(Protocol):
-    """Places of links, from :func:`er3a.formats.urdf.link_places`."""
-
-    def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
+LinkPlaces = Callable[[str, bool], tuple[Reals, int] | None]
+"""Places of links, from :func:`er3a.formats.urdf.link_places`."""
 
 
 def in_links(
