@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError
-from er3a.files.csv_file import read_column
+from er3a.files.csv_file import read_lines
 from er3a.files.yaml_file import read_yaml
 
 
@@ -21,7 +21,9 @@ def grades_in(file: Path) -> dict[str, list[str]] | dict[str, int]:
         grades
     """
     if file.suffix == ".csv":
-        return dict(Counter(read_column(file, "grade")))
+        (_, header), *rows = read_lines(file)
+        place = [name.strip() for name in header].index("grade") if "grade" in ",".join(header) else None
+        return {} if place is None else dict(Counter(line[place].strip() for _, line in rows))
     if file.suffix not in (".yaml", ".yml"):
         return {}
     found: dict[str, list[str]] = {}

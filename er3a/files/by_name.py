@@ -22,10 +22,10 @@ from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, start
 from er3a.diagnosis import diagnose as diagnosis
 from er3a.diagnosis.diagnose import Hypotheses
 from er3a.errors import ArgumentError, InputError
-from er3a.files.csv_file import CsvColumn, columns_of, read_csv, read_header
+from er3a.files.csv_file import METRES, CsvColumn, columns_of, read_csv, read_header, refuse_unit
 from er3a.files.orientations import POSITION
 from er3a.files.reference_sets import check_robot_origins, load_references
-from er3a.files.units import MIN_SPAN_MM, joint_names, refuse_radians
+from er3a.files.units import joint_names, refuse_radians
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
@@ -104,6 +104,7 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
             raise InputError(path, where, problem, remedy)
         pose = tuple(fields[name] for name in joints)
         rows.append(Measurement(fields["row"], pose, fields["point"], xyz, deviation, **names))
+    refuse_unit(path, table, POSITION, METRES, mixed=False)
     _check_units(path, rows, joints)
     if robot is not None:
         _check_scale(path, rows, robot)
@@ -124,20 +125,17 @@ def load_joint_values(path: str | Path, robot: Robot) -> Reals:
     unread = {name: replace(each, optional=True, always=False) for name, each in measurement_columns(joints).items()}
     table = read_csv(path, unread | columns_of(" ".join(joints)))
     rows = [Measurement(each["row"], tuple(each[q] for q in joints), "tool", (None, None, None)) for each in table]
-    _check_units(path, rows, joints)
+    values = _check_units(path, rows, joints)
     check_poses(rows, robot, path)
-    return meant(robot, np.array([row.pose for row in rows], dtype=float).reshape(-1, robot.joints))
+    return meant(robot, values)
 
 
-def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> None:
-    whole = [row for row in rows if None not in row.xyz_mm]
-    span = max((abs(value) for row in whole for value in row.xyz_mm if value is not None), default=0.0)
-    if whole and span < MIN_SPAN_MM:
-        problem = f"all points are within {span:g} mm of the frame's origin, which can only be metres"
-        raise InputError(path, f"row {whole[0].row}, columns x_mm, y_mm, z_mm", problem, "Multiply by 1000")
+def _check_units(path: Path, rows: list[Measurement], joints: Sequence[str]) -> Reals:
+    """The joint values (P, n), deg and mm, of which none can be radians."""
     turning = np.array([name.endswith("_deg") for name in joints])
     poses = np.array([row.pose for row in rows], dtype=float).reshape(-1, len(joints))
     refuse_radians(path, f"columns {joints[0]} to {joints[-1]}", poses[:, turning])
+    return poses
 
 
 def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:

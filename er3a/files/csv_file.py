@@ -7,12 +7,13 @@ import difflib
 import io
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from er3a.errors import InputError, given_bytes
+from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
 from er3a.files.yaml_file import vanished
 from er3a.formats.mesh_file import TOO_LARGE, read_text, text_of
 
@@ -135,23 +136,6 @@ def is_own(path: str | Path) -> bool:
         if the file is missing, too large or not text
     """
     return OWN_HEAD.match(read_text(Path(path), MAX_BYTES)) is not None
-
-
-def read_column(path: str | Path, column: str) -> list[str]:
-    """The texts in one column of a CSV file that has been checked before.
-
-    Returns
-    -------
-    texts : one per row below the header, without surrounding spaces; [] if the file has no such column
-
-    Raises
-    ------
-    InputError
-        if the file is missing, too large or not CSV
-    """
-    (_, header), *rows = read_lines(Path(path))
-    names = [name.strip() for name in header]
-    return [line[names.index(column)].strip() for _, line in rows] if column in names else []
 
 
 def csv_text(path: Path) -> str:
@@ -306,3 +290,74 @@ def cell_value(path: Path, row: int, name: str, text: str, column: CsvColumn) ->
 
 def _allowed(column: CsvColumn) -> str:
     return f" one of: {', '.join(column.choices)}" if column.choices else ""
+
+
+@dataclass(frozen=True)
+class Mistaken:
+    """A unit that values were written in by mistake.
+
+    Attributes
+    ----------
+    least : values are in the other unit if all are smaller; small, large : or one row's among larger ones
+    """
+
+    unit: str
+    other: str
+    least: float
+    small: float
+    large: float
+
+
+METRES = Mistaken("mm", "metres", MIN_SPAN_MM, 2.0, 100.0)
+RADIANS = Mistaken("deg", "radians", WIDEST_IN_RADIANS, WIDEST_IN_RADIANS, 30.0)
+
+
+def refuse_unit(
+    path: Path,
+    table: Sequence[Mapping[str, Any]],
+    columns: Iterable[str],
+    mistaken: Mistaken,
+    remedy: str = "Multiply by 1000",
+    *,
+    whole: bool = True,
+    mixed: bool = True,
+) -> None:
+    """Reject a table whose values are all too small, and a row of small values among large ones.
+
+    Parameters
+    ----------
+    table : rows by column, with the line as ``row``
+    columns : those of one unit, in deg or mm; such as the table lacks are not looked at
+    whole, mixed : whether all rows together are judged, and single ones among others
+
+    Raises
+    ------
+    InputError
+        naming the columns, and the row if it is one alone
+    """
+    present = [column for column in columns if column in table[0]]
+    where, sizes, unit = f"columns {', '.join(present)}", sizes_of(table, present), mistaken.unit
+    largest = max(sizes)
+    if whole and 0 < largest < mistaken.least:
+        problem = f"the largest value is {largest:g} {unit}, which can only be {mistaken.other}"
+        raise InputError(path, where, problem, remedy)
+    for fields, size in zip(table, sizes):
+        if mixed and 0 < size < mistaken.small and largest > mistaken.large:
+            problem = (
+                f"{size:g} {unit} at most, with up to {largest:g} {unit} in other rows, looks like {mistaken.other}"
+            )
+            raise InputError(path, f"row {fields['row']}, {where}", problem, remedy)
+
+
+def sizes_of(table: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> list[float]:
+    """The largest size in some columns of each row.
+
+    Parameters
+    ----------
+    table : rows by column; values may be None
+
+    Returns
+    -------
+    sizes : one for each row; 0 of rows without any value
+    """
+    return [max((abs(row[column]) for column in columns if row[column] is not None), default=0.0) for row in table]

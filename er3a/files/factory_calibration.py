@@ -28,7 +28,6 @@ from er3a.robots.robot import Robot, Source
 
 MAX_BYTES = 1_000_000
 DELTAS = {"offset": "delta_theta", "a": "delta_a", "d": "delta_d", "alpha": "delta_alpha"}
-LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 LONGEST_M = 20.0
 TABLE = "a", "alpha", "beta", "d", "direction", "offset"
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -57,6 +56,9 @@ class Kinematics(StrictModel):
     wrist_2: LinkPose
     wrist_3: LinkPose
     hash: Annotated[str | None, Field(max_length=200)] = None
+
+
+LINKS = tuple(Kinematics.model_fields)[:6]
 
 
 class KinematicsFile(StrictModel):

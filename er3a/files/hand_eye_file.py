@@ -22,17 +22,10 @@ from PIL import Image
 from pydantic import Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CsvColumn, read_csv, read_header
+from er3a.files.csv_file import METRES, CsvColumn, read_csv, read_header, refuse_unit
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Text
-from er3a.files.units import (
-    METRES_BELOW_MM,
-    ROWS_TO_JUDGE_UNITS,
-    WIDEST_IN_RADIANS,
-    doubt,
-    joint_names,
-    refuse_radians,
-)
+from er3a.files.units import WIDEST_IN_RADIANS, doubt, joint_names, refuse_radians
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
@@ -44,35 +37,17 @@ from er3a.vision.boards import Board, BoardNotFoundError, BoardViews, Camera, bo
 from er3a.vision.calibration_set import CalibrationSet
 
 TOLERANCE = 1e-3  # quaternions are written with as few as four digits
-MIXED_UNITS = 200.0
 
 
 def _poses(path: Path, rows: list[dict[str, Any]], stream: str, form: str) -> Reals:
     """Poses (N, 4, 4), m, of which the units are judged, too."""
     prefix = f"{stream}_"
-    position, values = (
-        np.array([[row[prefix + name] for name in names] for row in rows], float) for names in (POSITION, FORMS[form])
-    )
-    _check_millimetres(path, rows, stream, position)
+    refuse_unit(path, rows, [prefix + name for name in POSITION], METRES)
     if form in ("rpy_deg", "zyz_deg"):
         where = f"columns {prefix}{FORMS[form][0]} to {prefix}{FORMS[form][-1]}"
+        values = np.array([[row[prefix + name] for name in FORMS[form]] for row in rows], float)
         refuse_radians(path, where, values, WIDEST_IN_RADIANS / 2)
     return poses_of(path, rows, form, prefix, TOLERANCE)
-
-
-def _check_millimetres(path: Path, rows: list[dict[str, Any]], stream: str, position: Reals) -> None:
-    where = f"columns {stream}_x_mm, {stream}_y_mm, {stream}_z_mm"
-    largest = np.abs(position).max(axis=1)
-    if 0 < largest.max() < METRES_BELOW_MM:
-        problem = f"no coordinate is above {largest.max():.3g} mm, which can only be metres"
-        raise InputError(path, where, problem, "Multiply by 1000")
-    usual = float(np.median(largest))
-    for row, size in zip(rows, largest):
-        if len(rows) >= ROWS_TO_JUDGE_UNITS and size > 0 and not usual / MIXED_UNITS < size < usual * MIXED_UNITS:
-            problem = (
-                f"the position of {size:.3g} mm is in another unit than the others, of {usual:.3g} mm in the median"
-            )
-            raise InputError(path, f"row {row['row']}, {where}", problem, "Write every position in mm")
 
 
 SHOWN_HEADER = 60
@@ -238,7 +213,6 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
     table = path.parent / head.samples
     rows, header = sample_rows(table)
     flange, q = _flange(table, rows, header, robot)
-    of_joints = q is not None
     names = tuple(str(row.get("name") or f"row {row['row']}") for row in rows)
     if head.images is not None:
         images = _targets_of_images(table, rows, names, head.images)
@@ -261,7 +235,7 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         touched=_touched(path.parent / head.touched, robot) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,
         shared=shared,
-        of_joints=of_joints,
+        of_joints=q is not None,
     )
     return samples, images
 

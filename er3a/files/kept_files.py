@@ -22,33 +22,20 @@ INSTALLED = _IN_WHEEL.is_dir()
 ROOT = _IN_WHEEL if INSTALLED else _PACKAGE.parent
 
 
-def own_or_shipped(place: str) -> Path:
+def own_or_shipped(place: str | Path) -> Path:
     """The file or folder at a place such as ``data/robots/arm.yaml``: the study's own, otherwise er3a's.
-
-    The study's folder is the current folder; all paths of a study are relative to it.
-
-    Returns
-    -------
-    path : relative to the current folder if something exists there; otherwise below er3a's root, where it may be
-        missing
-    """
-    own = Path(place)
-    return own if own.exists() else ROOT / place
-
-
-def given_file(path: Path) -> Path:
-    """A file named by the user: their own, otherwise er3a's at a place such as ``data/paths/arm.yaml``.
 
     Parameters
     ----------
-    path : as it was typed; only one that begins with ``data`` is looked up among er3a's files
+    place : from the study's folder, which is the current folder; only one that begins with ``data`` is looked up among
+        er3a's files
 
     Returns
     -------
-    path : er3a's file if the user has none at that place; else the path as it was given, whether or not it exists
+    path : er3a's if the study has none at that place; else the path as it was given, whether or not it exists
     """
-    shipped = ROOT / path
-    return shipped if path.parts[:1] == ("data",) and not path.exists() and shipped.is_file() else path
+    own, shipped = Path(place), ROOT / place
+    return shipped if own.parts[:1] == ("data",) and not own.exists() and shipped.exists() else own
 
 
 def names(folder: str, pattern: str) -> list[str]:

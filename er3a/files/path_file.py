@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
@@ -28,8 +28,17 @@ import scipy
 from pydantic import BeforeValidator, Field, model_validator
 
 from er3a.errors import InputError
-from er3a.files.csv_file import CHECKED_COLUMN, UNITS_CHECKED, CsvColumn, is_own, read_csv, read_header
-from er3a.files.kept_files import given_file
+from er3a.files.csv_file import (
+    CHECKED_COLUMN,
+    METRES,
+    UNITS_CHECKED,
+    CsvColumn,
+    is_own,
+    read_csv,
+    read_header,
+    refuse_unit,
+)
+from er3a.files.kept_files import own_or_shipped
 from er3a.files.orientations import FORMS, POSITION, form_in, poses_of
 from er3a.files.robot_file import Name, Text
 from er3a.files.target_file import KNOWN_FORMS, PoseEntry
@@ -38,7 +47,6 @@ from er3a.files.units import (
     PositionMm,
     Triple,
     check_degrees,
-    check_millimetres,
     doubt_degrees,
     joint_names,
     joint_rates,
@@ -96,7 +104,7 @@ def read_path_table(path: str | Path) -> PathTable:
         naming row and column: no known columns, too few points, NaN, times that do not rise, wrong units, an invalid
         orientation
     """
-    path = given_file(Path(path))
+    path = own_or_shipped(path)
     if path.suffix in TRAJECTORIES:
         at, values, rates = _ros_trajectory(path)
         _repeated(path, np.abs(np.diff(values, axis=0)).max(axis=1))
@@ -119,11 +127,13 @@ def read_path_table(path: str | Path) -> PathTable:
     timed = {"t_s": CsvColumn()} if "t_s" in header else {}
     rows = read_csv(path, timed | {name: CsvColumn() for name in (*columns, *sorted(beside))} | CHECKED_COLUMN)
     if len(rows) < 2:
-        raise InputError(path, None, f"the path has {_points(len(rows))}", "Give at least two rows")
+        raise InputError(path, None, "the path has fewer than two points", "Give at least two rows")
     if len(rows) > MAX_ROWS:
         raise InputError(path, None, f"{len(rows)} rows are more than {MAX_ROWS}", "Split the path")
     lines = np.array([row["row"] for row in rows])
-    times = _times(path, lines, rows) if timed else None
+    times = np.array([row["t_s"] for row in rows]) if timed else None
+    if times is not None:
+        _check_times(path, [f"row {line}, column t_s" for line in lines], times)
     if of_joints:
         joints = _row_joints(path, rows, own)
         size, poses = np.abs(np.diff(joints, axis=0)).max(axis=1), None
@@ -262,12 +272,6 @@ def _row_joints(path: Path, rows: list[dict[str, Any]], names: tuple[str, ...]) 
     return q
 
 
-def _times(path: Path, lines: Integers, rows: list[dict[str, Any]]) -> Reals:
-    times = np.array([row["t_s"] for row in rows])
-    _check_times(path, [f"row {line}, column t_s" for line in lines], times)
-    return times
-
-
 def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
     if times[0] != 0:
         raise InputError(path, places[0], f"the path starts at {times[0]:g} s", "Start at 0")
@@ -279,38 +283,24 @@ def _check_times(path: Path, places: Sequence[str], times: Reals) -> None:
 
 
 def _poses(path: Path, rows: list[dict[str, Any]], form: str) -> Reals:
-    _block(path, rows, POSITION, check_millimetres)
+    refuse_unit(path, rows, POSITION, METRES)
     if form in ("rpy_deg", "zyz_deg"):
         _block(path, rows, FORMS[form])
     return poses_of(path, rows, form)
 
 
-def _block(
-    path: Path,
-    rows: list[dict[str, Any]],
-    names: Sequence[str],
-    check: Callable[[Sequence[float]], None] = check_degrees,
-) -> Reals:
-    """The values of columns of one kind, their unit judged by the largest row: others may well be small."""
+def _block(path: Path, rows: list[dict[str, Any]], names: Sequence[str]) -> None:
+    """Judge the unit of columns of angles by the largest row: others may well be small."""
     values = np.array([[row[name] for name in names] for row in rows])
     top = int(np.argmax(np.abs(values).max(axis=1)))
-    where, largest = _where(rows[top]["row"], names), values[top].tolist()
+    where, largest = f"row {rows[top]['row']}, column {', '.join(names)}", values[top].tolist()
     try:
-        check(largest)
+        check_degrees(largest)
     except ValueError as error:
         problem, _, remedy = str(error).partition(" | ")
         raise InputError(path, where, problem, remedy) from None
-    if check is check_degrees and not all(row[UNITS_CHECKED] for row in rows):
+    if not all(row[UNITS_CHECKED] for row in rows):
         doubt_degrees(largest, key=where, file=path)
-    return values
-
-
-def _where(row: int, names: Sequence[str]) -> str:
-    return f"row {row}, column {', '.join(names)}"
-
-
-def _points(count: int) -> str:
-    return "no point" if count == 0 else "one point"
 
 
 TRAPEZOID_RAMP = 1 / 3  # of a motion's time, on the way up and on the way down

@@ -13,11 +13,21 @@ from typing import Any
 import numpy as np
 
 from er3a.errors import InputError, InputWarning
-from er3a.files.csv_file import UNITS_CHECKED, CsvColumn, Written, columns_of, read_csv
+from er3a.files.csv_file import (
+    METRES,
+    RADIANS,
+    UNITS_CHECKED,
+    CsvColumn,
+    Written,
+    columns_of,
+    read_csv,
+    refuse_unit,
+    sizes_of,
+)
 from er3a.files.kept_files import names, own_or_shipped
 from er3a.files.orientations import BY_ROW, NoRotationError, rotations
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS, doubt
+from er3a.files.units import WIDEST_IN_RADIANS, doubt
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import NEAR_STEP, STEP_IN_RADIANS
 from er3a.references.predict import with_rounding
@@ -383,32 +393,10 @@ LEAST_COMMANDED = 4  # values of a row; rounded to whole degrees they would all 
 LONGEST_ARM = 4.0  # times the farther of both points from the base
 
 
-@dataclass(frozen=True)
-class Mistaken:
-    """A unit that values were written in by mistake.
-
-    Attributes
-    ----------
-    columns : which are looked at
-    least : values are in the other unit if all are smaller; small, large : or one row's among larger ones
-    """
-
-    unit: str
-    other: str
-    remedy: str
-    columns: tuple[str, ...]
-    least: float
-    small: float
-    large: float
-
-
 AS_WRITTEN = f"if the values are meant as they are written, add a column {UNITS_CHECKED} that says yes"
+IN_DEGREES = f"Convert to degrees; {AS_WRITTEN}"
 LENGTHS = (*_XYZ, "value_mm", "lower_mm", "upper_mm", "speed_mm_s")
 ANGLES = ("lower_deg", "upper_deg", "speed_deg_s")
-METRES = Mistaken("mm", "metres", f"Multiply by 1000; {AS_WRITTEN}", LENGTHS, MIN_SPAN_MM, 2.0, 100.0)
-RADIANS = Mistaken(
-    "deg", "radians", f"Convert to degrees; {AS_WRITTEN}", ANGLES, WIDEST_IN_RADIANS, WIDEST_IN_RADIANS, 30.0
-)
 
 
 def load_references(name_or_folder: str | Path, robot: Robot | None = None) -> ReferenceSet:
@@ -596,36 +584,16 @@ def _check_units(path: Path, format: Format, table: list[Fields]) -> None:
     """Reject values in metres or radians, but where a person has checked the units of every row."""
     if all(fields[UNITS_CHECKED] for fields in table):
         return
-    for mistaken in (METRES, RADIANS):
-        _check_sizes(path, table, mistaken, format.mixed)
+    columns = (METRES, LENGTHS, f"Multiply by 1000; {AS_WRITTEN}"), (RADIANS, ANGLES, IN_DEGREES)
+    for mistaken, judged, remedy in columns:
+        refuse_unit(path, table, judged, mistaken, remedy, whole="length" not in table[0], mixed=format.mixed)
     if _POSE[0] in format.columns:
         _check_angles(path, table)
 
 
-def _check_sizes(path: Path, table: list[Fields], mistaken: Mistaken, mixed: bool) -> None:
-    """Reject a table whose values are all too small, and a row of small values among large ones."""
-    present = [column for column in mistaken.columns if column in table[0]]
-    columns = f"columns {', '.join(present)}"
-    sizes = _sizes(table, present)
-    largest = max(sizes)
-    if "length" not in table[0] and 0 < largest < mistaken.least:
-        problem = f"the largest value is {largest:g} {mistaken.unit}, which can only be {mistaken.other}"
-        raise InputError(path, columns, problem, mistaken.remedy)
-    for fields, size in zip(table, sizes):
-        if mixed and 0 < size < mistaken.small and largest > mistaken.large:
-            problem = f"{size:g} {mistaken.unit} at most, with up to {largest:g} {mistaken.unit} in other rows,"
-            where = f"row {fields['row']}, {columns}"
-            raise InputError(path, where, f"{problem} looks like {mistaken.other}", mistaken.remedy)
-
-
-def _sizes(table: list[Fields], columns: list[str]) -> list[float]:
-    """The largest size in these columns of each row."""
-    return [max((abs(row[column]) for column in columns if row[column] is not None), default=0.0) for row in table]
-
-
 def _check_angles(path: Path, table: list[Fields]) -> None:
     """Reject poses that are all in radians; of single angles among degrees, which can be meant so, only warn."""
-    all_small = max(_sizes(table, [*_POSE, *_FURTHER])) < WIDEST_IN_RADIANS
+    all_small = max(sizes_of(table, (*_POSE, *_FURTHER))) < WIDEST_IN_RADIANS
     if all_small and _XYZ[0] in table[0]:
         _check_arcs(path, table)
     for fields in table:
@@ -651,7 +619,7 @@ def _check_arcs(path: Path, table: list[Fields]) -> None:
         if turned and moved > longest * math.radians(turned):
             where = f"row {row['row']}, columns {_POSE[0]} to {_POSE[-1]}"
             problem = f"{turned:.4g} deg in all from row {start['row']} can't move the point by {moved:.4g} mm; "
-            raise InputError(path, where, f"{problem}the joint values can only be radians", RADIANS.remedy)
+            raise InputError(path, where, f"{problem}the joint values can only be radians", IN_DEGREES)
 
 
 def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:

@@ -6,10 +6,10 @@ import base64
 import math
 from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
 from er3a.files.kept_files import own_or_shipped
 from er3a.files.units import (
@@ -19,9 +19,7 @@ from er3a.files.units import (
     SHORTEST_PLAIN_LENGTH_MM,
     JointsDeg,
     Triple,
-    check_degrees,
     doubt,
-    doubt_degrees,
     doubt_millimetres,
     look_like_radians,
 )
@@ -32,7 +30,7 @@ from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import RADIANS_BELOW_DEG, in_si, is_part_of_pi
 from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, WristLoad, moved, no_body
-from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot
+from er3a.robots.robot import MAX_JOINTS, Grade, LinkMesh, PairRule, Robot, slides_of
 
 NAME_PATTERN = r"^[a-z0-9][a-z0-9_-]{0,63}$"
 DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
@@ -138,41 +136,21 @@ class LinkRow(BodyFields):
     link: Annotated[int, Field(ge=0, le=MAX_JOINTS)]
 
 
-class JointOrigin(Placement):
-    """A joint's frame in a URDF, relative to the frame of the previous link."""
-
-    joint: JointNumber
-
-    @model_validator(mode="after")
-    def _in_degrees(self):
-        check_degrees(self.rpy_deg)
-        doubt_degrees(self.rpy_deg, self, "rpy_deg")
-        return self
-
-
 class Inertia(Sourced):
-    """Bodies of the links, in one of three kinds of frames.
+    """Bodies of the links, in one of two kinds of frames.
 
     ``joint``: on the axis of the link's joint and moving with it, as for the envelopes. ``dh``: the frame of the
-    table's row of that number. ``urdf``: the link frame of a URDF; its joint origins are in ``origins``.
+    table's row of that number.
     """
 
-    frame: Literal["joint", "dh", "urdf"]
-    origins: list[JointOrigin] = []
+    frame: Literal["joint", "dh"]
     links: Annotated[list[LinkRow], Field(min_length=1, max_length=MAX_JOINTS + 1)]
 
     @model_validator(mode="after")
-    def _frames_known(self):
+    def _each_link_once(self):
         numbers = [row.link for row in self.links]
         if len(set(numbers)) != len(numbers):
             raise ValueError("links: a link is named twice | Write one row for each link")
-        if (self.frame == "urdf") != bool(self.origins):
-            raise ValueError("origins: frame urdf needs them, and only frame urdf | Give both or neither")
-        joints = [origin.joint for origin in self.origins]
-        if self.frame == "urdf" and max(numbers) > len(joints):
-            raise ValueError(f"links: there is no origin for link {max(numbers)} | Give that of each link's joint")
-        if self.frame == "urdf" and joints != list(range(1, len(joints) + 1)):
-            raise ValueError("origins: not one for each joint in order | Write the origins of joints 1, 2, 3 ...")
         return self
 
 
@@ -262,10 +240,9 @@ def check_masses(drives: DriveGroup | None, wrist: WristLoadGroup | None, slides
         as ``field: problem | remedy``: repeated or unknown joints, moments about a joint that slides, units of the
         other type of joint, or a peak below the rated value
     """
-    rows: list[tuple[str, Sequence[DriveRow | WristRow]]] = [("drives", drives.rows if drives else [])]
-    rows.append(("wrist_load", wrist.rows if wrist else []))
-    for group, listed in rows:
-        joints = [row.joint for row in listed]
+    groups: dict[str, DriveGroup | WristLoadGroup | None] = {"drives": drives, "wrist_load": wrist}
+    for group, listed in groups.items():
+        joints = [row.joint for row in listed.rows] if listed else []
         if joints and (max(joints) > len(slides) or len(set(joints)) != len(joints)):
             raise ValueError(f"{group}.rows: the joints come as {joints} | Write one row for each joint of the arm")
     for i, about in enumerate(wrist.rows if wrist else []):
@@ -317,7 +294,7 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
     Parameters
     ----------
     robot : the arm with its table; its base does not count
-    inertia : says in which frames the bodies are: joint, D-H, or those of a URDF with their origins
+    inertia : says in which frames the bodies are: joint or D-H
 
     Returns
     -------
@@ -328,18 +305,12 @@ def link_masses(robot: Robot, inertia: Inertia) -> tuple[LinkMass, ...]:
     The frames of the file and of the joints are compared with all joints at 0, where all of them are known.
     """
     placed = robot.replace(base=np.eye(4), masses=Masses())
-    at_zero = np.array([np.eye(4), *(_at_zero(placed, constant_links(placed)[: k + 1]) for k in range(robot.rows))])
-    stated = at_zero.copy()
-    if inertia.frame == "dh":
-        for k in range(1, robot.rows + 1):
-            links = constant_links(placed, k)
-            stated[k] = _at_zero(placed, links[:-1]) @ links[-1]
-    T = np.eye(4)
-    for origin in inertia.origins:
-        T = T @ origin.transform()
-        stated[origin.joint] = T
-    # Both frames of a link move together, so how they lie to each other with the joints at 0 holds always.
-    own = np.linalg.inv(at_zero) @ stated
+    own = np.tile(np.eye(4), (robot.rows + 1, 1, 1))
+    for k in range(1, robot.rows + 1 if inertia.frame == "dh" else 1):
+        links = constant_links(placed, k)
+        joint, row = _at_zero(placed, constant_links(placed)[:k]), _at_zero(placed, links[:-1]) @ links[-1]
+        # Both frames of a link move together, so how they lie to each other with the joints at 0 holds always.
+        own[k] = np.linalg.inv(joint) @ row
     return tuple(LinkMass(row.link, moved(row.body, own[row.link])) for row in inertia.links)
 
 
@@ -543,21 +514,25 @@ class SourcedPlacement(Placement, Sourced):
     pass
 
 
+def _plain_lengths(values: list[Any]) -> list[Any]:
+    farthest = float(np.abs(values).max())
+    if RESIDUE_MM < farthest < SHORTEST_PLAIN_LENGTH_MM:
+        doubt(values, "", f"{farthest:g} mm at most", "metres")
+    if farthest > LONGEST_LENGTH_MM:
+        raise ValueError(f"{farthest:g} mm is longer than any robot's link | Write the points in mm")
+    return values
+
+
+LinkPoint = Annotated[Triple, AfterValidator(_plain_lengths)]
+
+
 class Capsule(StrictModel):
     """All points within ``radius_mm`` of the line between two points, in the frame that turns with joint ``link``."""
 
     link: Annotated[int, Field(ge=0, le=MAX_JOINTS)]
-    from_mm: Triple
-    to_mm: Triple
+    from_mm: LinkPoint
+    to_mm: LinkPoint
     radius_mm: Annotated[float, Field(ge=SHORTEST_PLAIN_LENGTH_MM, le=LONGEST_LENGTH_MM)]
-
-    @field_validator("from_mm", "to_mm")
-    @classmethod
-    def _plain_lengths(cls, values):
-        doubt_millimetres(values, values)
-        if max(map(abs, values)) > LONGEST_LENGTH_MM:
-            raise ValueError(f"{values} mm is longer than any robot's link | Write the point in mm")
-        return values
 
 
 class PlacedMesh(Placement, MeshFile):
@@ -571,17 +546,7 @@ class LinkHull(StrictModel):
 
     link: Annotated[int, Field(ge=0)]
     margin_mm: Annotated[float, Field(ge=0, le=LONGEST_LENGTH_MM)] = 0.0
-    points_mm: Annotated[list[Triple], Field(min_length=4, max_length=1000)]
-
-    @field_validator("points_mm")
-    @classmethod
-    def _plain_lengths(cls, points):
-        farthest = max(abs(value) for point in points for value in point)
-        if RESIDUE_MM < farthest < SHORTEST_PLAIN_LENGTH_MM:
-            doubt(points, "", f"{farthest:g} mm at most", "metres")
-        if farthest > LONGEST_LENGTH_MM:
-            raise ValueError(f"{farthest:g} mm is longer than any robot's link | Write the points in mm")
-        return points
+    points_mm: Annotated[list[Triple], Field(min_length=4, max_length=1000), AfterValidator(_plain_lengths)]
 
 
 class LinkSurface(StrictModel):
@@ -686,9 +651,11 @@ class CollisionPairs(StrictModel):
 
     def rules(self) -> tuple[PairRule, ...]:
         """As the library takes them."""
-        return (
-            *(PairRule(entry.pair[0], entry.pair[1], "allow", entry.reason) for entry in self.allow),
-            *(PairRule(entry.pair[0], entry.pair[1], "watch", entry.reason) for entry in self.watch),
+        decided: dict[Literal["allow", "watch"], list[DecidedPair]] = {"allow": self.allow, "watch": self.watch}
+        return tuple(
+            PairRule(entry.pair[0], entry.pair[1], rule, entry.reason)
+            for rule, entries in decided.items()
+            for entry in entries
         )
 
     def check(self, known: Collection[str]) -> None:
@@ -706,7 +673,7 @@ class CollisionPairs(StrictModel):
         seen: set[frozenset[str]] = set()
         for key in ("allow", "watch"):
             for i, entry in enumerate(getattr(self, key)):
-                where, pair = f"{key}[{i}].pair", frozenset(entry.pair)
+                where, pair = f"collision.{key}[{i}].pair", frozenset(entry.pair)
                 for name in entry.pair:
                     if name not in known:
                         raise ValueError(f"{where}: there is no '{name}' | Known: {', '.join(sorted(known))}")
@@ -822,8 +789,6 @@ class RobotFile(InputFile):
         check_masses(self.drives, self.wrist_load, self.slides)
         if self.inertia and max(row.link for row in self.inertia.links) > len(self.dh.rows):
             raise ValueError(f"inertia.links: the arm has {len(self.dh.rows)} links | Link 0 is the base")
-        if self.inertia and self.inertia.origins and len(self.inertia.origins) != len(self.dh.rows):
-            raise ValueError("inertia.origins: not one for each joint | Write the origin of each joint of the table")
         return self
 
     @property
@@ -831,9 +796,8 @@ class RobotFile(InputFile):
         """Whether each joint is a distance; see :attr:`er3a.robots.robot.Robot.slides`."""
         sliding = np.array([row.type == "prismatic" for row in self.dh.rows])
         joints = len(self.limits.rows)
-        moves = coupling_matrix(self.coupling, len(sliding), joints) if self.coupling else np.eye(len(sliding), joints)
-        moved = (moves[sliding] != 0).any(axis=0)
-        return [bool(each) for each in np.where(moves.diagonal() != 0, sliding[:joints], moved)]
+        coupling = coupling_matrix(self.coupling, len(sliding), joints) if self.coupling else None
+        return [bool(each) for each in slides_of(sliding, coupling)]
 
     @model_validator(mode="after")
     def _check_links(self):
@@ -844,10 +808,7 @@ class RobotFile(InputFile):
                 if shape.link > count:
                     raise ValueError(f"{key}[{i}].link: the arm has no link {shape.link} | 0 to {count}")
         if self.collision:
-            try:
-                self.collision.check({"base", *(f"link_{k}" for k in range(1, count + 1))})
-            except ValueError as error:
-                raise ValueError(f"collision.{error}") from None
+            self.collision.check({"base", *(f"link_{k}" for k in range(1, count + 1))})
         return self
 
     @model_validator(mode="after")
@@ -940,16 +901,16 @@ def _kind(sliding: bool) -> str:
 def _check_limit(field: str, row: JointLimitRow | CombinedLimitRow, sliding: bool) -> None:
     """Reject limits in the unit of the other type of joint, half of them, crossed ones, and unlikely ones."""
     named = f"joint {row.joint}" if isinstance(row, JointLimitRow) else "the sum"
-    degrees, millimetres = (row.lower_deg, row.upper_deg), (row.lower_mm, row.upper_mm)
-    own, other, unit = (millimetres, degrees, "mm") if sliding else (degrees, millimetres, "deg")
-    if isinstance(row, JointLimitRow) and row.continuous:
-        if sliding or any(value is not None for value in (*degrees, *millimetres)):
-            problem = f"{named} is {_kind(sliding)} and has limits" if not sliding else f"{named} is prismatic"
+    unit, endless = "mm" if sliding else "deg", isinstance(row, JointLimitRow) and row.continuous
+    given = [key for key in Ends.model_fields if getattr(row, key) is not None]
+    if endless:
+        if sliding or given:
+            problem = f"{named} is prismatic" if sliding else f"{named} is revolute and has limits"
             raise ValueError(f"{field}.continuous: {problem} | Write limits or continuous: true")
         return
-    lower, upper = own
-    if lower is None or upper is None or any(value is not None for value in other):
+    if given != [f"lower_{unit}", f"upper_{unit}"]:
         raise ValueError(f"{field}: {named} is {_kind(sliding)} | Write lower_{unit} and upper_{unit}")
+    lower, upper = (getattr(row, key) for key in given)
     if lower > upper:
         raise ValueError(f"{field}: {named} has lower_{unit} {lower:g} above upper_{unit} {upper:g} | Swap them")
     if not sliding and max(abs(lower), abs(upper)) > MAX_DEG:

@@ -1,27 +1,30 @@
-"""Makes a :class:`Robot` from a robot file."""
+"""Arms by name or by any kind of file that describes one, and the :class:`Robot` that a robot file makes."""
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from er3a.comparison.compare import Uncompared, beside_the_table
 from er3a.comparison.mechanism import mechanism_of, with_senses, without_far_normals
 from er3a.errors import InputError, InputWarning
 from er3a.files import robot_file
 from er3a.files.arm_catalogue import KnownArm, known_arms
-from er3a.files.dh_table import AngleUnit, LengthUnit, read_dh_table
+from er3a.files.dh_table import AngleUnit, LengthUnit, headed_units, read_dh_table
 from er3a.files.kept_files import ROOT, names, own_or_shipped
+from er3a.files.printed_table import table_text
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
-from er3a.formats.urdf import import_urdf
-from er3a.formats.urdf_tree import plain_urdf
+from er3a.formats.urdf import import_urdf, urdf_table
+from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.joint_limits import meant
@@ -44,6 +47,78 @@ ROBOTS = ROOT / "data" / "robots"
 MASS_GROUPS = ("inertia", "drives", "wrist_load", "weight")
 
 
+@dataclass(frozen=True)
+class ReadArm:
+    """``printed``: whether the table was given, not derived; ``notes``: assumptions; ``beside``: what the file gives
+    that a comparison doesn't look at; ``units``: of columns, as their headings say them."""
+
+    robot: Robot
+    printed: bool
+    notes: tuple[str, ...] = ()
+    beside: frozenset[Uncompared] = frozenset()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_arm(
+    source: str,
+    *,
+    convention: Convention = "standard",
+    length_unit: LengthUnit | None = None,
+    angle_unit: AngleUnit | None = None,
+    base: str | None = None,
+    tip: str | None = None,
+    joints: int | None = None,
+    xacro: Sequence[str] = (),
+    as_printed: bool = False,
+    columns: Sequence[str] = (),
+    whole: bool = False,
+    srdf: Path | None = None,
+) -> ReadArm:
+    """Read an arm's table, limits and speeds.
+
+    Parameters
+    ----------
+    source : a robot's name, or a path: of a robot file (.yaml), a URDF (.urdf, .xacro), or any other file with a D-H
+        table; ``-`` is standard input, and several lines are the table itself
+    convention : of a D-H table; a column ``convention`` in the table takes precedence
+    length_unit, angle_unit : of a D-H table whose column names say mm and deg although its values are in another unit
+    as_printed : keep numbers of a D-H table that look like another unit, as :func:`er3a.files.dh_table.read_dh_table`
+    columns : what the columns of a D-H table mean, as :func:`er3a.files.printed_table.printed_table` takes it
+    whole : also the shapes, meshes and masses of a URDF, as :func:`er3a.import_urdf` reads them
+    base, tip, xacro : for a URDF, as in :func:`er3a.import_urdf` and ``er3a.formats.urdf_tree``
+    srdf : from which a whole URDF's home is taken, see :func:`er3a.formats.urdf_tree.srdf_home`
+    joints : of a URDF without a ``tip``, the one chain with so many joints is taken, if there is one
+
+    Raises
+    ------
+    InputError
+        naming file, field and remedy
+    """
+    text = source if "\n" in source else None
+    path = Path("table" if text else source)
+    if srdf is not None and path.suffix not in URDF:
+        raise InputError(srdf, "--srdf", f"{source} is no URDF", "Give the URDF that the SRDF belongs to, or home_deg")
+    if holds_table(source):
+        form: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
+        form["text"] = text or table_text(path)
+        content, notes = read_dh_table(path, robot_name(path), convention, as_printed=as_printed, **form)
+        robot = robot_of(content)
+        return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
+    if path.suffix in URDF:
+        with plain_urdf(path, xacro) as plain:
+            if tip is None and joints is not None:
+                tip = tip_after(plain, base, joints)
+            if whole:
+                imported = import_urdf(plain, base=base, tip=tip)
+                home = None if srdf is None else srdf_home(srdf, imported.joints)
+                return ReadArm(imported.robot.replace(name=robot_name(path), home=home), False, imported.notes)
+            robot, assumed, beside = urdf_table(plain, base=base, tip=tip)
+        units = dict.fromkeys(("a", "d"), "m") | dict.fromkeys(("alpha", "offset", "lower", "upper", "speed"), "rad")
+        return ReadArm(robot.replace(name=robot_name(path)), False, assumed, beside, units)
+    robot = known.robot if (known := known_arm(source)) else robot_of(read_robot(robot_path(source)))
+    return ReadArm(robot, True, beside=beside_the_table(robot))
+
+
 def load_robot(name_or_path: str | Path, convention: Convention = "standard") -> Robot:
     """Load a robot by the name of a file in data/robots or of a known arm, or by a path of a robot file, D-H table,
     URDF or xacro.
@@ -57,17 +132,15 @@ def load_robot(name_or_path: str | Path, convention: Convention = "standard") ->
     InputError
         naming file, field and remedy
     """
-    if holds_table(name_or_path):
-        return read_table(name_or_path, convention)
-    if Path(name_or_path).suffix in URDF:
-        with plain_urdf(Path(name_or_path)) as plain:
-            imported = import_urdf(plain)
-        if imported.notes:
-            warnings.warn(f"{name_or_path}: {'; '.join(imported.notes)}", InputWarning, stacklevel=2)
-        return imported.robot.replace(name=robot_name(Path(name_or_path)))
-    if known := known_arm(str(name_or_path)):
-        return known.robot
-    return robot_of(read_robot(robot_path(name_or_path)))
+    return _warned(name_or_path, read_arm(str(name_or_path), convention=convention, whole=True))
+
+
+def _warned(source: str | Path, arm: ReadArm) -> Robot:
+    """The arm, with a warning of what was assumed about it."""
+    if arm.notes:
+        named = "table" if "\n" in str(source) else source
+        warnings.warn(f"{named}: {'; '.join(arm.notes)}", InputWarning, stacklevel=3)
+    return arm.robot
 
 
 def known_arm(name: str) -> KnownArm | None:
@@ -139,13 +212,8 @@ def read_table(
     InputError
         naming the row, column or cell that can't be read, or that can be read in two ways, with both
     """
-    text = str(source) if "\n" in str(source) else None
-    path = Path("table" if text else source)
     units: Any = {"length_unit": length_unit, "angle_unit": angle_unit, "columns": columns}
-    content, notes = read_dh_table(path, robot_name(path), convention, text=text, **units)
-    if notes:
-        warnings.warn(f"{path}: {'; '.join(notes)}", InputWarning, stacklevel=3)
-    return robot_of(content)
+    return _warned(source, read_arm(str(source), convention=convention, **units))
 
 
 def read_robot(path: Path) -> robot_file.RobotFile:
@@ -222,6 +290,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         row.theta_deg if slides else zero.offset_deg for row, zero, slides in zip(rows, content.zero.rows, sliding)
     ]
     limits = np.array([_limits(row) for row in content.limits.rows])
+    shapes = content.envelopes
     robot = Robot(
         name=content.name,
         title=content.title,
@@ -234,7 +303,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         offset=np.radians([offset or 0.0 for offset in offsets]),
         lower=limits[:, 0],
         upper=limits[:, 1],
-        speed=np.array([_speed(row) for row in content.speeds.rows] if content.speeds else []),
+        speed=np.array([_si(row.speed_deg_s, row.speed_mm_s) for row in content.speeds.rows] if content.speeds else []),
         sliding=np.array(sliding),
         coupling=robot_file.coupling_matrix(content.coupling, len(rows), joints) if content.coupling else None,
         continuous=np.array([row.continuous for row in content.limits.rows]),
@@ -244,8 +313,14 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
         tool=placement_transform(content.tool),
         zero_pose=content.zero_pose,
         references=tuple(content.references),
-        envelopes=_envelopes(content.envelopes),
-        hulls=_hulls(content.envelopes),
+        envelopes=tuple(
+            Envelope(each.link, _metres(each.from_mm), _metres(each.to_mm), each.radius_mm / 1000)
+            for each in (shapes.capsules if shapes else ())
+        ),
+        hulls=tuple(
+            ConvexPiece(each.link, tuple(map(_metres, each.points_mm)), each.margin_mm / 1000)
+            for each in (shapes.hulls if shapes else ())
+        ),
         meshes=_surfaces(content),
         visuals=tuple(each.visual() for each in content.visuals),
         pair_rules=content.collision.rules() if content.collision else (),
@@ -287,14 +362,10 @@ def with_near_rows(robot: Robot) -> Robot:
 
 
 def _si(degrees: float | None, millimetres: float | None) -> float:
-    """The one that is given, in rad or m."""
-    return float(np.radians(degrees)) if degrees is not None else (millimetres or 0.0) / 1000
-
-
-def _speed(row: robot_file.JointSpeedRow) -> float:
-    """rad/s or m/s; NaN where it is unknown."""
-    unknown = row.speed_deg_s is None and row.speed_mm_s is None
-    return np.nan if unknown else _si(row.speed_deg_s, row.speed_mm_s)
+    """The one that is given, in rad or m; NaN where none is."""
+    if degrees is not None:
+        return float(np.radians(degrees))
+    return np.nan if millimetres is None else millimetres / 1000
 
 
 def _limits(row: robot_file.JointLimitRow | robot_file.CombinedLimitRow) -> tuple[float, float]:
@@ -332,22 +403,9 @@ def _origins(content: robot_file.RobotFile) -> dict[str, str]:
     return found
 
 
-def _envelopes(group: robot_file.Envelopes | None) -> tuple[Envelope, ...]:
-    def metres(values: list[float]) -> tuple[float, float, float]:
-        x, y, z = values
-        return x / 1000, y / 1000, z / 1000
-
-    capsules = group.capsules if group else []
-    return tuple(Envelope(c.link, metres(c.from_mm), metres(c.to_mm), c.radius_mm / 1000) for c in capsules)
-
-
-def _hulls(group: robot_file.Envelopes | None) -> tuple[ConvexPiece, ...]:
-    return tuple(
-        ConvexPiece(
-            hull.link, tuple((x / 1000, y / 1000, z / 1000) for x, y, z in hull.points_mm), hull.margin_mm / 1000
-        )
-        for hull in (group.hulls if group else ())
-    )
+def _metres(point: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = point
+    return x / 1000, y / 1000, z / 1000
 
 
 def _surfaces(content: robot_file.RobotFile) -> tuple[LinkMesh, ...]:

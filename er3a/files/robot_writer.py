@@ -85,55 +85,50 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         if the robot's values make no acceptable file; it names ``path``
     """
 
-    def sourced(group: str) -> dict:
-        source = robot.sources.get(group, _UNKNOWN)
-        return {"source": source.source, "grade": source.grade, "origin": source.origin or None}
-
     zero_rows, dh_rows = list[dict[str, Any]](), list[dict[str, Any]]()
     for k, sliding in enumerate(robot.sliding):
         angles = {name: _tidy(np.degrees(getattr(robot, name)[k])) for name in ("alpha", "beta", "offset")}
         zero = {"direction": int(robot.direction[k]), "offset_deg": None if sliding else angles["offset"]}
-        zero_rows.append({"joint": k + 1, **zero, **_origins(robot, "zero", k + 1)})
+        zero_rows.append(zero)
         row: dict[str, Any] = {
             "a_mm": _tidy(robot.a[k] * 1000),
             "alpha_deg": angles["alpha"],
             "d_mm": _tidy(robot.d[k] * 1000),
         }
         row |= {"type": "prismatic", "theta_deg": angles["offset"]} if sliding else {}
-        dh_rows.append({"joint": k + 1, **row, "beta_deg": angles["beta"] or None, **_origins(robot, "dh", k + 1)})
+        dh_rows.append(row | {"beta_deg": angles["beta"] or None})
     lengths = np.abs(np.concatenate([robot.a, robot.d])) * 1000
-    content = {
+    groups: dict[str, dict[str, Any]] = {
+        "dh": {
+            "convention": robot.convention,
+            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
+            "rows": _rows(robot, "dh", dh_rows),
+        },
+        "zero": {"rows": _rows(robot, "zero", zero_rows)},
+        "limits": {"rows": _limit_rows(robot), "combined": [_combined_row(robot, each) for each in robot.combined]},
+        **mass_groups(robot),
+        **dict(_placements(robot)),
+    }
+    if np.isfinite(robot.speed).any():
+        groups["speeds"] = {"rows": _speed_rows(robot)}
+    if robot.coupling is not None:
+        groups["coupling"] = {"rows": _coupling_rows(robot.coupling)}
+    if robot.envelopes or robot.hulls or robot.meshes:
+        groups["envelopes"] = _shapes(robot)
+    content: dict[str, Any] = {
         "kind": "robot",
         "name": robot.name,
         "title": robot.title,
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
-        "dh": sourced("dh")
-        | {
-            "convention": robot.convention,
-            "calibrated": _short(lengths) or bool(robot.beta.any()) or _shifted(robot.base),
-            "rows": dh_rows,
-        },
-        "zero": sourced("zero") | {"rows": zero_rows},
-        "limits": sourced("limits")
-        | {"rows": _limit_rows(robot), "combined": [_combined_row(robot, limit) for limit in robot.combined]},
+        "visuals": [link_visual(each) for each in robot.visuals],
+        "home_deg": None if robot.home is None else [_tidy(value) for value in shown(robot, robot.home)],
     }
-    if np.isfinite(robot.speed).any():
-        content["speeds"] = sourced("speeds") | {"rows": _speed_rows(robot)}
-    if robot.coupling is not None:
-        content["coupling"] = sourced("coupling") | {"rows": _coupling_rows(robot.coupling)}
-    if robot.envelopes or robot.hulls or robot.meshes:
-        content["envelopes"] = sourced("envelopes") | _shapes(robot)
-    if robot.visuals:
-        content["visuals"] = [link_visual(each) for each in robot.visuals]
-    if robot.home is not None:
-        content["home_deg"] = [_tidy(value) for value in shown(robot, robot.home)]
     if robot.pair_rules:
         content["collision"] = {rule: _decided(robot, rule) for rule in ("allow", "watch")}
-    for group, fields in mass_groups(robot).items():
-        content[group] = sourced(group) | fields
-    for key, placement in _placements(robot):
-        content[key] = sourced(key) | placement
+    for group, fields in groups.items():
+        source = robot.sources.get(group, _UNKNOWN)
+        content[group] = fields | {"source": source.source, "grade": source.grade, "origin": source.origin or None}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
         return parse(RobotFile, content, path).with_surfaces(robot.meshes)
 
@@ -160,19 +155,18 @@ def _placements(robot: Robot) -> Iterator[tuple[str, dict]]:
 
 def _speed_rows(robot: Robot) -> list[dict]:
     """A row for each joint, with its speed where one is known."""
-    keys = np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist()
-    return [
-        {"joint": k + 1, **({keys[k]: _tidy(value)} if np.isfinite(value) else {}), **_origins(robot, "speeds", k + 1)}
-        for k, value in enumerate(shown(robot, robot.speed))
-    ]
+    speeds = zip(np.where(robot.slides, "speed_mm_s", "speed_deg_s").tolist(), shown(robot, robot.speed))
+    return _rows(robot, "speeds", [{key: _tidy(value)} if np.isfinite(value) else {} for key, value in speeds])
 
 
 def _limit_rows(robot: Robot) -> list[dict]:
-    found = []
-    for k, (lower, upper) in enumerate(zip(robot.lower, robot.upper)):
-        limits = {"continuous": True} if robot.continuous[k] else _ends(lower, upper, robot.slides[k])
-        found.append({"joint": k + 1, **limits, **_origins(robot, "limits", k + 1)})
-    return found
+    ends = zip(robot.lower, robot.upper, robot.slides, robot.continuous)
+    return _rows(robot, "limits", [{"continuous": True} if endless else _ends(*each) for *each, endless in ends])
+
+
+def _rows(robot: Robot, group: str, rows: list[dict[str, Any]]) -> list[dict]:
+    """The rows of a group, with the numbers of their joints, and the documents of those that have their own."""
+    return [{"joint": k, **row, **_origins(robot, group, k)} for k, row in enumerate(rows, start=1)]
 
 
 def _ends(lower: float, upper: float, slides: bool) -> dict[str, Any]:

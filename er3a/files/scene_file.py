@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from er3a.collision import scene as library
-from er3a.files.robot_file import CollisionPairs, DecidedPair, MeshFile, Name, Text
+from er3a.files.robot_file import CollisionPairs, DecidedPair, MeshFile, Name, Placement, Text
 from er3a.files.units import MAX_DISTANCE_MM, SHORTEST_PLAIN_LENGTH_MM, PositionMm, RpyDeg, Triple, doubt
 from er3a.files.yaml_file import InputFile, StrictModel, load
 from er3a.geometry.transforms import transform
@@ -30,16 +30,12 @@ SHAPES = ("boxes", "cylinders", "spheres", "planes", "meshes")
 Length = Annotated[float, Field(gt=0, le=MAX_DISTANCE_MM)]
 
 
-class Obstacle(StrictModel):
+class Obstacle(Placement):
     """A named solid; its own axes lie at ``xyz_mm`` (the solid's centre), turned by ``rpy_deg``."""
 
     name: Name
     xyz_mm: PositionMm
     rpy_deg: RpyDeg = [0.0, 0.0, 0.0]
-
-    def place(self) -> np.ndarray:
-        """Where the solid is: T_world_solid (4, 4), m."""
-        return transform(np.array(self.xyz_mm) / 1000, np.radians(self.rpy_deg))
 
 
 class BoxObstacle(Obstacle):
@@ -55,7 +51,7 @@ class BoxObstacle(Obstacle):
 
     def solid(self) -> library.Box:
         """The box in the units of the library: edges (3,) in m."""
-        return library.Box(self.name, self.place(), np.array(self.size_mm) / 1000)
+        return library.Box(self.name, self.transform(), np.array(self.size_mm) / 1000)
 
 
 class CylinderObstacle(Obstacle):
@@ -73,7 +69,7 @@ class CylinderObstacle(Obstacle):
 
     def solid(self) -> library.Cylinder:
         """The cylinder in the units of the library: radius and length in m, its axis along z."""
-        return library.Cylinder(self.name, self.place(), self.radius_mm / 1000, self.length_mm / 1000)
+        return library.Cylinder(self.name, self.transform(), self.radius_mm / 1000, self.length_mm / 1000)
 
 
 class MeshObstacle(Obstacle, MeshFile):
@@ -81,7 +77,7 @@ class MeshObstacle(Obstacle, MeshFile):
 
     def solid(self) -> library.Mesh:
         """In the units of the library; :class:`InputError` for a file that holds no triangles."""
-        return library.Mesh(self.name, self.place(), *self.triangles())
+        return library.Mesh(self.name, self.transform(), *self.triangles())
 
 
 class SphereObstacle(StrictModel):
@@ -193,10 +189,7 @@ class SceneFile(InputFile):
         if not seen:
             raise ValueError(f"the scene is empty | Add an obstacle under {', '.join(SHAPES)}")
         links = ["base", *(f"link_{k}" for k in range(1, MAX_LINKS + 1))]
-        try:
-            self.collision.check({*seen, *links})
-        except ValueError as error:
-            raise ValueError(f"collision.{error}") from None
+        self.collision.check({*seen, *links})
         return self
 
 

@@ -24,14 +24,6 @@ MAX_YAML_BYTES = 250_000  # of which the worst takes seconds to read
 
 CLOSE = 0.7  # how alike a key and the one that was meant are at least
 
-RENAMED = {
-    "full_speed_after_s": "acceleration_time_s",
-    "overlap_mm": "penetration_tolerance_mm",
-    "repair": "avoidance",
-    "pieces": "mesh: part.stl, unit: mm",
-}
-"""Keys of files by the names that they had, and the names that they have."""
-
 _KINDS = ("union_tag_invalid", "union_tag_not_found")  # faults of the key that says which of several entries one is
 _FIELD = re.compile(r"([A-Za-z_]\w*(?:\.[\w-]+|\[\d+\])*): ")
 _REMEDIES = {
@@ -302,8 +294,6 @@ def _explain(fault: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     if kind == "extra_forbidden":
         if any(word in str(key) for word in ("parallelogram", "mimic")):
             return f"unknown key {str(key)!r}", "Write coupled joints as `coupling:`; see docs/new-robot.md"
-        if str(key) in RENAMED:
-            return f"the key {str(key)!r} has another name now", f"Write '{RENAMED[str(key)]}'"
         known = _known_keys(model)
         close = difflib.get_close_matches(str(key), known, n=1, cutoff=CLOSE)
         hint = f"Did you mean '{close[0]}'?" if close else "Remove it, or check its place in the file"

@@ -77,6 +77,7 @@ def import_urdf(
     base: str | None = None,
     tip: str | None = None,
     snap: bool = True,
+    xacro: Sequence[str] = (),
 ) -> UrdfImport:
     """Import a URDF: D-H table, directions, offsets, limits and speeds from its axes; shapes, visual meshes and masses.
 
@@ -89,17 +90,22 @@ def import_urdf(
 
     Parameters
     ----------
-    path : a URDF, or expanded xacro
+    path : a URDF or xacro
     base, tip : links at which the arm begins and ends; None if the file has only one arm
     snap : take angles that the file shows rounded (1.571, 0.785) as the multiples of 45 deg that they stand for; one
         note says how many, and by how much that moves the flange
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
 
     Raises
     ------
     InputError
         if the file is not a URDF, has several arms (candidates are named), or no arm of 1 to 10 joints
     """
-    path = Path(path)
+    with urdf_tree.plain_urdf(Path(path), xacro) as plain:
+        return _imported(plain, base, tip, snap)
+
+
+def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> UrdfImport:
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
@@ -118,14 +124,17 @@ def import_urdf(
         "inertia": bool(robot.masses.links),
         "drives": robot.masses.drives is not None,
     }
-    more = {group: Source(f"As {path.name} states it", "export") for group, there in stated.items() if there}
-    if lost and stated["envelopes"]:
-        text = f"As {path.name} states it, but for shapes of {', '.join(lost)} that could not be read"
-        more["envelopes"] = Source(text, "inferred")
-    if changed and stated["inertia"]:
+    but, guessed = dict[str, str](), ("envelopes",) if lost else ()
+    if lost:
+        but["envelopes"] = f", but for shapes of {', '.join(lost)} that could not be read"
+    if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
-        text = f"As {path.name} states it, but for the inertia of {which}, for which the nearest possible one was taken"
-        more["inertia"] = Source(text, "export")
+        but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
+    more = {
+        group: Source(f"As {path.name} states it{but.get(group, '')}", "inferred" if group in guessed else "export")
+        for group, there in stated.items()
+        if there
+    }
     robot = robot.replace(sources={**robot.sources, **more})
     first, last = found.joints[0].parent, found.joints[-1].child
     rounded = _unrounded(urdf_tree.read_chain(path, base, tip, False).joints, found.joints, values) if snap else ()
@@ -147,20 +156,20 @@ def urdf_table(
     -------
     robot : a standard table, without shapes and masses
     notes : what was assumed or changed on the way, in words
-    groups : of which the URDF states anything, too: envelopes if a link of the chain has a collision shape, inertia if
-        one has a body; drives if a moving joint has friction, damping or an effort
+    groups : of which the URDF states anything, too: envelopes if a link has a collision shape, inertia if one has a
+        body; drives if a moving joint has friction, damping or an effort
     """
     path = Path(path)
     chain, root = urdf_tree.read_chain(path, base, tip, False), urdf_tree.urdf_root(path)
     robot, *_, notes = _robot_of_chain(path, chain)
-    names = {name for joint in chain.joints for name in (joint.parent, joint.child)}
-    links = [link for link in root.findall("link") if link.get("name") in names]
-    stated: dict[UrdfGroup, bool] = {
-        "envelopes": any(link.find("collision") is not None for link in links),
-        "inertia": any(link.find("inertial") is not None for link in links),
-        "drives": urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]) is not None,
-    }
-    return robot, (*chain.notes, *notes), frozenset(group for group, there in stated.items() if there)
+    groups: set[UrdfGroup] = set()
+    if root.find("link/collision") is not None:
+        groups.add("envelopes")
+    if root.find("link/inertial") is not None:
+        groups.add("inertia")
+    if urdf_tree.drives_of(root, [joint.name for joint in chain.joints if joint.moves]) is not None:
+        groups.add("drives")
+    return robot, (*chain.notes, *notes), frozenset(groups)
 
 
 def _robot_of_chain(
@@ -178,13 +187,14 @@ def _robot_of_chain(
     table = table_from_axes(directions, points, T)
     plain = np.array_equal(coupling, np.eye(*coupling.shape))
     limits, notes, assumed = _limits(sources)
-    speed = np.array([joint.speed if joint.speed < FASTEST else math.nan for joint in sources])
+    speed = np.array([joint.speed for joint in sources])
+    unknown = ~((speed > 0) & (speed < FASTEST))
     notes += [
-        f"joint {joint.name} has a speed of {joint.speed:g} {'m/s' if joint.type == 'prismatic' else 'rad/s'}, "
+        f"joint {sources[k].name} has a speed of {speed[k]:g} {'m/s' if sources[k].type == 'prismatic' else 'rad/s'}, "
         "which counts as unknown; a URDF's are in radians and metres"
-        for joint in sources
-        if FASTEST <= joint.speed < math.inf
+        for k in np.flatnonzero(unknown & np.isfinite(speed) & (speed != 0))
     ]
+    speed[unknown] = math.nan
     held, speed, more = _held_by_followers(moving, coupling, shift, limits, speed)
     continuous = np.array([joint.type == "continuous" for joint in sources]) & (held == limits).all(axis=1)
     groups = ("dh", "zero", "limits", "speeds", "base", "flange", *(() if plain else ("coupling",)))
@@ -231,7 +241,7 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     for joint, _, T in _along(found.joints, shift[None]):
         place[joint.child] = T[0], place[joint.parent][1] + joint.moves
 
-    def placed(name: str, carried: bool = False) -> tuple[Reals, int] | None:
+    def placed(name: str, carried: bool) -> tuple[Reals, int] | None:
         behind, fixed = np.eye(4), True
         while name not in place and name in above and (carried or not above[name].moves):
             fixed &= not above[name].moves
@@ -267,13 +277,11 @@ def link_shapes(
             continue
         made = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
         for collision in collisions:
-            found = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
             try:
-                found = urdf_tree.collision_shapes(path, name, collision, place, notes)
-            except InputError as error:
+                made.append(urdf_tree.collision_shape(path, name, collision, place))
+            except Er3aError as error:
                 notes.append(f"link {name} has a shape that is left out ({error})")
-            made += found
-            lost += [] if found or name in lost else [name]
+                lost += [] if name in lost else [name]
         shapes += urdf_tree.with_capsules(made)
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
@@ -383,24 +391,19 @@ def _limits(sources: list[urdf_tree.UrdfJoint]) -> tuple[Reals, list[str], list[
     rows, notes, assumed = [], [], []
     for joint in sources:
         lower, upper, turns = joint.lower, joint.upper, joint.type == "revolute"
-        widest = max(abs(lower), abs(upper))
-        none = "no limits" if math.isnan(lower) else "the limits 0 and 0" if lower == upper == 0 else ""
-        none = none or ("limits beyond ten turns (in radians)" if turns and widest > urdf_tree.MAX_TURNED else "")
+        widest, shown = max(abs(lower), abs(upper)), f"limits of {lower:g} to {upper:g}"
         if joint.type == "continuous":
             notes.append(f"joint {joint.name} is continuous: one turn is sampled")
             lower, upper = -math.pi, math.pi
-        elif none:
-            half, shown = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
-            notes.append(f"joint {joint.name} has {none}: +-{shown} were assumed")
+        elif not widest <= (urdf_tree.MAX_TURNED if turns else MAX_SLID_M):
+            none = "no limits" if math.isnan(lower) else f"{shown}, which no joint has"
+            half, assumed_as = (NO_RANGE, "180 deg") if turns else (NO_SLIDE_M, f"{NO_SLIDE_M * 1000:g} mm")
+            notes.append(f"joint {joint.name} has {none}: +-{assumed_as} were assumed")
             assumed.append(joint.name)
             lower, upper = -half, half
         elif turns and widest > MANY_TURNS:
-            shown = f"{lower:g} to {upper:g} rad"
-            notes.append(f"joint {joint.name} has limits of more than two turns ({shown}); a URDF's are in radians")
+            notes.append(f"joint {joint.name} has {shown} rad, more than two turns; a URDF's are in radians")
             assumed.append(joint.name)
-        elif not turns and widest > MAX_SLID_M:
-            notes.append(f"joint {joint.name} has limits beyond {MAX_SLID_M:g} m: it was held to that")
-            lower, upper = max(lower, -MAX_SLID_M), min(upper, MAX_SLID_M)
         rows.append((lower, upper))
     return np.array(rows), notes, assumed
 
@@ -414,21 +417,16 @@ def _held_by_followers(
         leader, factor = int(np.abs(row).argmax()), float(row[np.abs(row).argmax()])
         if joint.mimic is None or factor == 0:
             continue
-        name, (least, most) = joint.mimic.source, np.sort(factor * limits[leader] + offset).tolist()
-        stated = joint.lower < joint.upper and joint.type != "continuous"
-        if stated and (least < joint.lower - FOLLOWS or most > joint.upper + FOLLOWS):
-            lower, upper = sorted(((joint.lower - offset) / factor, (joint.upper - offset) / factor))
-            lower, upper = max(lower, float(limits[leader, 0])), min(upper, float(limits[leader, 1]))
-            told = f"joint {joint.name} follows {name} from {least:g} to {most:g}; its own limits {joint.lower:g} to "
-            if lower < upper:
-                limits[leader] = lower, upper
-                notes.append(f"{told}{joint.upper:g} hold that to {lower:g} to {upper:g}")
-            else:
-                notes.append(f"{told}{joint.upper:g} are not kept")
-        if joint.speed < FASTEST and not speed[leader] * abs(factor) <= joint.speed * (1 + FOLLOWS):
-            speed[leader] = joint.speed / abs(factor)
-            told = f"joint {joint.name}, which follows {name}, has the velocity {joint.speed:g}"
-            notes.append(f"{told}, which holds that to {speed[leader]:g}")
+        before = (*limits[leader].tolist(), float(speed[leader]))
+        least, most = np.sort((np.array([joint.lower, joint.upper]) - offset) / factor)
+        lower, upper = float(np.fmax(before[0], least)), float(np.fmin(before[1], most))
+        limits[leader] = (lower, upper) if lower < upper else before[:2]
+        if 0 < joint.speed < FASTEST:
+            speed[leader] = np.fmin(speed[leader], joint.speed / abs(factor))
+        after = (*limits[leader].tolist(), float(speed[leader]))
+        if not (lower < upper and np.allclose(before, after, FOLLOWS, FOLLOWS, equal_nan=True)):
+            held = f"which is held to {after[0]:g} to {after[1]:g}, and to {after[2]:g} per second"
+            notes.append(f"joint {joint.name} follows {joint.mimic.source}, {held}")
     return limits, speed, notes
 
 
@@ -496,12 +494,22 @@ def _describe(robot: Robot, k: int, moved_by: list[tuple[int, float]], joint: El
     lower, upper = sorted((factor * robot.lower[j], factor * robot.upper[j]))
     limits = {} if endless else {"lower": lower, "upper": upper}
     driver = moved_by.index((j, 1.0))
-    limits |= {"velocity": speed, "effort": urdf_tree.peak_torque(robot, j) if driver == k else 0.0}
+    own = _of_drive(robot, j) if driver == k else {}
+    limits |= {"velocity": speed, "effort": own.pop("effort", 0.0)}
     ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in limits.items()})
-    if driver == k:
-        urdf_tree.write_friction(robot, j, joint)
-    else:
+    if driver != k:
         ElementTree.SubElement(joint, "mimic", joint=f"joint_{driver + 1}", multiplier=repr(factor), offset="0.0")
+    elif own:
+        ElementTree.SubElement(joint, "dynamics", {key: repr(value) for key, value in own.items()})
+
+
+def _of_drive(robot: Robot, j: int) -> dict[str, float]:
+    """Peak torque, viscous and Coulomb's friction of a joint (N m and rad, or N and m), as far as they are known."""
+    drives = robot.masses.drives
+    if drives is None:
+        return {}
+    values = {"effort": drives.peak[j], "damping": drives.viscous[j], "friction": drives.coulomb[j]}
+    return {key: float(value) for key, value in values.items() if not np.isnan(value)}
 
 
 def _chain_forward(joints: Sequence[urdf_tree.UrdfJoint], values: Reals) -> Reals:

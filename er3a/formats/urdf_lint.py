@@ -17,7 +17,7 @@ import numpy as np
 from er3a.errors import InputError
 from er3a.finding import Finding, fact
 from er3a.formats.mesh_file import read_link_mesh, read_text
-from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of
+from er3a.formats.urdf_tree import FAR_APART_M, MAX_BYTES, MOVING, WHOLE_TURN, body_of, mesh_of, number_of, numbers_of
 from er3a.programs.instructions import Place
 from er3a.robots.masses import no_body
 from er3a.xml_lines import LINE, read_xml
@@ -26,6 +26,7 @@ WRONG = ("urdf_lengths", "urdf_angles", "urdf_limits_reversed", "urdf_inertia")
 """Rules of numbers that can't be meant; the others name what is missing or no data."""
 XACRO = "<xacro:"
 MANY_TURNS = 10 * 2 * math.pi
+NONE = (0.0, 0.0, 0.0)
 AXIS_OFF = 1e-3  # by which an axis' length may differ from 1
 ALIKE = 3  # joints or links whose efforts or masses no maker's arm has alike
 
@@ -55,7 +56,7 @@ def lint(path: Path) -> tuple[tuple[Finding, Place], ...]:
         return ()
     root = read_xml(text, path)
     broken: dict[str, list[tuple[Element, str]]] = {}
-    for code, element, name in (*_of_joints(root), *_of_links(path, root)):
+    for code, element, name in (*_of_joints(path, root), *_of_links(path, root)):
         broken.setdefault(code, []).append((element, name))
     return tuple(
         (fact(code, names=tuple(dict.fromkeys(name for _, name in where))), Place(path, int(where[0][0].attrib[LINE])))
@@ -73,32 +74,20 @@ def is_wrong(found: Finding) -> bool:
     return found.code in WRONG
 
 
-def _number(element: Element | None, key: str) -> float:
-    """One number of an attribute; NaN where there is none."""
-    found = _numbers(element, key)
-    return float(found[0]) if len(found) == 1 else math.nan
-
-
-def _numbers(element: Element | None, key: str) -> np.ndarray:
-    try:
-        return np.array([float(word) for word in ("" if element is None else element.get(key, "")).split()])
-    except ValueError:
-        return np.empty(0)
-
-
-def _of_joints(root: Element) -> Iterator[Broken]:
+def _of_joints(path: Path, root: Element) -> Iterator[Broken]:
     moving = [joint for joint in root.findall("joint") if joint.get("type") in MOVING]
     for joint in root.findall("joint"):
         name, origin = joint.get("name", "?"), joint.find("origin")
-        if (np.abs(_numbers(origin, "xyz")) > FAR_APART_M).any():
+        if (np.abs(numbers_of(path, name, origin, "xyz", NONE)) > FAR_APART_M).any():
             yield "urdf_lengths", joint, name
-        if (np.abs(_numbers(origin, "rpy")) > WHOLE_TURN).any():
+        if (np.abs(numbers_of(path, name, origin, "rpy", NONE)) > WHOLE_TURN).any():
             yield "urdf_angles", joint, name
     for joint in moving:
-        name, limit, axis = joint.get("name", "?"), joint.find("limit"), _numbers(joint.find("axis"), "xyz")
-        lower, upper = _number(limit, "lower"), _number(limit, "upper")
+        name, limit = joint.get("name", "?"), joint.find("limit")
+        axis = numbers_of(path, name, joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        lower, upper = number_of(limit, "lower"), number_of(limit, "upper")
         slides, endless = joint.get("type") == "prismatic", joint.get("type") == "continuous"
-        if len(axis) == 3 and abs(np.linalg.norm(axis) - 1) > AXIS_OFF:
+        if abs(np.linalg.norm(axis) - 1) > AXIS_OFF:
             yield "urdf_axis", joint, name
         if lower > upper:
             yield "urdf_limits_reversed", joint, name
@@ -107,15 +96,15 @@ def _of_joints(root: Element) -> Iterator[Broken]:
         if not endless and (math.isnan(lower) or math.isnan(upper) or lower == upper):
             yield "urdf_no_limits", joint, name
         for key, code in (("velocity", "urdf_no_velocity"), ("effort", "urdf_no_effort")):
-            if joint.find("mimic") is None and not _number(limit, key) > 0:
+            if joint.find("mimic") is None and not number_of(limit, key) > 0:
                 yield code, joint, name
-    yield from _alike(moving, [_number(joint.find("limit"), "effort") for joint in moving], "urdf_efforts_alike")
+    yield from _alike(moving, [number_of(joint.find("limit"), "effort") for joint in moving], "urdf_efforts_alike")
 
 
 def _of_links(path: Path, root: Element) -> Iterator[Broken]:
     children = {each.get("link") for each in root.findall("joint/child")}
     links = [link for link in root.findall("link") if link.get("name") in children]
-    masses = [_number(link.find("inertial/mass"), "value") for link in links]
+    masses = [number_of(link.find("inertial/mass"), "value") for link in links]
     yield from _alike(links, masses, "urdf_masses_alike")
     for link, mass in zip(links, masses):
         name = link.get("name", "?")
@@ -134,13 +123,13 @@ def _of_links(path: Path, root: Element) -> Iterator[Broken]:
 
 
 def _of_mesh(path: Path, mesh: Element) -> Iterator[Broken]:
-    name, scale = mesh.get("filename", ""), _numbers(mesh, "scale")
+    name = mesh.get("filename", "")
     file = mesh_of(path, name)
     if file is None:
         yield "urdf_mesh_missing", mesh, name
         return
     try:
-        read_link_mesh(file, scale if len(scale) == 3 else np.ones(3))
+        read_link_mesh(file, numbers_of(path, name, mesh, "scale", (1.0, 1.0, 1.0)))
     except InputError as error:
         yield "urdf_mesh_unusable", mesh, f"{name}: {error.problem}"
 

@@ -26,12 +26,11 @@ import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import scipy
@@ -39,17 +38,19 @@ import scipy
 from er3a.collision.convex import cylinder_points
 from er3a.collision.meshes import MOST_CORNERS, hull_corners, hull_faces, is_convex
 from er3a.collision.shapes import CORNERS
-from er3a.errors import Er3aError, InputError
+from er3a.errors import InputError
 from er3a.formats.mesh_file import read_link_mesh, read_text
 from er3a.formats.xacro_expansion import FOLDERS_UP, packages_near
 from er3a.geometry.transforms import rpy_of, transform, translation
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.si_units import limit_in_degrees
-from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, NoBody, moved, nearest_body, no_body, together
+from er3a.robots.masses import Drives, LinkMass, MassBody, Masses, moved, nearest_body, no_body, together
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, Robot
 
 MOVING = ("revolute", "continuous", "prismatic")
+LIMITS = {"limit": ("lower", "upper"), "safety_controller": ("soft_lower_limit", "soft_upper_limit")}
+"""Attributes of a joint's limits, by their element."""
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
 ROUNDED_RAD = 1e-3  # of angles in three digits, and of 1.57
@@ -59,8 +60,6 @@ FINGER_JOINTS = 4
 GRIPPER = re.compile("gripper|finger|jaw", re.IGNORECASE)
 SHOWN = 12
 CONTROLLER_BASE = "base"
-EXPAND = "Expand it first: xacro FILE > arm.urdf"
-DEFINITIONS = ("property", "arg")  # of xacro
 PREFIXED = re.compile(r"(</?[\w.-]+):([\w.-]+)")
 WHOLE_TURN = 2 * math.pi + SNAP_RAD
 MAX_TURNED = 20 * math.pi
@@ -325,15 +324,13 @@ def tip_after(path: Path, base: str | None, joints: int) -> str | None:
         as for :func:`tree_of`
     """
     tree = tree_of(path, False)
-    todo, found = [(base or _root(tree), 0)], list[str]()
-    while todo:
-        link, count = todo.pop()
-        for joint in tree.onward(link)[0] or tree.by_parent.get(link, []):
-            reached = count + joint.independent
-            if joint.independent and reached == joints:
-                found.append(tree._tail(joint.child))
-            elif reached < joints:
-                todo.append((joint.child, reached))
+    root, found = base or _root(tree), list[str]()
+    for last in tree.by_name.values():
+        chain = tree.up_from(last.child)
+        above = [joint.parent for joint in chain]
+        moving = [joint for joint in chain[above.index(root) :] if joint.independent] if root in above else []
+        if len(moving) == joints and moving[-1:] == [last]:
+            found.append(tree._tail(last.child))
     ending = [link for link in found if not tree.onward(link)[1]] if len(found) > 1 else found
     return ending[0] if len(ending) == 1 else None
 
@@ -419,7 +416,7 @@ def urdf_root(path: Path) -> ElementTree.Element:
     Raises
     ------
     InputError
-        for a file that is not a URDF, such as xacro that is not expanded
+        for a file that is not a URDF
     """
     root = _robot_element(path)
     if root.find("joint") is None:
@@ -432,7 +429,7 @@ def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
 
     Parameters
     ----------
-    path : the SRDF, expanded if it is xacro
+    path : the SRDF, or xacro of it
     joints : names, in the order of the values
 
     Returns
@@ -445,10 +442,12 @@ def srdf_home(path: Path, joints: Sequence[str]) -> Reals:
         for a file that is none, and one in which no state gives all joints
     """
     states: dict[str, Reals] = {}
-    for state in _robot_element(path).iter("group_state"):
+    with plain_urdf(path) as plain:
+        root = _robot_element(plain)
+    for state in root.iter("group_state"):
         name, values = state.get("name", ""), {each.get("name"): each for each in state.iter("joint")}
         if values.keys() >= set(joints):
-            given = [_numbers(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]
+            given = [numbers_of(path, f"group_state {name}", values[joint], "value", None)[0] for joint in joints]
             states[name] = np.array(given)
     if not states:
         raise InputError(path, "group_state", f"none gives {_some(list(joints))}", "Write home_deg into the robot file")
@@ -470,28 +469,7 @@ def _robot_element(path: Path) -> ElementTree.Element:
             raise InputError(path, None, f"not valid XML ({error})", "Correct the file") from None
     if root.tag != "robot":
         raise InputError(path, None, f"the top element is <{root.tag}>", "A URDF has <robot> (expand xacro first)")
-    if (where := _xacro(root)) is not None:
-        raise InputError(path, where or None, "is xacro, which has to be expanded to a URDF", EXPAND)
     return root
-
-
-def _xacro(root: ElementTree.Element) -> str | None:
-    """Where a file is xacro: macros, or expressions in what is read of joints and links; None where it is not.
-
-    Definitions alone are left over in many URDFs and change nothing.
-    """
-    for element in root.iter():
-        name = element.tag.rpartition("}")[2].removeprefix("xacro_")
-        prefixed = "xacro" in element.tag
-        if (prefixed and name not in DEFINITIONS) or (name in ("include", "macro") and element in list(root)):
-            return f"xacro:{name}"
-    for part in [*root.findall("joint"), *root.findall("link/inertial/.."), *root.findall("link/collision/..")]:
-        named = f"{part.tag} {part.get('name', '?')}"
-        read = [part, *(each for child in part if child.tag != "visual" for each in child.iter())]
-        for value in (value for each in read for value in each.attrib.values()):
-            if "${" in value or "$(" in value:
-                return f"{named}, '{value[:60]}'"
-    return None
 
 
 def _link(path: Path, element: ElementTree.Element, role: str) -> str:
@@ -506,7 +484,7 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
     name, kind = element.get("name", "?"), element.get("type", "")
     where = f"joint {name}"
     origin, axis, limit, mimic = (element.find(tag) for tag in ("origin", "axis", "limit", "mimic"))
-    xyz, rpy = _origin(path, where, origin)
+    xyz, rpy = (numbers_of(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
     notes: list[str] = []
     if snap and origin is not None:
         rpy = _unrounded(rpy, origin.get("rpy", "").split())
@@ -515,86 +493,73 @@ def _joint(path: Path, element: ElementTree.Element, snap: bool) -> UrdfJoint:
         notes.append(f"{where} stands {np.abs(xyz).max():g} m from the one before it; a URDF's lengths are in metres")
     if (np.abs(rpy) > WHOLE_TURN).any():
         notes.append(f"{where} is turned by {np.abs(rpy).max():g} rad; a URDF's angles are in radians")
-    direction = _numbers(path, where, axis, "xyz", (1.0, 0.0, 0.0))
+    direction = numbers_of(path, where, axis, "xyz", (1.0, 0.0, 0.0))
     longest = np.abs(direction).max()
     if kind in MOVING and longest < 1e-9:
         raise InputError(path, where, "the axis has no length", 'Write for example <axis xyz="0 0 1"/>')
     direction = direction / (longest or 1.0)  # so that no square overflows
-    lower, upper = _stated_limits(path, where, kind, limit, notes)
-    if kind == "continuous":
-        kind = "revolute" if -MAX_TURNED <= lower < upper <= MAX_TURNED else kind
-        if not (math.isnan(lower) and math.isnan(upper)):
-            taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
-            notes.append(f"{where} is continuous with limits {lower:g} to {upper:g}: {taken}")
-    lower, upper = _within_soft_limits(path, element, kind, (lower, upper), notes)
+    lower, upper = _range(path, where, element, notes) if kind in MOVING else (math.nan, math.nan)
+    if kind == "continuous" and not math.isnan(lower):
+        kind = "revolute" if max(-lower, upper) <= MAX_TURNED else kind
+        taken = "they are kept" if kind == "revolute" else "not kept, as they are no range of up to ten turns"
+        notes.append(f"{where} is continuous with limits {lower:g} to {upper:g}: {taken}")
     if kind == "revolute":
         lower, upper = math.radians(limit_in_degrees(lower, 1)), math.radians(limit_in_degrees(upper, -1))
-    speed = _stated_speed(path, where, limit if kind in MOVING else None, notes)
+    stated = (limit.get("velocity") or "inf") if limit is not None else "inf"
+    speed = math.nan if stated == "inf" else float(numbers_of(path, where, limit, "velocity", None)[0])
     follows = None if mimic is None else _mimic(path, where, mimic)
     parent, child = _link(path, element, "parent"), _link(path, element, "child")
     placed, axis_of = transform(xyz, rpy), direction / (np.linalg.norm(direction) or 1.0)
     return UrdfJoint(name, kind, parent, child, placed, axis_of, lower, upper, speed, follows, tuple(notes), doubtful)
 
 
-def _stated_limits(
-    path: Path, where: str, kind: str, limit: ElementTree.Element | None, notes: list[str]
-) -> tuple[float, float]:
-    """Limits of a joint that moves, rad or m, in order; NaN where it has none."""
-    if kind not in MOVING or limit is None:
-        return math.nan, math.nan
-    lower, upper = (_numbers(path, where, limit, key, (math.nan,))[0] for key in ("lower", "upper"))
-    if kind != "continuous" and math.isnan(lower) != math.isnan(upper):  # the specification's default
-        missing = "lower" if math.isnan(lower) else "upper"
-        notes.append(f"{where} has no {missing} limit: 0 was taken")
-        lower, upper = np.nan_to_num([lower, upper]).tolist()
-    if lower > upper:
-        notes.append(f"{where} has its lower limit {lower:g} above the upper {upper:g}: they were swapped")
-        lower, upper = upper, lower
+def _range(path: Path, where: str, joint: ElementTree.Element, notes: list[str]) -> tuple[float, float]:
+    """Limits of a joint, rad or m, held within those of its safety controller, as MoveIt plans; NaN without a range."""
+    stated = np.array(
+        [
+            [numbers_of(path, where, joint.find(tag), key, (math.nan,))[0] for key in keys]
+            for tag, keys in LIMITS.items()
+        ]
+    )
+    default = math.nan if joint.get("type") == "continuous" else 0.0  # the specification's
+    half = np.isnan(stated).sum(axis=1, keepdims=True) == 1
+    taken = np.sort(np.where(half & np.isnan(stated), default, stated), axis=1)
+    taken[~(taken[:, 0] < taken[:, 1])] = math.nan
+    (lower, upper), both = taken[0].tolist(), (float(np.fmax(*taken[:, 0])), float(np.fmin(*taken[:, 1])))
+    if both[0] < both[1]:
+        lower, upper = both
+    given = {key: value for keys, row in zip(LIMITS.values(), stated) for key, value in zip(keys, row)}
+    if not math.isnan(lower) and ((lower, upper) != tuple(stated[0]) or not both[0] < both[1]):
+        shown = ", ".join(f"{key} {value:g}" for key, value in given.items() if not math.isnan(value))
+        notes.append(f"{where} states {shown}: {lower:g} to {upper:g} was taken")
     return lower, upper
-
-
-def _stated_speed(path: Path, where: str, limit: ElementTree.Element | None, notes: list[str]) -> float:
-    """Largest speed of a joint, rad/s or m/s; NaN where none is known."""
-    if limit is None or (limit.get("velocity") or "inf") == "inf":
-        return math.nan
-    speed = _numbers(path, where, limit, "velocity", (0.0,))[0] or math.nan
-    if speed < 0:
-        notes.append(f"{where} has the velocity {speed:g}, which is below 0: its speed counts as unknown")
-        return math.nan
-    return speed
 
 
 def _mimic(path: Path, where: str, mimic: ElementTree.Element) -> Mimic:
     """Which joint another one follows, and how."""
     if not mimic.get("joint"):
         raise InputError(path, where, "its <mimic> names no joint", "Add joint=... to it")
-    factors = (_numbers(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0)))
+    factors = (
+        numbers_of(path, where, mimic, key, (value,))[0] for key, value in (("multiplier", 1.0), ("offset", 0.0))
+    )
     return Mimic(mimic.get("joint", ""), *factors)
 
 
-def _within_soft_limits(
-    path: Path, joint: ElementTree.Element, kind: str, limits: tuple[float, float], notes: list[str]
-) -> tuple[float, float]:
-    """Limits of a joint, NaN where it has none, held within those of its safety controller, as MoveIt plans."""
-    soft, where = joint.find("safety_controller"), f"joint {joint.get('name', '?')}"
-    keys = ("soft_lower_limit", "soft_upper_limit")
-    if soft is None or not any(key in soft.attrib for key in keys) or kind not in ("revolute", "prismatic"):
-        return limits
-    least, most = (float(_numbers(path, where, soft, key, (0.0,))[0]) for key in keys)
-    given = (math.nan, math.nan) if limits == (0, 0) else limits
-    lower, upper = float(np.fmax(given[0], least)), float(np.fmin(given[1], most))
-    if (lower, upper) == limits:
-        return limits
-    held = f"its limits are held to {lower:g} to {upper:g}"
-    kept = held if lower < upper else "they leave nothing of its limits and are not kept"
-    notes.append(f"{where} has soft limits {least:g} to {most:g} (safety_controller): {kept}")
-    return (lower, upper) if lower < upper else limits
-
-
-def _numbers(
+def numbers_of(
     path: Path | None, where: str, element: ElementTree.Element | None, key: str, default: tuple[float, ...] | None
 ) -> Reals:
-    """Finite numbers of an attribute, as many as its default has; one where it has none and has to be there."""
+    """Finite numbers of an attribute.
+
+    Parameters
+    ----------
+    path, where : named in the error
+    default : taken where the attribute is missing, and as many as there have to be; None for one that has to be there
+
+    Raises
+    ------
+    InputError
+        for more or fewer numbers, and for what is none
+    """
     text = element.get(key) if element is not None else None
     if text is None:
         if default is None:
@@ -611,9 +576,10 @@ def _numbers(
     return values
 
 
-def _origin(path: Path | None, where: str, origin: ElementTree.Element | None) -> tuple[Reals, Reals]:
-    xyz, rpy = (_numbers(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy"))
-    return xyz, rpy
+def _placed(path: Path | None, where: str, element: ElementTree.Element) -> Reals:
+    """The frame (4, 4), m, that the origin of an element gives."""
+    origin = element.find("origin")
+    return transform(*(numbers_of(path, where, origin, key, (0.0, 0.0, 0.0)) for key in ("xyz", "rpy")))
 
 
 def _unrounded(rpy: Reals, words: Sequence[str]) -> Reals:
@@ -625,10 +591,8 @@ def _unrounded(rpy: Reals, words: Sequence[str]) -> Reals:
     return np.where(np.abs(rpy - meant) <= shown, meant, rpy)
 
 
-class LinkPlaces(Protocol):
-    """Places of links, from :func:`er3a.formats.urdf.link_places`."""
-
-    def __call__(self, name: str, carried: bool = False, /) -> tuple[Reals, int] | None: ...
+LinkPlaces = Callable[[str, bool], tuple[Reals, int] | None]
+"""Places of links, from :func:`er3a.formats.urdf.link_places`."""
 
 
 def in_links(
@@ -687,9 +651,15 @@ def masses_from_urdf(
         except InputError as error:
             notes.append(f"{error.field}: {error.problem}; its mass was left out")
             continue
-        if problem := no_body(body):
+        if no_body(body):
             given, body = body, nearest_body(body)
-            notes.append(_changed(name, problem, given, body))
+            before, after = (
+                ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(each.inertia_matrix)) for each in (given, body)
+            )
+            notes.append(
+                f"link {name} has principal moments of inertia of {before} kg m2, which no body has: the nearest "
+                f"that a body can have, {after} kg m2, were taken"
+            )
             changed.append(name)
         if body.mass > 0 or any(body.inertia):
             placed, number = place
@@ -719,37 +689,6 @@ def write_masses(robot: Robot, names: Sequence[str], root: ElementTree.Element) 
         ElementTree.SubElement(inertial, "inertia", {key: repr(value) for key, value in zip(ENTRIES, body.inertia)})
 
 
-def peak_torque(robot: Robot, joint: int) -> float:
-    """Peak torque or force of the drive of a joint.
-
-    Parameters
-    ----------
-    joint : counted from 0
-
-    Returns
-    -------
-    effort : N m, or N of a joint that slides; 0 where it is unknown, as URDFs write it
-    """
-    drives = robot.masses.drives
-    return 0.0 if drives is None or np.isnan(drives.peak[joint]) else float(drives.peak[joint])
-
-
-def write_friction(robot: Robot, joint: int, element: ElementTree.Element) -> None:
-    """Add ``<dynamics>`` to a URDF's joint, if anything of its friction is known.
-
-    Parameters
-    ----------
-    joint : counted from 0
-    element : the ``<joint>``, which is changed; ``damping`` is viscous friction in N m s/rad, ``friction`` is Coulomb's
-        in N m (N s/m and N of a joint that slides)
-    """
-    drives = robot.masses.drives
-    known = {} if drives is None else {"damping": drives.viscous[joint], "friction": drives.coulomb[joint]}
-    written = {key: repr(float(value)) for key, value in known.items() if not np.isnan(value)}
-    if written:
-        ElementTree.SubElement(element, "dynamics", written)
-
-
 def body_of(name: str, inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
     """The body of a URDF's link.
 
@@ -767,23 +706,12 @@ def body_of(name: str, inertial: ElementTree.Element) -> tuple[MassBody, Reals]:
         for what is no number, or a mass below 0
     """
     where = f"inertial of link {name}"
-    origin, mass, inertia = (inertial.find(tag) for tag in ("origin", "mass", "inertia"))
-    xyz, rpy = _origin(None, where, origin)
-    kg = float(_numbers(None, where, mass, "value", (0.0,))[0])
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    kg = float(numbers_of(None, where, mass, "value", (0.0,))[0])
     if kg < 0:
         raise InputError(None, where, f"a mass of {kg:g} kg is below 0", "Write it in kg")
-    xx, yy, zz, xy, xz, yz = (float(_numbers(None, where, inertia, key, (0.0,))[0]) for key in ENTRIES)
-    return MassBody(kg, (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz)), transform(xyz, rpy)
-
-
-def _changed(name: str, problem: NoBody, given: MassBody, taken: MassBody) -> str:
-    """That a link has another inertia than the file says."""
-    least, middle, greatest = np.linalg.eigvalsh(given.inertia_matrix).tolist()
-    what = f"of {greatest:g} kg m2, above the sum of the other two ({least + middle:g} kg m2)"
-    what = f"of {least:g} kg m2, below 0" if problem == "negative_moment" else what
-    shown = ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(taken.inertia_matrix))
-    instead = f"the nearest that a body can have was taken, with principal moments of {shown} kg m2"
-    return f"link {name} has a principal moment of inertia {what}; its mass and centre stay, and {instead}"
+    xx, yy, zz, xy, xz, yz = (float(numbers_of(None, where, inertia, key, (0.0,))[0]) for key in ENTRIES)
+    return MassBody(kg, (0.0, 0.0, 0.0), (xx, yy, zz, xy, xz, yz)), _placed(None, where, inertial)
 
 
 def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
@@ -801,7 +729,7 @@ def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     """
     joints = {joint.get("name", "?"): joint for joint in root.findall("joint")}
     coulomb, viscous, effort = (
-        np.array([_number(joints[name].find(tag), key) for name in names])
+        np.array([number_of(joints[name].find(tag), key) for name in names])
         for tag, key in (("dynamics", "friction"), ("dynamics", "damping"), ("limit", "effort"))
     )
     effort[~(effort > 0)] = np.nan
@@ -812,8 +740,13 @@ def drives_of(root: ElementTree.Element, names: Sequence[str]) -> Drives | None:
     return Drives(unknown, unknown, coulomb, viscous, rated=unknown, peak=effort)
 
 
-def _number(element: ElementTree.Element | None, key: str) -> float:
-    """A number that may be missing or none: NaN then."""
+def number_of(element: ElementTree.Element | None, key: str) -> float:
+    """One number of an attribute.
+
+    Returns
+    -------
+    number : NaN where the element or attribute is missing, or holds no number
+    """
     try:
         return float((element.get(key) or "nan") if element is not None else "nan")
     except ValueError:
@@ -834,68 +767,47 @@ class CylinderOfLink:
     capsule: Envelope
 
 
-def collision_shapes(
-    path: Path,
-    name: str,
-    collision: ElementTree.Element,
-    place: tuple[Reals, int],
-    notes: list[str],
-) -> list[Shape | CylinderOfLink]:
-    """Shapes of one ``<collision>``.
+def collision_shape(
+    path: Path, name: str, collision: ElementTree.Element, place: tuple[Reals, int]
+) -> Shape | CylinderOfLink:
+    """The shape of one ``<collision>``.
 
     Parameters
     ----------
     name : of its link in the URDF
     place : (4, 4), from the URDF link's frame to that of our link, and the number of that link
-    notes : gets what was assumed or left out
 
     Raises
     ------
     InputError
-        for numbers that make no shape, or a mesh that can't be read
+        for numbers that make no shape, or a mesh that is not there or can't be read
     """
     T_link, link = place
-    origin, geometry = collision.find("origin"), collision.find("geometry")
-    where = f"collision of link {name}"
-    xyz, rpy = _origin(path, where, origin)
-    T = T_link @ transform(xyz, rpy)
-    shape = geometry[0] if geometry is not None and len(geometry) else None
-    core = None
+    where, shape = f"collision of link {name}", collision.find("geometry/*")
+    T = T_link @ _placed(path, where, collision)
+    core = np.zeros((0, 3))
     match shape.tag if shape is not None else "":
         case "box":
             corners = CORNERS * _sizes(path, where, shape)
         case "cylinder":
             radius, length = _sizes(path, where, shape).tolist()
-            ends = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
-            corners = cylinder_points(ends, radius, PRISM_SIDES)
-            core = ends @ T[:3, :3].T + T[:3, 3]
+            core = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
+            corners = cylinder_points(core, radius, PRISM_SIDES)
         case "sphere":
             x, y, z = T[:3, 3].tolist()
-            radius = float(_sizes(path, where, shape)[0])
-            if radius < SMALLEST_SPHERE_M:
-                notes.append(
-                    f"{where}: a sphere of {1000 * radius:g} mm is taken as one of {1000 * SMALLEST_SPHERE_M:g} mm"
-                )
-            return [Envelope(link, (x, y, z), (x, y, z), max(radius, SMALLEST_SPHERE_M))]
-        case "mesh":
-            mesh = _mesh(path, where, shape, notes)
-            if mesh is None:
-                return []
-            corners, faces, closed = mesh
+            return Envelope(link, (x, y, z), (x, y, z), max(float(_sizes(path, where, shape)[0]), SMALLEST_SPHERE_M))
+        case _:
+            corners, faces, closed = _mesh(path, where, shape)
             few = len(corners) <= MOST_CORNERS
             if not ("margin" in collision.attrib or (closed and few and is_convex(corners, faces))):
-                return [LinkMesh(link, corners @ T[:3, :3].T + T[:3, 3], faces)]
+                return LinkMesh(link, corners @ T[:3, :3].T + T[:3, 3], faces)
             corners = hull_corners(corners)
-        case tag:
-            notes.append(f"{where}: <{tag}> is not a shape that er3a reads; it is left out")
-            return []
-    corners = corners @ T[:3, :3].T + T[:3, 3]
-    stated = float(_numbers(path, where, collision, "margin", None)[0]) if "margin" in collision.attrib else 0.0
-    made = ConvexPiece(link, tuple((x, y, z) for x, y, z in corners.tolist()), max(stated, 0.0))
-    if core is None:
-        return [made]
-    start, end = ((x, y, z) for x, y, z in core.tolist())
-    return [CylinderOfLink(made, Envelope(link, start, end, radius))]
+    margin = max(float(numbers_of(path, where, collision, "margin", (0.0,))[0]), 0.0)
+    placed, ends = (
+        tuple((x, y, z) for x, y, z in (each @ T[:3, :3].T + T[:3, 3]).tolist()) for each in (corners, core)
+    )
+    made = ConvexPiece(link, placed, margin)
+    return CylinderOfLink(made, Envelope(link, ends[0], ends[1], radius)) if ends else made
 
 
 def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[Reals, Integers]:
@@ -908,8 +820,7 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
     """
     import trimesh  # takes a while
 
-    where, origin, shape = f"visual of link {name}", visual.find("origin"), visual.find("geometry/*")
-    xyz, rpy = _origin(path, where, origin)
+    where, shape = f"visual of link {name}", visual.find("geometry/*")
     match shape.tag if shape is not None else "":
         case "box":
             made = trimesh.creation.box(_sizes(path, where, shape))
@@ -918,12 +829,9 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
             made = trimesh.creation.cylinder(radius, length, PRISM_SIDES)
         case "sphere":
             made = trimesh.creation.icosphere(2, float(_sizes(path, where, shape)[0]))
-        case "mesh" if shape is not None and (file := mesh_of(path, shape.get("filename", ""))):
-            points, faces, _ = read_link_mesh(file, _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
-            made = trimesh.Trimesh(points, faces, process=False)
         case _:
-            raise InputError(path, where, "no shape, or no file of its mesh", "Give a box, cylinder, sphere or mesh")
-    made.apply_transform(transform(xyz, rpy))
+            made = trimesh.Trimesh(*_mesh(path, where, shape)[:2], process=False)
+    made.apply_transform(_placed(path, where, visual))
     return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
 
 
@@ -1016,26 +924,19 @@ def _sizes(path: Path, where: str, shape: ElementTree.Element | None) -> Reals:
     kind = "" if shape is None else shape.tag
     keys = {"box": ("size",), "cylinder": ("radius", "length")}.get(kind, ("radius",))
     default = (1.0, 1.0, 1.0) if kind == "box" else None
-    sizes = np.concatenate([_numbers(path, where, shape, key, default) for key in keys])
+    sizes = np.concatenate([numbers_of(path, where, shape, key, default) for key in keys])
     if (sizes < 0).any():
         raise InputError(path, where, f"a size of {sizes.min():g} m is below 0", "Write sizes above 0")
     return sizes
 
 
-def _mesh(
-    path: Path, where: str, shape: ElementTree.Element | None, notes: list[str]
-) -> tuple[Reals, Integers, bool] | None:
-    """The triangles of a mesh as the file gives them, see :func:`read_link_mesh`; None where there are none."""
-    name = shape.get("filename", "") if shape is not None else ""
-    file = mesh_of(path, name)
-    if file is None:
-        notes.append(f"{where}: the mesh {name} was not found; the link has no shape of it")
-        return None
-    try:
-        return read_link_mesh(file, _numbers(path, where, shape, "scale", (1.0, 1.0, 1.0)))
-    except Er3aError as error:
-        notes.append(f"{where}: {error}; the link has no shape of it")
-        return None
+def _mesh(path: Path, where: str, shape: ElementTree.Element | None) -> tuple[Reals, Integers, bool]:
+    """The triangles of a mesh as the file gives them, see :func:`read_link_mesh`."""
+    name = shape.get("filename", shape.tag) if shape is not None else "nothing"
+    if (file := mesh_of(path, name)) is None:
+        problem = f"{name} is no file of a mesh that was found, nor a shape that is known"
+        raise InputError(path, where, problem, "Give a box, cylinder, sphere or mesh")
+    return read_link_mesh(file, numbers_of(path, where, shape, "scale", (1.0, 1.0, 1.0)))
 
 
 def mesh_of(path: Path, name: str) -> Path | None:
@@ -1069,6 +970,8 @@ def _in_package(path: Path, name: str) -> Iterator[Path]:
 
 
 COMMENT = re.compile("<!--.*?-->", re.DOTALL)
+MACRO, EXPRESSION = re.compile(r"<xacro:(?!property\b|arg\b)"), re.compile(r"\$[({]")
+"""What of xacro has to be expanded; definitions alone are left over in many URDFs and change nothing."""
 EXPANDING_S = 30  # the largest public ones take two
 UNBOUNDED = "Look for an expression without end, such as 9**9**9"
 ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
@@ -1091,7 +994,8 @@ def plain_urdf(path: Path, arguments: Sequence[str] = ()) -> Iterator[Path]:
         for arguments of another form or to a file that is not xacro, without xacrodoc, or for what it can't expand; it
         names ``path`` for what the expanded file is refused for, too
     """
-    if "<xacro:" not in COMMENT.sub("", read_text(path, MAX_BYTES)):
+    text = COMMENT.sub("", read_text(path, MAX_BYTES))
+    if not MACRO.search(text) and not ("<xacro:" in text and EXPRESSION.search(text)):
         if arguments:
             raise InputError(path, "--xacro", "the file holds no xacro macros", "Leave the arguments out")
         yield path

@@ -124,6 +124,24 @@ class PairRule:
     reason: str
 
 
+def slides_of(sliding: Flags, coupling: Reals | None) -> Flags:
+    """Joints that are distances: the row of their number slides, or else one that they move.
+
+    Parameters
+    ----------
+    sliding : (m,) bool, of rows
+    coupling : (m, n), what moves the rows; None where each is moved by the joint of its number
+
+    Returns
+    -------
+    slides : (n,) bool
+    """
+    if coupling is None:
+        return sliding
+    moved: Flags = (coupling[sliding] != 0).any(axis=0)
+    return np.where(coupling.diagonal() != 0, sliding[: coupling.shape[1]], moved)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot(ByValue, Displayed):
     """A serial arm of 1 to 10 joints. SI units; angles are in rad, arrays are read-only.
@@ -321,11 +339,7 @@ class Robot(ByValue, Displayed):
     @property
     def slides(self) -> Flags:
         """(n,) bool, joints of q that are distances: the row of their number slides, or else one that they move."""
-        if self.coupling is None:
-            return self.sliding
-        moved: Flags = (self.coupling[self.sliding] != 0).any(axis=0)
-        own = self.coupling.diagonal() != 0
-        return np.where(own, self.sliding[: self.joints], moved)
+        return slides_of(self.sliding, self.coupling)
 
     def without_tool(self) -> Robot:
         """The robot with its flange as tool, as references describe it.

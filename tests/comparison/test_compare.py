@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import er3a
 from er3a.comparison.compare import ANGLE_UNITS, LENGTH_UNITS, best_of
 from er3a.errors import InputError
-from er3a.files.arm_file import read_arm
+from er3a.files.robot_library import read_arm
 from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf_tree import read_chain, tip_after
 from er3a.geometry.transforms import rot_x, rot_z, translation

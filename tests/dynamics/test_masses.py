@@ -163,8 +163,7 @@ DRIVES = {"source": "made up", "grade": "claim"}
         ),
         (lambda c: c["inertia"]["links"].append({"link": 3, "mass_kg": 1}), "inertia.links", "named twice"),
         (lambda c: c["inertia"]["links"].append({"link": 9, "mass_kg": 1}), "inertia", "link"),
-        (lambda c: c["inertia"]["origins"].pop(), "inertia.origins", "not one for each joint"),
-        (lambda c: c["inertia"].update(frame="dh"), "inertia.origins", "only frame urdf"),
+        (lambda c: c["inertia"].update(frame="urdf"), "inertia.frame", "'joint' or 'dh'"),
         (
             lambda c: c.update(drives=DRIVES | {"rows": [{"joint": 1, "peak_n_m": 0}]}),
             "drives.rows[0].peak_n_m",
@@ -209,7 +208,6 @@ def test_frames_of_a_file_give_equal_torques(arm, tmp_path, frame):
 
     def change(content):
         content["inertia"] |= {"frame": frame, "links": fields}
-        del content["inertia"]["origins"]
 
     other = er3a.load_robot(changed_file(tmp_path, change))
     q, qd, qdd = np.random.default_rng(0).normal(size=(3, 50, 6))

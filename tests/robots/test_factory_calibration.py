@@ -10,10 +10,9 @@ from typer.testing import CliRunner
 
 import er3a
 from er3a.errors import InputError
-from er3a.files.arm_file import read_arm
 from er3a.files.factory_calibration import load_factory_calibration
 from er3a.files.robot_file import RobotFile
-from er3a.files.robot_library import load_robot, robot_of
+from er3a.files.robot_library import load_robot, read_arm, robot_of
 from er3a.files.robot_writer import robot_file, write_robot
 from er3a.files.yaml_file import parse
 from er3a.formats.urdf import export_urdf, import_urdf

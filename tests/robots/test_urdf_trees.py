@@ -235,16 +235,16 @@ def test_what_urdfs_leave_out_or_overdo_is_assumed_with_a_note(written):
         '<joint name="f" type="fixed"><parent link="l1"/><child link="ball"/></joint>',
     )
     imported = import_urdf(path)
-    assert imported.robot.lower[:2].tolist() == [-100, -1]
-    assert imported.robot.upper[:2].tolist() == [5, 1]
+    assert imported.robot.lower[:2].tolist() == [-1, -1]
+    assert imported.robot.upper[:2].tolist() == [1, 1]
     told = " ".join(imported.notes)
     assert np.isnan(imported.robot.speed[0])
     assert "joint far has a speed of 180 m/s, which counts as unknown" in told
-    for word in ("far has limits beyond 100 m", "open has no limits: +-1000 mm", "0.5 mm is taken as one of 2 mm"):
+    for word in ("far has limits of -1000 to 5, which no joint has", "open has no limits: +-1000 mm"):
         assert word in told
     write_robot(imported.robot, path.with_suffix(".yaml"))
     limits = load_robot(path.with_suffix(".yaml")).sources["limits"]
-    assert (limits.grade, "but for open: assumed" in limits.source) == ("inferred", True)
+    assert (limits.grade, "but for far, open: assumed" in limits.source) == ("inferred", True)
 
 
 def test_a_frame_beside_the_arm_can_be_its_base(tmp_path):

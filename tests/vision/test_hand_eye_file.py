@@ -141,7 +141,7 @@ def spoiled(what: str, flange: np.ndarray, target: np.ndarray) -> dict[str, np.n
     ("what", "where", "told"),
     [
         ("metres", "columns target_x_mm", "can only be metres"),
-        ("mixed", "row 5", "another unit"),
+        ("mixed", "row 5", "looks like metres"),
         ("length", "row 6", "length is"),
         ("mirrored", "row 7", "left-handed"),
         ("skewed", "row 8", "not a rotation"),

@@ -31,7 +31,7 @@ from er3a.robots.robot import Convention, Robot
 
 if TYPE_CHECKING:
     from er3a.comparison.compare import Comparison
-    from er3a.files.arm_file import ReadArm
+    from er3a.files.robot_library import ReadArm
 
 Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
 """An arm as it was read, and doubts about its units."""
@@ -155,7 +155,7 @@ def compare_two(
 
 def _read(source: str, asked: CompareRequest) -> Read:
     """An arm, and the numbers of its file whose units are in doubt."""
-    from er3a.files.arm_file import read_arm
+    from er3a.files.robot_library import read_arm
     from er3a.files.units import noted_doubts
 
     with noted_doubts() as doubtful:

@@ -59,7 +59,7 @@ def confirm(
     If not, the least that explains it is named: another reading of the file, a base or tool, a joint's zero or sense, a
     factory's calibration, another arm. Exit code 1 if anything is between model and controller that is not expected.
     """
-    from er3a.files.arm_file import read_arm
+    from er3a.files.robot_library import read_arm
 
     read = read_arm(robot, base=base, tip=tip)
     for note in read.notes:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from er3a.errors import Er3aError, InputWarning
-from er3a.files.kept_files import given_file
+from er3a.files.kept_files import own_or_shipped
 from er3a.pipeline.commands.names import FIRST, JOBS, PROGRAMS, ROBOT_FILES, app
 from er3a.version import __version__
 
@@ -66,10 +66,10 @@ def _robots(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def given_files(files: Any) -> Any:
-    """One file or several, or none, as :func:`er3a.files.kept_files.given_file` finds them: a callback of typer."""
+    """One file or several, or none, as :func:`er3a.files.kept_files.own_or_shipped` finds them: a callback of typer."""
     if isinstance(files, list):
-        return [given_file(file) for file in files]
-    return files and given_file(files)
+        return [own_or_shipped(file) for file in files]
+    return files and own_or_shipped(files)
 
 
 RobotName = Annotated[str, typer.Argument(metavar="ROBOT", help="a robot of the study", autocompletion=_robots)]
@@ -87,6 +87,9 @@ Columns = Annotated[
     typer.Option("--column", help="what a D-H table's columns are, in order: theta,d,a,alpha (-: not read)"),
 ]
 Xacro = Annotated[list[str] | None, typer.Option(metavar="NAME:=VALUE", help="a xacro argument; can be repeated")]
+Srdf = Annotated[
+    Path | None, typer.Option(help="the SRDF of a URDF, whose state home, else the first of all joints, is home")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="print JSON")]
 
 

@@ -44,21 +44,20 @@ def import_urdf(
     tip: options.Tip = None,
     snap: Annotated[bool, typer.Option(help="take rounded angles (1.571) as the multiples of 45 deg meant")] = True,
     xacro: options.Xacro = None,
-    srdf: Annotated[Path | None, typer.Option(help="whose state home, else the first of all joints, is home")] = None,
+    srdf: options.Srdf = None,
     as_json: options.AsJson = False,
 ):
     """Write a robot file (D-H table, directions, offsets, limits) from a URDF."""
     from er3a.files.robot_writer import write_robot
     from er3a.formats.urdf import import_urdf as read_urdf
-    from er3a.formats.urdf_tree import plain_urdf, srdf_home
+    from er3a.formats.urdf_tree import srdf_home
     from er3a.robots.robot import robot_name
 
-    with shown_work(f"{file}: reading the arm"), plain_urdf(file, xacro or ()) as plain:
-        imported = read_urdf(plain, base=base, tip=tip, snap=snap)
+    with shown_work(f"{file}: reading the arm"):
+        imported = read_urdf(file, base=base, tip=tip, snap=snap, xacro=xacro or ())
     robot = imported.robot
     if srdf is not None:
-        with plain_urdf(srdf) as plain:
-            robot = robot.replace(home=srdf_home(plain, imported.joints))
+        robot = robot.replace(home=srdf_home(srdf, imported.joints))
     name = robot_name(output)
     output = output.with_name(f"{name}.yaml") if re.fullmatch(NAME_PATTERN, output.stem) is None else output
     write_robot(robot.replace(name=output.stem), output)

@@ -119,6 +119,7 @@ def teach(
     base: options.Base = None,
     tip: options.Tip = None,
     xacro: options.Xacro = None,
+    srdf: options.Srdf = None,
 ):
     """Write a teach panel as one page: sliders, the arm in 3-D, its pose and all IK solutions.
 
@@ -129,7 +130,7 @@ def teach(
     from er3a.robots.robot import robot_name
 
     given: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    given |= {"base": base, "tip": tip, "xacro": xacro or ()}
+    given |= {"base": base, "tip": tip, "xacro": xacro or (), "srdf": srdf}
     if robot == "-" or Path(robot).suffix or (robot in known_arms() and (output or not study.is_file())):
         _teach_file(robot, output or Path(f"{robot_name(Path(robot))}.html"), given)
         return
@@ -143,8 +144,8 @@ def teach(
 def _teach_file(source: str, page: Path, given: dict[str, Any]) -> None:
     """Write the panel of an arm that is given as a file, read as the options say."""
     from er3a.files.arm_catalogue import ARMS
-    from er3a.files.arm_file import read_arm
     from er3a.files.kept_files import sha256
+    from er3a.files.robot_library import read_arm
     from er3a.pipeline.code_digest import code_digest
     from er3a.pipeline.results import Input, Provenance
     from er3a.pipeline.teach.panel import write_panel

@@ -43,13 +43,14 @@ def new(
     base: options.Base = None,
     tip: options.Tip = None,
     xacro: options.Xacro = None,
+    srdf: options.Srdf = None,
 ):
     """Write a study for an arm: robot file, scene, targets and paths that the arm can do, README."""
     from er3a.pipeline.new_study.arms import arm_of
     from er3a.pipeline.new_study.write import write_study
 
     form: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
-    form |= {"columns": options.columns_of(column), "base": base, "tip": tip, "xacro": xacro or ()}
+    form |= {"columns": options.columns_of(column), "base": base, "tip": tip, "xacro": xacro or (), "srdf": srdf}
     with shown_work(f"{folder}: reading the arm") as at:
         arm = arm_of(source, name, **form)
         compiles = "" if STAGES["trajectory"].compiled.exists() else "; the first time er3a compiles, up to two minutes"

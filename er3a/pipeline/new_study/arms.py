@@ -10,10 +10,9 @@ from typing import Any
 
 from er3a.collision.shapes import arm_shapes
 from er3a.errors import Er3aError, InputError
-from er3a.files.arm_file import read_arm
 from er3a.files.reference_sets import reference_folder
 from er3a.files.robot_file import NAME_PATTERN
-from er3a.files.robot_library import URDF, holds_table, known_arm, read_robot, robot_of, robot_path
+from er3a.files.robot_library import URDF, holds_table, known_arm, read_arm, read_robot, robot_of, robot_path
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.formats.mesh_file import read_text
 from er3a.robots.robot import Robot
@@ -45,7 +44,7 @@ def arm_of(source: str | Path, name: str | None = None, **form: Any) -> Arm:
 
     Parameters
     ----------
-    source : as :func:`er3a.files.arm_file.read_arm` takes it
+    source : as :func:`er3a.files.robot_library.read_arm` takes it
     name : of the robot in the study; by default that of the file
     form : how tables and URDFs are read, as that function takes it
 
@@ -58,7 +57,7 @@ def arm_of(source: str | Path, name: str | None = None, **form: Any) -> Arm:
         allowed = "small letters, digits, - and _, a letter or digit first, 64 at most"
         raise Er3aError(f"--name '{name}' can't be a robot's name: {allowed}")
     path = Path(source)
-    if not (holds_table(source) or path.suffix in URDF or known_arm(str(source))):
+    if not (holds_table(source) or path.suffix in URDF or known_arm(str(source)) or form.get("srdf")):
         return _of_file(robot_path(source), name)
     arm = read_arm(str(source), whole=True, **form)
     content = robot_file(arm.robot.replace(name=name or arm.robot.name), path)
