@@ -206,7 +206,7 @@ class ChainSolver(Protocol):
 
 
 class WithoutParameters:
-    """A class without parameters."""
+    """A class without parameters, or what one with parameters has of it: no seeds and no names."""
 
     parameters: tuple[Redundancy, ...] = ()
 
@@ -425,8 +425,8 @@ class EliminationSolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ArmAngle:
-    """Seven joints with a spherical shoulder and wrist."""
+class ArmAngle(WithoutParameters):
+    """Seven joints with a spherical shoulder and wrist; self-motions are collected over the arm angle."""
 
     arm: ArmAngleArm
     code: ArmClassCode = "arm_angle"
@@ -461,19 +461,6 @@ class ArmAngle:
         values : (..., 1), rad
         """
         return arm_angles_of(self.arm, x)[..., None]
-
-    def seeds(self, T: Reals) -> list[Reals]:
-        """No members of continua: self-motions of redundant arms are collected over the arm angle.
-
-        Parameters
-        ----------
-        T : (4, 4), m
-
-        Returns
-        -------
-        seeds : none
-        """
-        return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         """Names by the roots of shoulder, elbow and wrist.
