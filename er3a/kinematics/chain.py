@@ -22,7 +22,7 @@ import numpy as np
 
 from er3a.errors import Er3aError
 from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
-from er3a.numerics.arrays import Flags, Reals
+from er3a.numerics.arrays import Flags, Reals, for_kernel
 from er3a.numerics.jit import inner_kernel
 from er3a.robots.robot import Robot, derived
 
@@ -67,6 +67,7 @@ def constant_links(robot: Robot, frame: int | None = None) -> Reals:
     return links
 
 
+@derived
 def joint_starts(robot: Robot) -> Reals:
     """What each row's motion x begins with at u = 0.
 
@@ -76,9 +77,9 @@ def joint_starts(robot: Robot) -> Reals:
 
     Returns
     -------
-    start : (m,), the offset (rad) of revolute rows, 0 (m) of prismatic ones
+    start : (m,), the offset (rad) of revolute rows, 0 (m) of prismatic ones; read-only
     """
-    return np.where(robot.sliding, 0.0, robot.offset)
+    return for_kernel(np.where(robot.sliding, 0.0, robot.offset))
 
 
 def row_values(robot: Robot, q: Reals) -> Reals:

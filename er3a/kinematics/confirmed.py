@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.kinematics.by_class import CONFIRMS, arm_solver, confirms, task_mask, with_task_frame
+from er3a.kinematics.classes.polish import miss_and_pivot
 from er3a.kinematics.forward import forward
 from er3a.kinematics.numerical import polished
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import shortest_move
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, shortest_move, turned_alone
 
 MOVED = 1e-2  # rad or m by which polishing may move a row, which else becomes another one
 
@@ -39,6 +40,51 @@ def confirmed(robot: Robot, T: Reals, q: Reals) -> tuple[Reals, Flags]:
     kept = q.copy()
     kept[failing] = np.where(good[:, None], better, np.nan)
     return kept, failing
+
+
+ClosedFormArm = tuple[Reals, float, Reals, Reals, tuple[Reals, Reals]]
+"""Of six revolute joints without coupling: links in units of the chain's size, that size (m), direction, start, and
+lower and upper limits (6,)."""
+ROUNDING, REGULAR = 1e-12, 1e-3  # miss (parts of 1, of the size) and last pivot of a row that needs no second look
+
+
+@kernel
+def regular_turns(arm: ClosedFormArm, T: Reals, x: Reals, q_ref: Reals, out: tuple[Reals, Integers, Flags]) -> int:
+    """All turns of rows that solve a pose to rounding, far from singular poses. Kernel.
+
+    Parameters
+    ----------
+    arm : in closed form
+    T : (4, 4), m
+    x : (8, 6), rad, row values, NaN in empty slots
+    q_ref : (6,), rad
+    out : (k, 6), (k,) and (k,), filled with rows, of each slot the nearest to the reference first, with their slots and
+        whether they keep the limits
+
+    Returns
+    -------
+    count : of rows; 0 or less where something asks for a second look, or there are more than ``out`` has place for
+    """
+    (links, size, direction, start, limits), (rows, of, inside) = arm, out
+    pose, q, slots, found = T.copy(), np.empty((8, 6)), np.empty(8, np.int64), 0
+    pose[:3, 3] /= size
+    rigid = T[3, 0] == 0.0 and T[3, 1] == 0.0 and T[3, 2] == 0.0 and T[3, 3] == 1.0
+    off, pivot = miss_and_pivot(links, pose, x)
+    if not (rigid and off < ROUNDING and pivot > REGULAR and np.isfinite(q_ref).all()):
+        return 0
+    for slot in range(8):
+        if not np.isnan(x[slot, 0]):
+            slots[found] = slot
+            for j in range(6):
+                q[found, j] = direction[j] * (x[slot, j] - start[j])
+            found += 1
+    count: int = turned_alone(q[:found], q_ref, limits, rows, of)
+    for k in range(count):
+        inside[k], of[k] = True, slots[of[k]]
+        for j in range(6):
+            beyond = max(rows[k, j] - limits[1][j], limits[0][j] - rows[k, j])
+            inside[k] &= beyond <= LIMIT_TOLERANCE
+    return count
 
 
 AT_A_TIME = 512  # poses, whose rows' forward kinematics stay in the processor's cache

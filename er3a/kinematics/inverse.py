@@ -14,11 +14,12 @@ from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
 from er3a.kinematics.by_class import CONFIRMS, confirms, meets_poses, misses, task_mask
+from er3a.kinematics.chain import joint_starts
 from er3a.kinematics.classes.chain_solvers import Unsolved as UnsolvedChain
-from er3a.kinematics.classes.class_solvers import ARM_CLASSES, LinkedRows
+from er3a.kinematics.classes.class_solvers import ARM_CLASSES, BranchSolver, LinkedRows
 from er3a.kinematics.classes.six_revolute import CERTAIN
 from er3a.kinematics.closed_form import FREE, OFF_AXIS, ORIENTATION, REACHED, TOO_FAR
-from er3a.kinematics.confirmed import confirmed
+from er3a.kinematics.confirmed import ClosedFormArm, confirmed, regular_turns
 from er3a.kinematics.families import Family, families, is_regular
 from er3a.kinematics.forward import checked_joints, forward
 from er3a.kinematics.numerical import all_found, nearest_arm, solve
@@ -32,12 +33,14 @@ from er3a.kinematics.wrist_partitioned import (
 )
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import equivalents_within, within
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
+from er3a.robots.whole_turns import turns_alone
 
 SAME_JOINTS = 1e-9  # rad: rows so near to each other are one
 SAME_MEMBER = 1e-6  # rad or m: a member of a self-motion so near to a row is listed already
 MISSED = 1e-4  # rad or m from all rows
 SOLVES = 1e-12  # m and parts of 1
+MOST_AT_ONCE = 1024  # turns of a pose; more take the longer way
 STARTS, STARTS_OF_DEPENDENT = 400, 24  # where joints depend on each other a start that leads anywhere leads elsewhere
 
 
@@ -78,6 +81,8 @@ def inverse(
     ShapeError, PoseError
         if T is not a rigid transform, or q_ref does not have one finite number for each joint
     """
+    if (at_once := _at_once(robot, T, q_ref)) is not None:
+        return at_once
     T = check_poses(T)
     if T.shape != (4, 4):
         raise ShapeError("T", T.shape, "(4, 4)")
@@ -87,6 +92,45 @@ def inverse(
     else:
         found = _by_closed_form(robot, T, q_ref)
     return _at_exit(robot, found, T, q_ref if redundancy is None and not found.regular else None)
+
+
+@derived
+def _closed_form(robot: Robot) -> tuple[BranchSolver, ClosedFormArm, solutions.Method] | None:
+    """The solver of an arm in closed form whose joints turn by themselves, and what the kernel takes of the arm."""
+    solver = by_class.arm_solver(robot)
+    if not isinstance(solver.chain, BranchSolver) or not turns_alone(robot) or robot.coupling is not None:
+        return None
+    method = fact("by_class", arm_class=solver.chain.code, certain=True, named=True)
+    if solver.chain.code == "spherical_wrist":
+        method = solutions.CLOSED_FORM
+    scaled = np.array(solver.links)
+    scaled[:, :3, 3] /= solver.size
+    arm = scaled, solver.size, robot.direction, joint_starts(robot), (robot.lower, robot.upper)
+    return solver.chain, arm, method
+
+
+def _at_once(robot: Robot, T: Reals, q_ref: Reals | None) -> solutions.Solutions | None:
+    """The solutions of a pose far from all singular ones: all that most poses need.
+
+    Nothing is checked before: what is no rigid transform has no row that solves it to rounding.
+    """
+    plain = _closed_form(robot)
+    if plain is None or not isinstance(T, np.ndarray) or T.dtype != float or T.shape != (4, 4):
+        return None
+    q_ref = np.zeros(6) if q_ref is None else np.ascontiguousarray(q_ref, dtype=float)
+    if q_ref.shape != (6,):
+        return None
+    solver, arm, method = plain
+    x, marked, empty = solver.branches(np.ascontiguousarray(T[None]))
+    if marked[0]:
+        return None
+    rows, of, inside = np.empty((MOST_AT_ONCE, 6)), np.empty(MOST_AT_ONCE, np.int64), np.empty(MOST_AT_ONCE, bool)
+    count = regular_turns(arm, T, x[0], q_ref, (rows, of, inside))
+    if count <= 0:
+        return None
+    q, branch, fits = rows[:count].copy(), of[:count].copy(), inside[:count].copy()
+    unsolved = () if empty is None else _unsolved(robot, empty[0][0], empty[1][0])
+    return solutions.Solutions(robot, q, np.ones(count, bool), fits, branch, method, unsolved)
 
 
 class _Found(NamedTuple):

@@ -5,17 +5,15 @@ as a rotation vector [2]_. The damping falls with the squared error [3]_, so tha
 limit that the step would leave are held there (projected Gauss-Newton). A start that stalls is replaced by a random
 one; random numbers depend on seed, pose and start alone [4]_.
 
-``LANES`` poses are iterated in parallel, so that the arithmetic becomes vector instructions; a lane that is done takes
-the next pose. The result of a lane depends on its own pose only. The damped step is ``-J^T y`` with
-``(J J^T + damping) y = e``: six equations for any number of joints. Their symmetric positive matrix is solved by
-Cholesky's factors, written out [1]_ so that one pass over the lanes does it all: ``l_ij`` are the entries of the lower
-factor, ``r_i`` the reciprocals of its diagonal.
+The damped step is ``J^T y`` with ``(J J^T + damping) y = e``: six equations for any number of joints [1]_.
 
-Steps of prismatic joints are counted in parts of the arm's length; coupled joints have the sum of their rows' columns.
+Joint values of prismatic joints are counted in parts of the arm's length; coupled joints have the sum of their rows'
+columns.
 
 References
 ----------
-.. [1] G. H. Golub, C. F. Van Loan, *Matrix Computations*, 4th ed., algorithm 4.2.1.
+.. [1] S. R. Buss, "Introduction to inverse kinematics with Jacobian transpose, pseudoinverse and damped least squares
+   methods", 2004, equation 11.
 .. [2] R. M. Murray, Z. Li, S. S. Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994, equation 2.18;
    its derivative: J. Sola et al., "A micro Lie theory", arXiv 1812.01537, equations 145 and 146.
 .. [3] T. Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans.
@@ -34,69 +32,17 @@ import numpy as np
 from er3a.errors import Er3aError, PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
+from er3a.geometry.vectors import Vector, cross, dot, scaled
 from er3a.kinematics.by_class import distinct
-from er3a.kinematics.chain import arm_length, constant_links, joint_starts, rows_at
+from er3a.kinematics.chain import arm_length, constant_links, joint_starts
+from er3a.kinematics.classes.polish import error_and_columns
+from er3a.kinematics.classes.self_motion import shortest_step
 from er3a.kinematics.forward import checked_joints, jacobian
 from er3a.kinematics.solutions import NotFound, Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats, for_kernel
-from er3a.numerics.fast_math import arctan2, cos_sin
 from er3a.numerics.jit import inner_kernel, kernel, parallel_for
 from er3a.robots.joint_limits import limits_exceeded, nearest_equivalent, unwound, within
 from er3a.robots.robot import Robot
-
-LANES = 32  # four or more vectors of any processor, while the scratch memory stays in its cache
-TOGETHER = 3  # columns whose products are added at a time; J has room for a multiple
-MIN_PIVOT = 1e-15  # keeps the root of a pivot that rounding has made negative
-
-
-@inner_kernel
-def solve_by_cholesky(A: Reals, step: Reals) -> None:
-    """Solve six equations in each lane by Cholesky's factors [1]_. Kernel.
-
-    Parameters
-    ----------
-    A : 36 rows of lanes, symmetric positive matrices, of which the lower half is read
-    step : 6 rows of lanes, right sides, replaced by the solutions
-    """
-    for i in range(LANES):
-        r_0 = 1.0 / np.sqrt(max(A[i], MIN_PIVOT))
-        l_10 = A[6 * LANES + i] * r_0
-        l_20 = A[12 * LANES + i] * r_0
-        l_30 = A[18 * LANES + i] * r_0
-        l_40 = A[24 * LANES + i] * r_0
-        l_50 = A[30 * LANES + i] * r_0
-        r_1 = 1.0 / np.sqrt(max(A[7 * LANES + i] - l_10 * l_10, MIN_PIVOT))
-        l_21 = (A[13 * LANES + i] - l_20 * l_10) * r_1
-        l_31 = (A[19 * LANES + i] - l_30 * l_10) * r_1
-        l_41 = (A[25 * LANES + i] - l_40 * l_10) * r_1
-        l_51 = (A[31 * LANES + i] - l_50 * l_10) * r_1
-        r_2 = 1.0 / np.sqrt(max(A[14 * LANES + i] - l_20 * l_20 - l_21 * l_21, MIN_PIVOT))
-        l_32 = (A[20 * LANES + i] - l_30 * l_20 - l_31 * l_21) * r_2
-        l_42 = (A[26 * LANES + i] - l_40 * l_20 - l_41 * l_21) * r_2
-        l_52 = (A[32 * LANES + i] - l_50 * l_20 - l_51 * l_21) * r_2
-        r_3 = 1.0 / np.sqrt(max(A[21 * LANES + i] - l_30 * l_30 - l_31 * l_31 - l_32 * l_32, MIN_PIVOT))
-        l_43 = (A[27 * LANES + i] - l_40 * l_30 - l_41 * l_31 - l_42 * l_32) * r_3
-        l_53 = (A[33 * LANES + i] - l_50 * l_30 - l_51 * l_31 - l_52 * l_32) * r_3
-        r_4 = 1.0 / np.sqrt(max(A[28 * LANES + i] - l_40 * l_40 - l_41 * l_41 - l_42 * l_42 - l_43 * l_43, MIN_PIVOT))
-        l_54 = (A[34 * LANES + i] - l_50 * l_40 - l_51 * l_41 - l_52 * l_42 - l_53 * l_43) * r_4
-        r_5 = 1.0 / np.sqrt(
-            max(A[35 * LANES + i] - l_50 * l_50 - l_51 * l_51 - l_52 * l_52 - l_53 * l_53 - l_54 * l_54, MIN_PIVOT)
-        )
-        y_0 = step[i] * r_0
-        y_1 = (step[1 * LANES + i] - l_10 * y_0) * r_1
-        y_2 = (step[2 * LANES + i] - l_20 * y_0 - l_21 * y_1) * r_2
-        y_3 = (step[3 * LANES + i] - l_30 * y_0 - l_31 * y_1 - l_32 * y_2) * r_3
-        y_4 = (step[4 * LANES + i] - l_40 * y_0 - l_41 * y_1 - l_42 * y_2 - l_43 * y_3) * r_4
-        y_5 = (step[5 * LANES + i] - l_50 * y_0 - l_51 * y_1 - l_52 * y_2 - l_53 * y_3 - l_54 * y_4) * r_5
-        x_5 = y_5 * r_5
-        x_4 = (y_4 - l_54 * x_5) * r_4
-        x_3 = (y_3 - l_43 * x_4 - l_53 * x_5) * r_3
-        x_2 = (y_2 - l_32 * x_3 - l_42 * x_4 - l_52 * x_5) * r_2
-        x_1 = (y_1 - l_21 * x_2 - l_31 * x_3 - l_41 * x_4 - l_51 * x_5) * r_1
-        x_0 = (y_0 - l_10 * x_1 - l_20 * x_2 - l_30 * x_3 - l_40 * x_4 - l_50 * x_5) * r_0
-        step[i], step[LANES + i], step[2 * LANES + i] = x_0, x_1, x_2
-        step[3 * LANES + i], step[4 * LANES + i], step[5 * LANES + i] = x_3, x_4, x_5
-
 
 DAMPING = 0.1  # times the squared error
 MAX_ITERATIONS = 40  # of one start
@@ -105,35 +51,28 @@ STALLED = 0.9  # the squared error must fall by this factor ...
 PATIENCE = 3  # ... within so many iterations
 MIN_DAMPING = 1e-15  # keeps the normal matrix positive at the solution
 
-# Rows of scratch memory, one number of each lane in a row: the arm's frame (3 x 4), the target (3 x 4), then vectors.
-_FRAME, _TARGET, _E, _W, _SQUARED, _POSITION, _ROTATION = 0, 12, 24, 30, 33, 34, 35
-_Y, _SCALE, _TURNS, _MOVED, _ROWS = 36, 42, 43, 45, 46
-
-Arm = tuple[Reals, Reals, Reals, Flags, Reals, Reals]
-"""Direction (m,), start (m,), links (m + 1, 4, 4), sliding (m,), coupling (m, n) or none (0, n), each joint's unit
-(n,): 1, or the arm's length in m if it slides."""
+Arm = tuple[Reals, Reals, Reals, Flags]
+"""What joints, slides in parts of the arm's length, move the table's rows by (m, n), start (m,), links (m + 1, 4, 4),
+sliding (m,)."""
 Limits = tuple[Reals, Reals, bool]  # lower, upper, and whether the iteration keeps to them
 Goal = tuple[Reals, Reals, float]  # mask, tolerances, length
 Draws = tuple[int, np.uint64, int]  # restarts, seed, number of the first pose
 
 
-class Lanes(NamedTuple):
-    """Scratch memory of ``LANES`` poses, flat.
+class Room(NamedTuple):
+    """Scratch memory: row values (m,), frames (2, 4, 4), the pose error (6,), its derivatives by rows (6, m) and by
+    joints (6, n), and the joints' step (n,)."""
 
-    ``w`` has ``_ROWS`` rows; joints ``q`` and their steps n each; columns ``J`` of the joints and those of the table's
-    rows 6 n and 6 m (one array without coupling); the equations ``A`` 36.
-    """
-
-    w: Reals
-    q: Reals
-    step: Reals
-    J: Reals
+    x: Reals
+    frames: Reals
+    e: Reals
     of_rows: Reals
-    A: Reals
+    J: Reals
+    step: Reals
 
 
 @kernel
-def new_lanes(arm: Arm) -> Lanes:
+def new_room(arm: Arm) -> Room:
     """Scratch memory for an arm of n joints and m rows. Kernel.
 
     Parameters
@@ -142,20 +81,17 @@ def new_lanes(arm: Arm) -> Lanes:
 
     Returns
     -------
-    lanes : zeros; without coupling the columns of the rows are those of the joints
+    room : not filled
     """
-    n = arm[5].shape[0]
-    J = np.zeros((n + TOGETHER - 1) // TOGETHER * TOGETHER * 6 * LANES)
-    of_rows = J if arm[4].shape[0] == 0 else np.zeros(6 * arm[0].shape[0] * LANES)
-    x, step = np.zeros(n * LANES), np.zeros(n * LANES)
-    return Lanes(np.zeros(_ROWS * LANES), x, step, J, of_rows, np.zeros(36 * LANES))
+    m, n = arm[0].shape
+    return Room(np.empty(m), np.empty((2, 4, 4)), np.empty(6), np.empty((6, m)), np.empty((6, n)), np.empty(n))
 
 
 @kernel
 def solve_numerically(
-    arm: Arm, limits: Limits, T: Reals, q0: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Reals, Integers]
+    arm: Arm, limits: Limits, T: Reals, q: Reals, goal: Goal, draws: Draws, out: tuple[Reals, Integers]
 ) -> None:
-    """Solve poses of any arm by iteration, ``LANES`` at a time. Kernel.
+    """Solve poses of any arm by iteration. Kernel.
 
     Random starts depend on the pose's number. Where no start reaches the tolerances, ``q`` is the nearest arm found and
     ``starts`` is 0.
@@ -163,64 +99,34 @@ def solve_numerically(
     Parameters
     ----------
     arm : see ``Arm``
-    limits : lower and upper (n,), rad or m, and whether to keep to them
+    limits : lower and upper (n,), rad or parts of the length, and whether to keep to them
     T : (N, 4, 4), m
-    q0 : (N, n), rad or m, first start
+    q : (N, n), rad or parts of the length, first start; replaced by what is found
     goal : mask (6,), tolerances (m, rad), length (m)
     draws : restarts, seed, number of the first pose
-    out : fills ``q`` (N, n), ``error`` (N, 2) in m and rad, ``starts`` (N,)
+    out : fills ``error`` (N, 2) in m and rad, ``starts`` (N,)
     """
-    (mask, tolerances, length), (restarts, _, _) = goal, draws
-    q, error, starts = out
-    lanes = new_lanes(arm)
-    w = lanes.w
-    pose, start, count = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
-    mark, since, best = np.empty(LANES), np.zeros(LANES, np.int64), np.empty(LANES)
-    taken, active = 0, 0
-    for i in range(LANES):
-        _take(w, i, T, min(taken, T.shape[0] - 1))
-        if taken < T.shape[0]:
-            pose[i], start[i], count[i], mark[i], since[i], best[i] = taken, 0, 0, np.inf, 0, np.inf
-            _begin(lanes.q, i, q0, taken, 0, limits, draws)
-            taken += 1
-            active += 1
-    while active > 0:
-        _evaluate(arm, mask, length, lanes)
-        for i in range(LANES):
-            n = pose[i]
-            w[_SCALE * LANES + i] = 1.0
-            if n < 0:
-                continue
-            position, rotation = w[_POSITION * LANES + i], w[_ROTATION * LANES + i]
-            square = (position / length) ** 2 + rotation**2
-            solved = position <= tolerances[0] and rotation <= tolerances[1]
-            if square < STALLED * mark[i]:
-                mark[i], since[i] = square, 0
-            else:
-                since[i] += 1
-            count[i] += 1
-            if not (solved or since[i] > PATIENCE or count[i] > MAX_ITERATIONS):
-                continue
-            if solved or square < best[i] or start[i] == 0:
-                best[i], error[n, 0], error[n, 1], starts[n] = square, position, rotation, 0
-                for j in range(q.shape[1]):
-                    q[n, j] = lanes.q[j * LANES + i]
-            w[_SCALE * LANES + i] = 0.0
-            count[i], mark[i], since[i] = 0, np.inf, 0
-            if not solved and start[i] < restarts:
-                start[i] += 1
-                _begin(lanes.q, i, q0, n, start[i], limits, draws)
-                continue
-            starts[n] = start[i] + 1 if solved else 0
-            pose[i], start[i], best[i] = -1, 0, np.inf
-            active -= 1
-            if taken < T.shape[0]:
-                pose[i] = taken
-                _take(w, i, T, taken)
-                _begin(lanes.q, i, q0, taken, 0, limits, draws)
-                taken += 1
-                active += 1
-        _step(arm[5], limits, lanes)
+    (_, tolerances, length), (error, starts), room, now = goal, out, new_room(arm), np.empty(q.shape[1])
+    for n in range(T.shape[0]):
+        best, starts[n], first = np.inf, 0, q[n].copy()
+        for start in range(draws[0] + 1):
+            _begin(now, first, n, start, limits, draws)
+            mark, since, count, solved, square = np.inf, 0, 0, False, np.inf
+            position, rotation = np.inf, np.inf
+            while not solved and since <= PATIENCE and count <= MAX_ITERATIONS:
+                if count:
+                    _step(limits, room, now)
+                position, rotation = evaluate(arm, goal, T[n], now, room)
+                square = (position / length) ** 2 + rotation**2
+                solved = position <= tolerances[0] and rotation <= tolerances[1]
+                mark, since = (square, 0) if square < STALLED * mark else (mark, since + 1)
+                count += 1
+            if solved or square < best or start == 0:
+                best, error[n, 0], error[n, 1] = square, position, rotation
+                q[n] = now
+            if solved:
+                starts[n] = start + 1
+                break
 
 
 @kernel
@@ -243,222 +149,99 @@ def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@inner_kernel
-def _take(w: Reals, i: int, T: Reals, n: int) -> None:
-    """Load a pose into a lane as its target."""
-    for r in range(3):
-        for c in range(4):
-            w[(_TARGET + 4 * r + c) * LANES + i] = T[n, r, c]
-
-
 @kernel
-def _begin(q: Reals, i: int, q0: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
-    """Set a lane's joints to a start: the guess, or a random one within the limits."""
-    (lower, upper, respect), (_, seed, first) = limits, draws
-    for j in range(q0.shape[1]):
-        angle = q0[n, j] if start == 0 else lower[j] + uniform(seed, first + n, start, j) * (upper[j] - lower[j])
+def _begin(q: Reals, first: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
+    """Set joints to a start: the guess, or a random one within the limits."""
+    (lower, upper, respect), (_, seed, before) = limits, draws
+    for j in range(q.shape[0]):
+        q[j] = first[j] if start == 0 else lower[j] + uniform(seed, before + n, start, j) * (upper[j] - lower[j])
         if respect:
-            angle = min(max(angle, lower[j]), upper[j])
-        q[j * LANES + i] = angle
+            q[j] = min(max(q[j], lower[j]), upper[j])
+
+
+@inner_kernel
+def _seen_from(T: Reals, x: float, y: float, z: float) -> Vector:
+    """A direction in the coordinates of a frame."""
+    return (
+        T[0, 0] * x + T[1, 0] * y + T[2, 0] * z,
+        T[0, 1] * x + T[1, 1] * y + T[2, 1] * z,
+        T[0, 2] * x + T[1, 2] * y + T[2, 2] * z,
+    )
 
 
 @kernel
-def _evaluate(arm: Arm, mask: Reals, length: float, lanes: Lanes) -> None:
-    """Pose errors in the target's tool frame and their derivatives by the joints, masked; a column holds 6 rows."""
-    direction, start, links, sliding, coupling, units = arm
-    w, J, of_rows = lanes.w, lanes.J, lanes.of_rows
+def evaluate(arm: Arm, goal: Goal, T: Reals, q: Reals, room: Room) -> tuple[float, float]:
+    """Find the masked pose error in the target's tool frame, and its derivatives by the joints. Kernel.
+
+    Parameters
+    ----------
+    arm : see ``Arm``
+    goal : mask, tolerances, length
+    T : (4, 4), m, the target
+    q : (n,), rad or parts of the length
+    room : its ``e`` is filled with the position over the length and the rotation vector [2]_, its ``J`` with their
+        derivatives
+
+    Returns
+    -------
+    position, rotation : m and rad, sizes of what the mask asks
+    """
+    (motion, start, links, sliding), (mask, _, length), (x, frames, e, of_rows, J, _) = arm, goal, room
+    for k in range(x.shape[0]):
+        x[k] = start[k]
+        for j in range(q.shape[0]):
+            x[k] += motion[k, j] * q[j]
+    cosine = 0.5 * (error_and_columns(links, sliding, T, x, frames, e, of_rows) - 1.0)
+    frame = frames[x.shape[0] % 2]
+    turn, shift = _seen_from(frame, e[3], e[4], e[5]), _seen_from(T, -e[0], -e[1], -e[2])
+    sine = np.sqrt(dot(turn, turn))
+    squared = 1.0 / 12.0
+    if sine > 1e-8:
+        theta = np.arctan2(sine, cosine)
+        turn = scaled(turn, theta / sine)
+        squared = 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * sine)
+    elif cosine <= 0.0:  # next to half a turn the axis is undefined; the error counts as half a turn about any axis
+        turn, squared = (np.pi, np.pi, np.pi), 1.0 / np.pi**2
     for r in range(3):
-        for c in range(4):
-            w[(4 * r + c) * LANES : (4 * r + c + 1) * LANES] = links[0, r, c]
-    for k in range(direction.shape[0]):
-        moved = lanes.q[k * LANES : (k + 1) * LANES]
-        if coupling.shape[0] > 0:
-            moved = w[_MOVED * LANES : (_MOVED + 1) * LANES]
-            moved[:] = 0.0
-            for j in range(units.shape[0]):
-                _add(moved, coupling[k, j], lanes.q[j * LANES : (j + 1) * LANES])
-        column = of_rows[6 * k * LANES : (6 * k + 6) * LANES]
-        _joint(direction[k], start[k], sliding[k], links[k + 1], moved, w, column)
-    _pose_error(mask, length, w)
-    for k in range(direction.shape[0]):
-        _column(mask, length, sliding[k], w, of_rows[6 * k * LANES : (6 * k + 6) * LANES])
-    for j in range(units.shape[0]):
-        column = J[6 * j * LANES : (6 * j + 6) * LANES]
-        if coupling.shape[0] > 0:
-            column[:] = 0.0
-            for k in range(direction.shape[0]):
-                _add(column, coupling[k, j], of_rows[6 * k * LANES : (6 * k + 6) * LANES])
-        if units[j] != 1.0:
-            for i in range(6 * LANES):
-                column[i] *= units[j]
-
-
-@inner_kernel
-def _add(total: Reals, factor: float, part: Reals) -> None:
-    """Add a multiple of rows to others."""
-    for i in range(total.shape[0]):
-        total[i] += factor * part[i]
-
-
-@kernel
-def _joint(sign: float, zero: float, slides: bool, link: Reals, moved: Reals, w: Reals, column: Reals) -> None:
-    """Keep the joint's point and axis, then go over its rotation, or its shift, and its link."""
-    turns = w[_TURNS * LANES : (_TURNS + 2) * LANES]
-    for i in range(LANES):
-        turns[i], turns[LANES + i] = cos_sin(0.0 if slides else sign * moved[i] + zero)
-    a, b, c, x = link[0, 0], link[0, 1], link[0, 2], link[0, 3]
-    d, e, f, y = link[1, 0], link[1, 1], link[1, 2], link[1, 3]
-    g, h, m, z = link[2, 0], link[2, 1], link[2, 2], link[2, 3]
-    for r in range(3):
-        row = w[4 * r * LANES : (4 * r + 4) * LANES]
-        point, axis = column[r * LANES : (r + 1) * LANES], column[(3 + r) * LANES : (4 + r) * LANES]
-        for i in range(LANES):
-            cosine, sine = turns[i], turns[LANES + i]
-            p, s, t = row[i], row[LANES + i], row[2 * LANES + i]
-            point[i], axis[i] = row[3 * LANES + i], t * sign
-            p, s = p * cosine + s * sine, s * cosine - p * sine
-            row[i] = p * a + s * d + t * g
-            row[LANES + i] = p * b + s * e + t * h
-            row[2 * LANES + i] = p * c + s * f + t * m
-            row[3 * LANES + i] += p * x + s * y + t * z
-        if slides:  # the axis, which the shift goes along
-            for i in range(LANES):
-                row[3 * LANES + i] += axis[i] * moved[i]
-
-
-@inner_kernel
-def _pose_error(mask: Reals, length: float, w: Reals) -> None:
-    """Masked error of each lane in the target's tool frame: position over length, rotation vector (rad), and sizes."""
-    m0, m1, m2, m3, m4, m5 = mask[0], mask[1], mask[2], mask[3], mask[4], mask[5]
-    for i in range(LANES):
-        a0, a1, a2, px, b0, b1, b2, py, c0, c1, c2, pz = rows_at(w, LANES, i)
-        d0, d1, d2, tx, e0, e1, e2, ty, f0, f1, f2, tz = rows_at(w, LANES, _TARGET * LANES + i)
-        # Rotation vector of (arm's rotation)^T (target's rotation).
-        cosine = 0.5 * (a0 * d0 + b0 * e0 + c0 * f0 + a1 * d1 + b1 * e1 + c1 * f1 + a2 * d2 + b2 * e2 + c2 * f2 - 1.0)
-        wx = 0.5 * ((a2 * d1 + b2 * e1 + c2 * f1) - (a1 * d2 + b1 * e2 + c1 * f2))
-        wy = 0.5 * ((a0 * d2 + b0 * e2 + c0 * f2) - (a2 * d0 + b2 * e0 + c2 * f0))
-        wz = 0.5 * ((a1 * d0 + b1 * e0 + c1 * f0) - (a0 * d1 + b0 * e1 + c0 * f1))
-        sine = np.sqrt(wx * wx + wy * wy + wz * wz)
-        safe = max(sine, 1e-8)
-        theta = arctan2(safe, cosine)
-        small = (sine <= 1e-8) & (cosine > 0.0)
-        stretch = 1.0 if small else theta / safe
-        squared = 1.0 / 12.0 if small else 1.0 / (theta * theta) - (1.0 + cosine) / (2.0 * theta * safe)
-        # Next to half a turn the axis is undefined; the error counts as half a turn about any axis.
-        half_turn = (sine <= 1e-8) & (cosine <= 0.0)
-        wx, wy, wz = np.pi if half_turn else wx * stretch, wy * stretch, wz * stretch
-        dx, dy, dz = px - tx, py - ty, pz - tz
-        u = (d0 * dx + e0 * dy + f0 * dz) * m0
-        v = (d1 * dx + e1 * dy + f1 * dz) * m1
-        s = (d2 * dx + e2 * dy + f2 * dz) * m2
-        w[_E * LANES + i], w[(_E + 1) * LANES + i], w[(_E + 2) * LANES + i] = u / length, v / length, s / length
-        w[(_E + 3) * LANES + i], w[(_E + 4) * LANES + i], w[(_E + 5) * LANES + i] = wx * m3, wy * m4, wz * m5
-        w[_W * LANES + i], w[(_W + 1) * LANES + i], w[(_W + 2) * LANES + i] = wx, wy, wz
-        w[_SQUARED * LANES + i] = squared
-        w[_POSITION * LANES + i] = np.sqrt(u * u + v * v + s * s)
-        wx, wy, wz = wx * m3, wy * m4, wz * m5
-        w[_ROTATION * LANES + i] = np.sqrt(wx * wx + wy * wy + wz * wz)
-
-
-@inner_kernel
-def _column(mask: Reals, length: float, slides: bool, w: Reals, column: Reals) -> None:
-    """One row's column: a point and an axis in, the derivative of the pose error out."""
-    m0, m1, m2, m3, m4, m5 = mask[0] / length, mask[1] / length, mask[2] / length, mask[3], mask[4], mask[5]
-    for i in range(LANES):
-        rx, ry, rz = w[3 * LANES + i] - column[i], w[7 * LANES + i] - column[LANES + i], w[11 * LANES + i]
-        rz = rz - column[2 * LANES + i]
-        ax, ay, az = column[3 * LANES + i], column[4 * LANES + i], column[5 * LANES + i]
-        vx, vy, vz = ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
-        if slides:
-            vx, vy, vz, ax, ay, az = ax, ay, az, 0.0, 0.0, 0.0
-        column[i] = (w[12 * LANES + i] * vx + w[16 * LANES + i] * vy + w[20 * LANES + i] * vz) * m0
-        column[LANES + i] = (w[13 * LANES + i] * vx + w[17 * LANES + i] * vy + w[21 * LANES + i] * vz) * m1
-        column[2 * LANES + i] = (w[14 * LANES + i] * vx + w[18 * LANES + i] * vy + w[22 * LANES + i] * vz) * m2
+        e[r], e[3 + r] = mask[r] * shift[r] / length, mask[3 + r] * turn[r]
+    for k in range(x.shape[0]):
+        v = _seen_from(T, of_rows[0, k], of_rows[1, k], of_rows[2, k])
         # Angular velocity in the arm's tool frame, then minus the inverse left Jacobian of the rotation vector.
-        bx = w[i] * ax + w[4 * LANES + i] * ay + w[8 * LANES + i] * az
-        by = w[LANES + i] * ax + w[5 * LANES + i] * ay + w[9 * LANES + i] * az
-        bz = w[2 * LANES + i] * ax + w[6 * LANES + i] * ay + w[10 * LANES + i] * az
-        wx, wy, wz = w[_W * LANES + i], w[(_W + 1) * LANES + i], w[(_W + 2) * LANES + i]
-        squared = w[_SQUARED * LANES + i]
-        cx, cy, cz = wy * bz - wz * by, wz * bx - wx * bz, wx * by - wy * bx
-        column[3 * LANES + i] = -(bx - 0.5 * cx + squared * (wy * cz - wz * cy)) * m3
-        column[4 * LANES + i] = -(by - 0.5 * cy + squared * (wz * cx - wx * cz)) * m4
-        column[5 * LANES + i] = -(bz - 0.5 * cz + squared * (wx * cy - wy * cx)) * m5
-
-
-@kernel
-def _step(units: Reals, limits: Limits, lanes: Lanes) -> None:
-    """Move by a damped step, by Cholesky factors; joints that press against a limit stay."""
-    lower, upper, respect = limits
-    A, e, y = lanes.A, lanes.w[_E * LANES : (_E + 6) * LANES], lanes.w[_Y * LANES : (_Y + 6) * LANES]
-    for i in range(LANES):
-        total = 0.0
-        for r in range(6):
-            y[r * LANES + i] = e[r * LANES + i]
-            total += e[r * LANES + i] * e[r * LANES + i]
-        for r in range(6):
-            for c in range(r):
-                A[(6 * r + c) * LANES + i] = 0.0
-            A[7 * r * LANES + i] = DAMPING * total + MIN_DAMPING
-    if respect:
-        for j in range(units.shape[0]):
-            column, angle = lanes.J[6 * j * LANES : (6 * j + 6) * LANES], lanes.q[j * LANES : (j + 1) * LANES]
-            _hold(lower[j], upper[j], e, column, angle)
-    for j in range(0, lanes.J.shape[0], 6 * TOGETHER * LANES):
-        for r in range(6):
-            for c in range(r + 1):
-                entry = A[(6 * r + c) * LANES : (6 * r + c + 1) * LANES]
-                _add_products(lanes.J[j + r * LANES :], lanes.J[j + c * LANES :], entry)
-    solve_by_cholesky(A, y)
-    for j in range(units.shape[0]):
-        _dot_rows(lanes.J[6 * j * LANES : (6 * j + 6) * LANES], y, lanes.step[j * LANES : (j + 1) * LANES])
-    _move(units, limits, lanes)
+        b = _seen_from(frame, of_rows[3, k], of_rows[4, k], of_rows[5, k])
+        c = cross(turn, b)
+        d = cross(turn, c)
+        for r in range(3):
+            of_rows[r, k] = mask[r] * v[r] / length
+            of_rows[3 + r, k] = -mask[3 + r] * (b[r] - 0.5 * c[r] + squared * d[r])
+    for r in range(6):
+        for j in range(q.shape[0]):
+            J[r, j] = 0.0
+            for k in range(x.shape[0]):
+                J[r, j] += of_rows[r, k] * motion[k, j]
+    position = length * np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+    return position, np.sqrt(e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
 
 
 @inner_kernel
-def _dot_rows(a: Reals, b: Reals, out: Reals) -> None:
-    """Sum over 6 rows of the products of two columns."""
-    for i in range(LANES):
-        total = a[i] * b[i] + a[LANES + i] * b[LANES + i] + a[2 * LANES + i] * b[2 * LANES + i]
-        total = total + a[3 * LANES + i] * b[3 * LANES + i] + a[4 * LANES + i] * b[4 * LANES + i]
-        out[i] = total + a[5 * LANES + i] * b[5 * LANES + i]
-
-
-@inner_kernel
-def _add_products(a: Reals, b: Reals, out: Reals) -> None:
-    """Add the products of two components of ``TOGETHER`` neighbouring columns."""
-    for i in range(LANES):
-        total = a[i] * b[i] + a[6 * LANES + i] * b[6 * LANES + i]
-        out[i] += total + a[12 * LANES + i] * b[12 * LANES + i]
-
-
-@inner_kernel
-def _hold(low: float, high: float, e: Reals, column: Reals, angle: Reals) -> None:
-    """Make a joint's column 0 in lanes where it is at a limit that the step would leave."""
-    for i in range(LANES):
-        gradient = column[i] * e[i]
-        for r in range(1, 6):
-            gradient += column[r * LANES + i] * e[r * LANES + i]
-        pressed = ((angle[i] <= low) & (gradient > 0.0)) | ((angle[i] >= high) & (gradient < 0.0))
+def _step(limits: Limits, room: Room, q: Reals) -> None:
+    """Move by a damped step, at most ``LONGEST_STEP`` for any joint; joints that press against a limit stay."""
+    (lower, upper, respect), e, J, step = limits, room.e, room.J, room.step
+    damping, longest = MIN_DAMPING, LONGEST_STEP
+    for r in range(6):
+        damping += DAMPING * e[r] * e[r]
+    for j in range(q.shape[0] if respect else 0):
+        gradient = 0.0
         for r in range(6):
-            column[r * LANES + i] = 0.0 if pressed else column[r * LANES + i]
-
-
-@kernel
-def _move(units: Reals, limits: Limits, lanes: Lanes) -> None:
-    """Add the step, at most ``LONGEST_STEP`` for any joint, to the lanes that are to move."""
-    lower, upper, respect = limits
-    scale, step = lanes.w[_SCALE * LANES : (_SCALE + 1) * LANES], lanes.step
-    for i in range(LANES):
-        longest = LONGEST_STEP
-        for k in range(units.shape[0]):
-            longest = max(longest, abs(step[k * LANES + i]))
-        scale[i] = scale[i] * (LONGEST_STEP / longest)
-    for k in range(units.shape[0]):
-        angle, low, high = lanes.q[k * LANES : (k + 1) * LANES], lower[k], upper[k]
-        for i in range(LANES):
-            moved = angle[i] - scale[i] * step[k * LANES + i] * units[k]
-            angle[i] = min(max(moved, low), high) if respect else moved
+            gradient += J[r, j] * e[r]
+        if (q[j] <= lower[j] and gradient > 0.0) or (q[j] >= upper[j] and gradient < 0.0):
+            J[:, j] = 0.0
+    shortest_step(J, e, damping, step)
+    for j in range(q.shape[0]):
+        longest = max(longest, abs(step[j]))
+    for j in range(q.shape[0]):
+        q[j] -= LONGEST_STEP / longest * step[j]
+        if respect:
+            q[j] = min(max(q[j], lower[j]), upper[j])
 
 
 RESTARTS = 500  # random starts of a caller who names no other number
@@ -653,23 +436,25 @@ class _Search:
         error : (N, 2), m and rad
         starts : (N,), 0 where none succeeded
         """
-        robot, count = self.robot, len(T)
-        q, error, starts = np.empty((count, robot.joints)), np.empty((count, 2)), np.empty(count, dtype=np.int64)
-        low, high = (for_kernel(each) for each in ((robot.lower, robot.upper) if respect else self.without_limits()))
-        limits, mask, tolerances = (low, high, respect), for_kernel(self.mask), for_kernel(self.tolerances)
-        T, q0, length = for_kernel(T), for_kernel(q0), arm_length(robot)
-        links, none = for_kernel(constant_links(robot)), np.empty((0, robot.joints))
-        coupling = for_kernel(none if robot.coupling is None else robot.coupling)
-        units = for_kernel(np.where(robot.slides, length, 1.0))
-        starts_at, sliding = for_kernel(joint_starts(robot)), for_kernel(robot.sliding)
-        arm = for_kernel(robot.direction), starts_at, links, sliding, coupling, units
+        robot, count, length = self.robot, len(T), arm_length(self.robot)
+        error, starts, units = (
+            np.empty((count, 2)),
+            np.empty(count, dtype=np.int64),
+            np.where(robot.slides, length, 1.0),
+        )
+        low, high = (robot.lower, robot.upper) if respect else self.without_limits()
+        limits, q = (for_kernel(low / units), for_kernel(high / units), respect), q0 / units
+        motion = np.eye(robot.rows) if robot.coupling is None else robot.coupling
+        motion = for_kernel(robot.direction[:, None] * motion * units)
+        arm = motion, joint_starts(robot), for_kernel(constant_links(robot)), for_kernel(robot.sliding)
+        goal, T = (for_kernel(self.mask), for_kernel(self.tolerances), length), for_kernel(T)
 
         def part(rows: slice) -> None:
-            goal, draws = (mask, tolerances, length), (restarts, np.uint64(self.seed), rows.start)
-            out = q[rows], error[rows], starts[rows]
-            solve_numerically(arm, limits, T[rows], q0[rows], goal, draws, out)
+            draws, out = (restarts, np.uint64(self.seed), rows.start), (error[rows], starts[rows])
+            solve_numerically(arm, limits, T[rows], q[rows], goal, draws, out)
 
         parallel_for(count, threads, SMALLEST_PART, part)
+        q *= units
         return (q if respect else unwound(robot, q)), error, starts
 
     def without_limits(self) -> tuple[Reals, Reals]:

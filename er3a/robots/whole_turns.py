@@ -220,28 +220,29 @@ def turned_alone(q: Reals, q_ref: Reals, limits: tuple[Reals, Reals], rows: Real
     count : how many are filled in, -1 if they have too little room
     """
     (lower, upper), joints, count = limits, q.shape[1], 0
-    least, size = np.empty(joints), np.empty(joints, np.int64)
-    move, numbers = np.empty(len(rows)), np.empty(len(rows), np.int64)
+    least, size, turn = np.empty(joints), np.empty(joints, np.int64), np.empty(joints, np.int64)
+    turned, move, order = np.empty(rows.shape), np.empty(len(rows)), np.empty(len(rows), np.int64)
     for pose in range(len(q)):
         fitting = 1
         for j in range(joints):
-            least[j] = np.ceil((lower[j] - LIMIT_TOLERANCE - q[pose, j]) / TURN)
+            turn[j], least[j] = 0, np.ceil((lower[j] - LIMIT_TOLERANCE - q[pose, j]) / TURN)
             size[j] = max(np.floor((upper[j] + LIMIT_TOLERANCE - q[pose, j]) / TURN) - least[j] + 1.0, 0.0)
             fitting = min(fitting * size[j], len(rows) + 1)
         if count + max(fitting, 1) > len(rows):
             return -1
         for number in range(fitting):
-            _turn_by_number(q[pose], number, (least, size), rows[count])
             away = 0.0
             for j in range(joints):
-                away = max(away, abs(rows[count, j] - q_ref[j]))
+                turned[number, j] = q[pose, j] + TURN * (least[j] + turn[j])
+                away = max(away, abs(turned[number, j] - q_ref[j]))
             at = number
             while at > 0 and away < move[at - 1]:
-                move[at], numbers[at] = move[at - 1], numbers[at - 1]
+                move[at], order[at] = move[at - 1], order[at - 1]
                 at -= 1
-            move[at], numbers[at] = away, number
+            move[at], order[at] = away, number
+            _next_turn(turn, size)
         for k in range(fitting):
-            _turn_by_number(q[pose], numbers[k], (least, size), rows[count + k])
+            copy_values(turned[order[k]], rows[count + k])
         if fitting == 0:
             fitting = 1
             for j in range(joints):
@@ -252,12 +253,13 @@ def turned_alone(q: Reals, q_ref: Reals, limits: tuple[Reals, Reals], rows: Real
 
 
 @inner_kernel
-def _turn_by_number(q: Reals, number: int, turns: tuple[Reals, Integers], row: Reals) -> None:
-    """Fill in joints (n,) with the turns of that number, those of the last joint counted first."""
-    least, size = turns
-    for j in range(len(q) - 1, -1, -1):
-        row[j] = q[j] + TURN * (least[j] + number % size[j])
-        number //= size[j]
+def _next_turn(turn: Integers, size: Integers) -> None:
+    """Count one on, the last joint (n,) first."""
+    for j in range(len(turn) - 1, -1, -1):
+        turn[j] += 1
+        if turn[j] < size[j]:
+            return
+        turn[j] = 0
 
 
 @inner_kernel

@@ -13,7 +13,7 @@ from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.numerical import _E, _ROWS, _TARGET, LANES, _evaluate, all_found, new_lanes, solve, uniform
+from er3a.kinematics.numerical import all_found, evaluate, new_room, solve, uniform
 from er3a.kinematics.wrist_partitioned import wrist_partitioned_arm
 from er3a.pipeline.messages import kinematics  # noqa: F401
 from er3a.pipeline.messages.say import say
@@ -66,20 +66,16 @@ def test_singular_poses_are_solved(robot, random, kind):
 
 @pytest.mark.long
 def test_jacobian_of_the_error_is_its_derivative(robot, random):
-    """Lane k of the scratch memory holds the arm with joint k moved a little."""
-    arm = robot.direction, robot.offset, constant_links(robot), robot.sliding, np.empty((0, 6)), np.ones(6)
-    step, targets = 1e-6, joints_at_random(robot, random, 20)
-    for q, target in zip(joints_at_random(robot, random, 20), targets):
-        lanes = new_lanes(arm)
-        w, J = lanes.w.reshape(_ROWS, LANES), lanes.J.reshape(6, 6, LANES)
-        w[_TARGET : _TARGET + 12] = forward(robot, target)[:3].reshape(12, 1)
-        moves = np.concatenate([step * np.eye(6), -step * np.eye(6), np.zeros((LANES - 12, 6))])
-        lanes.q.reshape(6, LANES)[:] = (q + moves).T
-        _evaluate(arm, np.ones(6), 0.7, lanes)
-        errors = w[_E : _E + 6]
-        if np.linalg.norm(errors[3:, 12]) < 2.8:
-            by_differences = (errors[:, :6] - errors[:, 6:12]) / (2 * step)
-            np.testing.assert_allclose(J[:, :, 12].T, by_differences, atol=1e-6)
+    arm = robot.direction[:, None] * np.eye(6), robot.offset, constant_links(robot), robot.sliding
+    step, goal, room = 1e-6, (np.ones(6), np.zeros(2), 0.7), new_room(arm)
+    for q, target in zip(joints_at_random(robot, random, 20), joints_at_random(robot, random, 20)):
+        T, errors = forward(robot, target), []
+        for move in (*(step * np.eye(6)), *(-step * np.eye(6)), np.zeros(6)):
+            evaluate(arm, goal, T, q + move, room)
+            errors.append(room.e.copy())
+        if np.linalg.norm(errors[12][3:]) < 2.8:
+            by_differences = (np.array(errors[:6]) - errors[6:12]).T / (2 * step)
+            np.testing.assert_allclose(room.J, by_differences, atol=1e-6)
 
 
 def test_start_guess_decides_which_arm_is_found(robot, random):

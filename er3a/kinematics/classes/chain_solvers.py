@@ -31,8 +31,9 @@ PREFERENCE = tuple(class_solvers.ARM_CLASSES)
 
 
 @dataclass(frozen=True, eq=False)
-class LockedJoint:
-    """More than six joints, one of which is held at a value; ``rest`` solves the others."""
+class LockedJoint(class_solvers.WithoutParameters):
+    """More than six joints, one of which is held at a value; ``rest`` solves the others. Self-motions are collected
+    over the value."""
 
     links: Reals
     sliding: Flags
@@ -94,19 +95,6 @@ class LockedJoint:
         if self.rest is None or not self.rest.parameters:
             return own
         return np.concatenate([own, self.rest.values_of(np.delete(x, self.joint, axis=-1))], axis=-1)
-
-    def seeds(self, T: Reals) -> list[Reals]:
-        """No members of continua: self-motions of redundant arms are collected over the parameter.
-
-        Parameters
-        ----------
-        T : (4, 4), m
-
-        Returns
-        -------
-        seeds : none
-        """
-        return []
 
     def names(self, x: Reals) -> tuple[class_solvers.SlotName, ...]:
         """The rest's slot names; none if the rest differs from value to value.

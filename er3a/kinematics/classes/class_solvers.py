@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from er3a.geometry.vectors import TURN, Vector
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
-from er3a.kinematics.classes.parallel_axes import ThreeParallel
+from er3a.kinematics.classes.parallel_axes import ThreeParallel, solve_parallel_blocks
 from er3a.kinematics.classes.scara import Gantry, Scara, solve_gantry, solve_scara
 from er3a.kinematics.classes.self_motion import PoseChain
 from er3a.kinematics.classes.six_revolute import CERTAIN, CONTINUUM, RowsFound
@@ -88,6 +89,8 @@ ARM_CLASSES: dict[ArmClassCode, ArmClassTraits] = {
 - ``dependent``: fewer degrees of freedom than joints (six at most), for example two parallel slides: each pose within
   reach has infinitely many solutions; ``unsolved``: none of these.
 """
+Branches = tuple[Reals, Flags, tuple[NDArray[np.int8], Reals] | None]
+AS_IN_TABLE = for_kernel(np.ones(6)), for_kernel(np.zeros(6))  # direction and offset of row values
 ALL_OF_POSE = ArmClassTraits().task
 
 BranchLabel = Literal[
@@ -203,7 +206,7 @@ class ChainSolver(Protocol):
 
 
 class WithoutParameters:
-    """A class without parameters."""
+    """A class without parameters, or what one with parameters has of it: no seeds and no names."""
 
     parameters: tuple[Redundancy, ...] = ()
 
@@ -269,13 +272,30 @@ class SphericalWristSolver(WithoutParameters):
         q : (N, 8, 6), rad, NaN in empty slots
         certainty : (N,), CONTINUUM where branches meet or the wrist centre is next to axis 1, else CERTAIN
         """
-        shape = len(T), 8
-        q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
-        plain = for_kernel(np.ones(6)), for_kernel(np.zeros(6))
-        solve(self.constants, plain, for_kernel(T), for_kernel(np.zeros((len(T), 6))), True, True, (q, fault, gap))
-        q[fault != REACHED] = np.nan
+        q, *_ = self.branches(np.ascontiguousarray(T, dtype=float))
         singular = _branches_meet(q, ((4, 0), (2, 2), (1, 4))) | (self._beside_axis_1(T) < NEAR_SINGULAR)
         return q, np.where(singular, CONTINUUM, CERTAIN)
+
+    def branches(self, T: Reals) -> Branches:
+        """All eight branches, without a look at how near they are to singular poses.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m, contiguous
+
+        Returns
+        -------
+        q : (N, 8, 6), rad, NaN in empty slots
+        marked : (N,), False: where branches meet both have a row
+        fault, gap : (N, 8), of empty slots, as of :func:`er3a.kinematics.wrist_partitioned.solve_slots`
+        """
+        shape = len(T), 8
+        q, fault, gap = np.full((*shape, 6), np.nan), np.zeros(shape, dtype=np.int8), np.zeros(shape)
+        T, free = T.view(), np.zeros((len(T), 6))
+        T.flags.writeable = free.flags.writeable = False
+        solve(self.constants, AS_IN_TABLE, T, free, True, True, (q, fault, gap))
+        q[fault != REACHED] = np.nan
+        return q, np.zeros(len(T), dtype=bool), (fault, gap)
 
     def _beside_axis_1(self, T: Reals) -> Reals:
         """Distance (N,) of the wrist centre from axis 1, in parts of the reach; next to it that joint is free."""
@@ -326,6 +346,23 @@ class ParallelAxes(WithoutParameters):
             certainty[n] = CONTINUUM if any(chain.smallest(x) < RANK_LOST for x in solved) else CERTAIN
         return q, certainty
 
+    def branches(self, T: Reals) -> Branches:
+        """All eight branches, without a look at how near they are to singular poses.
+
+        Parameters
+        ----------
+        T : (N, 4, 4), m, contiguous
+
+        Returns
+        -------
+        q : (N, 8, 6), rad, NaN in empty slots
+        marked : (N,), where branches meet, so that rounding may have lost both
+        unsolved : nothing is said of empty slots
+        """
+        q, marked = np.empty((len(T), self.slots, 6)), np.empty(len(T), dtype=bool)
+        solve_parallel_blocks(self.arm.constants, T, 0.0, q, marked)
+        return q, marked, None
+
     def seeds(self, T: Reals) -> list[Reals]:
         """Two members of each range of each four-bar, with both elbows.
 
@@ -358,6 +395,10 @@ class ParallelAxes(WithoutParameters):
         return _names_by_side(self.arm.links, self.arm.constants.wrist_in_tool, x)
 
 
+BranchSolver = SphericalWristSolver | ParallelAxes
+"""Classes whose eight branches are known where no joint is free and no two meet, without a second look."""
+
+
 @dataclass(frozen=True, eq=False)
 class EliminationSolver(WithoutParameters):
     """Any six joints of which at most two slide."""
@@ -384,8 +425,8 @@ class EliminationSolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ArmAngle:
-    """Seven joints with a spherical shoulder and wrist."""
+class ArmAngle(WithoutParameters):
+    """Seven joints with a spherical shoulder and wrist; self-motions are collected over the arm angle."""
 
     arm: ArmAngleArm
     code: ArmClassCode = "arm_angle"
@@ -420,19 +461,6 @@ class ArmAngle:
         values : (..., 1), rad
         """
         return arm_angles_of(self.arm, x)[..., None]
-
-    def seeds(self, T: Reals) -> list[Reals]:
-        """No members of continua: self-motions of redundant arms are collected over the arm angle.
-
-        Parameters
-        ----------
-        T : (4, 4), m
-
-        Returns
-        -------
-        seeds : none
-        """
-        return []
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
         """Names by the roots of shoulder, elbow and wrist.

@@ -174,6 +174,33 @@ def null_vector(M: Reals, columns: Integers, one: int, pivots: int, v: Reals) ->
 
 
 @kernel
+def miss_and_pivot(links: Reals, T: Reals, rows: Reals) -> tuple[float, float]:
+    """How well rows solve a pose, and how near the nearest of them is to a singular one. Kernel.
+
+    Parameters
+    ----------
+    links : (7, 4, 4), in units of the chain's size
+    T : (4, 4), the pose, in these units
+    rows : (S, 6), rad, all joints revolute; rows of NaN are left out
+
+    Returns
+    -------
+    off : by how much an entry of a row's transform is off at most, parts of 1 and of the size; 0 without rows
+    pivot : the smallest of the last pivots' ratios; 1 without rows
+    """
+    w, J, columns, sliding = np.empty((2, 4, 4)), np.empty((6, 7)), np.zeros(6, np.int64), np.zeros(6, np.bool_)
+    off, pivot = 0.0, 1.0
+    for k in range(rows.shape[0]):
+        if not np.isnan(rows[k, 0]):
+            residual_and_jacobian(links, sliding, T, rows[k], w, J)
+            for i in range(3):
+                for j in range(4):
+                    off = max(off, abs(w[0, i, j] - T[i, j]))
+            pivot = min(pivot, pivoted(J, columns))
+    return off, pivot
+
+
+@kernel
 def _step(J: Reals, columns: Integers, dq: Reals) -> None:
     """The step that solves an eliminated system; 0 in directions without a pivot."""
     first = abs(J[0, 0])

@@ -30,6 +30,7 @@ SOLVES = 1e-11  # error (rad, parts of the size) at which Newton's steps may sto
 ON_CURVE = 2e-10  # of each component, in parts of the size: sums of three stay below the 1e-9 that rows are held to
 SOLVES_AS_ROOT = 1e-12  # error, rad or parts of the size, that a root may have
 ABOVE_ROUNDING = 1e-15  # of the trace
+MIN_PIVOT = 1e-15  # keeps the root of a pivot that rounding has made negative
 FEW_HALVINGS = 6  # of a step that does not come back to the curve, to 1/32 of it
 SHORTEST = np.radians(6.0)  # what ends on both sides nearer than so is a root of high order
 PROBE = 2e-3  # rad or parts of the size: a step along the null space, which must stay on the pose
@@ -86,18 +87,20 @@ def _without_what_is_open(T: Reals, task: int, frame: Reals, e: Reals, J: Reals)
 
 
 @inner_kernel
-def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:  # noqa: C901, PLR0912
-    """The shortest solution of a linear system with independent rows, by Cholesky's factors of ``J J^T``. Kernel.
+def shortest_step(J: Reals, e: Reals, damping: float, out: Reals) -> bool:  # noqa: C901, PLR0912
+    """The shortest solution of a linear system, damped or with independent rows, by Cholesky's factors of
+    ``J J^T + damping``. Kernel.
 
     Parameters
     ----------
-    J : (6, n), n of at least 6
+    J : (6, n), n of at least 6 unless damped
     e : (6,), right side
-    out : (n,), filled with the shortest x of ``J x = e``
+    damping : added to the diagonal of ``J J^T``
+    out : (n,), filled with the shortest x of ``J x = e``, or with the damped one
 
     Returns
     -------
-    regular : False if J is nearly dependent; then ``out`` means nothing
+    regular : False if J is nearly dependent; then ``out`` means nothing, unless it is damped
     """
     n = J.shape[1]
     M, y = np.empty((6, 6)), np.empty(6)
@@ -108,13 +111,14 @@ def shortest_step(J: Reals, e: Reals, out: Reals) -> bool:  # noqa: C901, PLR091
             for k in range(n):
                 total += J[r, k] * J[c, k]
             M[r, c] = total
+        M[r, r] += damping
         most = max(most, M[r, r])
     for c in range(6):
         for k in range(c):
             M[c, c] -= M[c, k] * M[c, k]
-        if not M[c, c] > REGULAR * most:
+        if damping == 0.0 and not M[c, c] > REGULAR * most:
             return False
-        M[c, c] = np.sqrt(M[c, c])
+        M[c, c] = np.sqrt(max(M[c, c], MIN_PIVOT))
         for r in range(c + 1, 6):
             for k in range(c):
                 M[r, c] -= M[r, k] * M[c, k]
@@ -156,7 +160,7 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
         for r in range(6):
             for k in range(n):
                 moved[r] += J[r, k] * v[k]
-        if shortest_step(J, moved, out):
+        if shortest_step(J, moved, 0.0, out):
             for k in range(n):
                 out[k] = v[k] - out[k]
             return n - 6
@@ -196,7 +200,7 @@ def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
         if error > 0.5:
             return error
         smallest = min(smallest, error)
-        if x.shape[0] > 6 and shortest_step(J, e, step):
+        if x.shape[0] > 6 and shortest_step(J, e, 0.0, step):
             for k in range(x.shape[0]):
                 x[k] += step[k]
             continue
