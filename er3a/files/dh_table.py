@@ -18,7 +18,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -101,7 +101,7 @@ def read_dh_table(
         }
     notes = [*printed.notes]
     notes += _in_own_units(
-        path, rows, length_unit, angle_unit, as_printed, own={*converted}, without_unit=printed.without_unit
+        path, rows, length_unit, angle_unit, as_printed, own={*converted}, printed=printed
     )
     short = _short_lengths(path, rows, {*converted}, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
@@ -288,20 +288,21 @@ def _in_own_units(
     as_printed: bool,
     *,
     own: set[str],
-    without_unit: frozenset[str],
+    printed: PrintedTable,
 ) -> Iterator[str]:
     """Take all values to mm and degrees, and doubt or refuse those that are another unit's.
 
     Lengths and twists are taken for what they can only be if no heading says their unit. Otherwise such lengths are
     refused, with ``as_printed`` doubted, and such twists stay degrees, with a note.
-    ``own``: columns that said their unit; ``without_unit``: those whose headings say none.
+    ``own``: columns that said their unit.
     """
+    without_unit = printed.without_unit
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unsaid = {"a_mm", "d_mm"} - own <= without_unit
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
-    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
+    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid, printed.said_unit)
     if unit != (length_unit or "mm"):
-        word = {"m": "metres", "in": "inches"}[unit]
+        word = {"m": "metres", "cm": "centimetres", "in": "inches"}[unit]
         yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
@@ -324,13 +325,16 @@ def _in_own_units(
                 row[column] = _converted(column, value, scale)
 
 
-def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool) -> LengthUnit:
-    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted."""
+def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool, said: str) -> LengthUnit:
+    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted.
+    ``said``: what the text around the table says, which decides between units that are all likely."""
     likely = _likely_unit(lengths) if lengths else "mm"
     longest = max(lengths, default=0.0)
     # A small arm in mm, or a large one in cm, and no other for sure.
     small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
     if unsaid and small and (likely == "mm" or all(length == round(length) for length in lengths)):
+        if said in ("mm", "cm", "in"):
+            return cast(LengthUnit, said)
         problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
         raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
     if likely == "mm":

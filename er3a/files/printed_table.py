@@ -32,17 +32,19 @@ NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
 _NUMBERED = re.compile(r"\d")
+_OF_LENGTHS = re.compile(r"(?:length|dimension|unit|长度|单位)[^.\n]*")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\(t\)", ""),
+    (r"\((?:t|var(?:iable|\.)?|变量)\)", ""),
+    (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
-    (r"\*+(?=$|\s*[-+])", ""),
+    (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
-_STARRED = re.compile(r"^\*$|\w\*+\s*(?:$|[-+])")
+_STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"[^\W\d]+\.?\s*\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
@@ -57,18 +59,19 @@ SIGNS = {
 """What a text around a table says of its convention."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n(])+?)"
-    r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b)?"
+    r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
 
 @dataclass(frozen=True)
 class PrintedTable:
     """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither the
-    heading nor cells say the unit."""
+    heading nor cells say the unit; the unit of lengths that the text says."""
 
     lines: Lines
     notes: tuple[str, ...]
     without_unit: frozenset[str] = frozenset()
+    said_unit: str = ""
 
 
 MAX_BYTES = 200_000
@@ -173,9 +176,9 @@ def is_printed_table(header: Iterable[str]) -> bool:
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    for grids, kind in _read(text, columns):
-        if tables := [table for grid in grids for table in _headed(grid, columns)]:
-            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
+    for grids, from_code in _read(text, columns):
+        if tables := [_trimmed(table) for grid in grids for table in _headed(grid, columns)]:
+            return tables, from_code
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -183,15 +186,15 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     return [], False
 
 
-def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
-    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
+def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], bool]]:
+    """What each reader makes of a text, and whether it reads programs."""
     if columns:
-        yield code_grids(text, headed=False), "program"
-    yield html_grids(text) or latex_grids(text), "marks"
-    yield code_grids(text), "program"
-    for mark, grid in line_grids(text):
-        yield [grid], "blanks" if mark in ("  ", " ") else "marks"
-    yield _stacked(text), "marks"
+        yield code_grids(text, headed=False), True
+    yield html_grids(text) or latex_grids(text), False
+    yield code_grids(text), True
+    for grid in line_grids(text):
+        yield [grid], False
+    yield _stacked(text), False
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -237,7 +240,7 @@ def _with_units(header: list[str], cells: list[str]) -> list[str]:
 
 
 def _trimmed(table: Grid) -> Grid:
-    """A table without what follows its last known column, where headings or cells hold blanks."""
+    """A table without what follows its last known column, with a heading for names of joints that have none."""
     header = table[0][1]
     firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
     counted = firsts in ([str(n + start) for n in range(len(table) - 1)] for start in (0, 1))
@@ -285,7 +288,7 @@ class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
-        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
+        self.path, self.whole, self.notes, self.unsaid = path, text, list[str](), set[str]()
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         check_widths(path, [(0, self.header), *self.rows])
         found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
@@ -328,12 +331,13 @@ class _Table:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
-        said = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        said |= {name for name, sign in SIGNS.items() if sign.search(near)}
-        for one in CONVENTIONS if len(said) == 1 else ():
-            if one in said:
-                self.notes.append(f"the text says {one} D-H, and was read so")
-                return one
+        library = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
+        for part in (near, text):
+            said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
+            for one in CONVENTIONS if len(said) == 1 else ():
+                if one in said:
+                    self.notes.append(f"the text says {one} D-H, and was read so")
+                    return one
         return None
 
     def _given(self) -> dict[str, str]:
@@ -380,7 +384,10 @@ class _Table:
         if unused:
             self.notes.append(f"not used: {', '.join(unused)}")
         made = [(line, list(cells)) for (line, _), cells in zip(self.rows, zip(*self.columns.values()))]
-        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid))
+        words = " ".join(_OF_LENGTHS.findall(self.whole.lower()))
+        units = {UNITS[word] for word in re.findall(r"[^\W\d_]+", words) if word != "in" and UNITS.get(word) in PER_MM}
+        said = units.pop() if len(units) == 1 else ""
+        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid), said)
 
     def _amounts(self, k: int) -> list[CellAmount | None]:
         """The amounts of a column's cells; None for an empty one."""
@@ -423,6 +430,7 @@ class _Table:
         if k is not None:
             return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
+        blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         moving = any(turns) or any(starred)
         names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
@@ -431,7 +439,8 @@ class _Table:
         found = []
         for row, name in enumerate(names):
             kind = "tool" if _TOOL.search(name.lower()) else "fixed"
-            if turns[row] or not (moving or (row in ends and name)):
+            unsaid = blank[row] and not slides[row] and row not in ends
+            if turns[row] or (unsaid if moving else not (row in ends and name)):
                 kind = "revolute"
             elif slides[row] and (starred[row] or any(turns)):
                 kind = "prismatic"

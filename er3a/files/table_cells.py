@@ -121,7 +121,7 @@ def latex_grids(text: str) -> list[Grid]:
     return found
 
 
-def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
+def line_grids(text: str) -> Iterator[Grid]:
     """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
     text = plain(text)
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
@@ -132,16 +132,17 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     ]
     for mark in MARKS:
         if mark in ";,\t":
-            yield mark, _delimited(text, mark)
+            yield _delimited(text, mark)
         elif mark.isspace():
-            yield mark, [(number, _spaced(without_latex(line), mark)) for number, line in lines]
+            yield [(number, _spaced(without_latex(line), mark)) for number, line in lines]
         else:
-            yield mark, [(number, _edged(line, mark)) for number, line in lines]
+            yield [(number, _edged(line, mark)) for number, line in lines]
 
 
 def _edged(line: str, mark: str) -> list[str]:
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
-    return cells[not cells[0] : len(cells) - (not cells[-1])]
+    framed = not cells[0]  # otherwise an empty cell at the end is one of the table's
+    return cells[framed : len(cells) - (framed and not cells[-1])]
 
 
 def _delimited(text: str, mark: str) -> Grid:

@@ -35,6 +35,7 @@ LIBRARIES = {
     "sympybotics": ("alpha,a,d,theta", ""),
 }
 """Columns of a matrix, and the convention, by a name of the library that takes it."""
+_TAKEN_APART = re.compile(r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*(?:\bin\b|=(?!=))")
 _INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
@@ -371,11 +372,11 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 
 def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
-    """A matrix with a line for each row, of YAML: ``joint1: [0, 270, 0, 0]``."""
+    """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
     rows = list[tuple[int, list[str]]]()
     for group in sorted(groups, key=lambda each: each.start):
-        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:)\s*$", group.before)
-        if group.bracket == "[" and label and "[" not in group.inside:
+        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
+        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             if (
                 4 <= len(cells) <= 8
@@ -404,8 +405,10 @@ def _symbols(row: list[str]) -> list[str]:
 
 
 def _order(code: Code, first: int, last: int, width: int) -> list[str]:
+    """The names of a matrix's columns: of a comment at it, of names into which its rows are taken apart, of a library."""
     near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
-    for comment in reversed(near):
+    taken = {re.sub(r"\s", "", names) for names in _TAKEN_APART.findall(code.text)}
+    for comment in (*reversed(near), *(taken if len(taken) == 1 else ())):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):
@@ -433,7 +436,7 @@ def _lists(code: Code) -> dict[str, list[str]]:
     """The lists of a program by their names, each multiplied by what is written after it."""
     found: dict[str, list[str]] = {}
     for group in groups_of(code.text):
-        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?$", group.before)
+        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before)
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
@@ -455,16 +458,24 @@ def _vectors(code: Code) -> list[Grid]:
     columns = {quantity: cells for quantity, cells in named.items() if len(cells) == length}
     if not {"a", "alpha", "d"} <= {*columns}:
         return []
-    if any(re.sub(r"[0.,()\s]", "", cell) and not re.search(r"[^\W\d]", cell) for cell in columns.pop("theta", [])):
+    theta = [re.sub(r"\b(?:\w+[._])?pi\b", "1", cell, flags=re.I) for cell in columns.get("theta", [])]
+    if not any(re.search(r"[^\W\d]", cell) for cell in theta):
+        columns.pop("theta", None)
+        theta = [cell for cell in theta if re.sub(r"[0.,()\s]", "", cell)]
+    if theta and "theta" not in columns:
         problem = "the list theta may hold zeros of the joints, or a pose"
         raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
-    return [_columns(1, {key: cells for key, cells in columns.items() if key in ("a", "alpha", "d", "offset")})]
+    return [_columns(1, {key: cells for key, cells in columns.items() if key in ("a", "alpha", "d", "theta", "offset")})]
 
 
 def _pairs(code: Code) -> list[Grid]:
     """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(alpha|theta|a|d|q|r)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
-    entries = {(name, int(number)): (value.strip(), place) for name, number, value, place in _found(pattern, code.text)}
+    pattern = r"\b(?:DH_)?(alpha|theta|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
+    entries = {
+        (name.rpartition("_")[2], int(number)): (value.strip(), place)
+        for name, number, value, place in _found(pattern, code.text)
+    }
+    found_names = {name for name, _ in entries}
     joints = sorted(number for name, number in entries if name == "d")
     shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
     rows = list[tuple[int, dict[str, str]]]()
@@ -476,8 +487,11 @@ def _pairs(code: Code) -> list[Grid]:
             return []
         names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
         row = {name: cell[0] for name, cell in zip(names, cells) if cell}
-        rows.append((code.line(cells[2][1] if cells[2] else 0), {"joint": str(joint)} | row | {"theta": angle[0]}))
-    angles = {name for name, _ in entries} & {"q", "theta"}  # else they may be in a matrix of these symbols
+        row |= {"joint": str(joint), "theta": angle[0]}
+        if "offset" in found_names:
+            row["offset"] = entries.get(("offset", joint), ("0", 0))[0]
+        rows.append((code.line(cells[2][1] if cells[2] else 0), row))
+    angles = found_names & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
     return [_grid(rows)] if len(rows) > 1 and angles else []
 
 
