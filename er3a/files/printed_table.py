@@ -36,7 +36,7 @@ _OF_LENGTHS = re.compile(r"(?:length|dimension|unit|长度|单位)[^.\n]*")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\((?:t|var(?:iable|\.)?|变量)\)", ""),
+    (r"\((?:t|fixed|var(?:iable|\.)?|变量)\)", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
@@ -58,8 +58,8 @@ SIGNS = {
 }
 """What a text around a table says of its convention."""
 _GIVEN = re.compile(
-    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n(])+?)"
-    r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
+    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
+    r"(?=[),;，；。%#≈`\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
 
@@ -301,6 +301,7 @@ class _Table:
         self.convention = self._stated(text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
+        text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
@@ -419,6 +420,9 @@ class _Table:
         names = {name: times for name, times in found.variables.items() if times}
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
+        for name in names:
+            if self.headings[k].quantity == "theta" and not _NUMBERED.search(name) and not heading_of(name):
+                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
         if {*map(abs, names.values())} - {1.0}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)

@@ -433,25 +433,31 @@ def elements(text: str) -> dict[str, str]:
 
 
 def _lists(code: Code) -> dict[str, list[str]]:
-    """The lists of a program by their names, each multiplied by what is written after it."""
-    found: dict[str, list[str]] = {}
+    """The lists of a program by their names; the last of a name that has several."""
+    return {name: cells for name, cells, _ in _named_lists(code)}
+
+
+def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int]]:
+    """The name and the cells of each list, multiplied by what is written after it, and its line."""
     for group in groups_of(code.text):
         name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before)
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
-        found[name[1]] = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
-    return found
+        cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+        yield name[1], cells, code.line(group.start)
 
 
 def _vectors(code: Code) -> list[Grid]:
     """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
     named: dict[str, list[str]] = {}
-    for name, cells in _lists(code).items():
+    for name, cells, line in _named_lists(code):
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         if heading and len(cells) > 1:
-            named.setdefault(heading.quantity, cells)
+            quantity = heading.quantity
+            if named.setdefault(quantity, cells) != cells and quantity != "theta":  # poses may follow
+                raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     length = len(named["alpha"])
