@@ -405,7 +405,7 @@ def _symbols(row: list[str]) -> list[str]:
 
 
 def _order(code: Code, first: int, last: int, width: int) -> list[str]:
-    """The names of a matrix's columns: of a comment at it, of names into which its rows are taken apart, of a library."""
+    """The names of a matrix's columns, of a comment, of what its rows are taken apart into, or of a library."""
     near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
     taken = {re.sub(r"\s", "", names) for names in _TAKEN_APART.findall(code.text)}
     for comment in (*reversed(near), *(taken if len(taken) == 1 else ())):
@@ -440,7 +440,9 @@ def _lists(code: Code) -> dict[str, list[str]]:
 def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int]]:
     """The name and the cells of each list, multiplied by what is written after it, and its line."""
     for group in groups_of(code.text):
-        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before)
+        name = re.search(
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+        )
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
@@ -471,7 +473,8 @@ def _vectors(code: Code) -> list[Grid]:
     if theta and "theta" not in columns:
         problem = "the list theta may hold zeros of the joints, or a pose"
         raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
-    return [_columns(1, {key: cells for key, cells in columns.items() if key in ("a", "alpha", "d", "theta", "offset")})]
+    used = "a", "alpha", "d", "theta", "offset"
+    return [_columns(1, {key: columns[key] for key in used if key in columns})]
 
 
 def _pairs(code: Code) -> list[Grid]:
