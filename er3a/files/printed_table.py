@@ -422,7 +422,10 @@ class _Table:
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
         for name in names:
-            if self.headings[k].quantity == "theta" and not _NUMBERED.search(name) and not heading_of(name):
+            own = heading_of(name)
+            if self.headings[k].quantity == "theta" and not (
+                _NUMBERED.search(name) or (own and own.quantity == "theta")
+            ):
                 self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
         if {*map(abs, names.values())} - {1.0}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")

@@ -215,6 +215,9 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "one of them",
         ),
         ("a (mm),alpha (deg),d (mm)\n0,pi/2°,3\n", "one unit|without a unit"),
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
+        ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -273,6 +276,32 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
     values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
     content, _ = read(tmp_path, values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
     np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\ntheta = [q1, q2 - pi/2]",
+        "robot.DH.theta= '[q(1) q(2)-pi/2]';\nrobot.DH.d='[0.29 0]';\n"
+        "robot.DH.a='[0 0.27]';\nrobot.DH.alpha='[-pi/2 0]';",
+        "double DH_a1=0, DH_a2=0.27;\ndouble DH_d1=0.29, DH_d2=0;\ndouble DH_alpha1=-M_PI/2, DH_alpha2=0;\n"
+        "double DH_q_offset1=0, DH_q_offset2=-M_PI/2;",
+        "% a alpha d theta\ndh(1,:) = [0 -pi/2 0.29 0];\ndh(2,:) = [0.27 0 0 -pi/2];",
+        "dh = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\nfor i, (a, alpha, d, theta_offset) in enumerate(dh):",
+        "i | alpha | a | d | theta\n--|--|--|--|--\n1 | -pi/2 | 0 | 0.29 | \n2 | 0 | 0.27 | 0 | θ2-pi/2\n",
+        "| theta | d | a | alpha\nJ0 | t0 | 290 | 0 | -90°\nJ1 | t1-90 | 0 | 270 | 0°\n",
+        "| i | a [mm] | α [°] | d [mm] | θ |\n|1|0|-90|290[mm]|$q_1^*$|\n|2|270|0|0|`q2` - β (variable)|\n\n"
+        "**Note:** `β = 90°`.",
+    ],
+)
+def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+def test_the_text_decides_between_units_that_are_all_likely(tmp_path):
+    content, _ = read(tmp_path, "Lengths are in cm.\n\na,alpha,d\n15,90,20\n30,0,0\n")
+    np.testing.assert_allclose([row.a_mm for row in content.dh.rows], [150, 300])
 
 
 def test_links_are_in_the_order_of_their_arm(tmp_path):
