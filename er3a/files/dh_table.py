@@ -222,16 +222,13 @@ def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], conventio
     """Make a fixed transform (4, 4), mm, part of the link between two rows."""
     link = before if convention == "standard" else after
     T = _across(link) @ fixed if convention == "standard" else fixed @ _across(link)
-    (x, y, z), (u, v, w) = T[:3, 3], T[:3, 2]
+    (x, y, z), (u, v, w) = np.round(T[:3, 3], DIGITS) + 0.0, T[:3, 2]
     sine = math.hypot(u, v)
-    if sine > PARALLEL:
-        turn = math.atan2(u, -v)
-        a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
-        far = -across / sine
-    else:
-        turn, far = (math.atan2(y, x) if math.hypot(x, y) > 10.0**-DIGITS else 0.0), 0.0
-        a = math.hypot(x, y)
-    alpha = math.atan2(sine if sine > PARALLEL else 0.0, w)
+    skew = sine > PARALLEL
+    turn = math.atan2(u, -v) if skew else math.atan2(y, x)
+    a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
+    far = -across / sine if skew else 0.0
+    alpha = math.atan2(sine if skew else 0.0, w)
     rest = rot_x(-alpha) @ rot_z(-turn) @ T
     link |= {"a_mm": round(a, DIGITS), "alpha_deg": round(math.degrees(alpha), DIGITS)}
     if link.get("beta_deg"):

@@ -421,11 +421,9 @@ class _Table:
         names = {name: times for name, times in found.variables.items() if times}
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
-        for name in names:
+        for name in names if self.headings[k].quantity == "theta" else ():
             own = heading_of(name)
-            if self.headings[k].quantity == "theta" and not (
-                _NUMBERED.search(name) or (own and own.quantity == "theta")
-            ):
+            if not (_NUMBERED.search(name) or (own and own.quantity == "theta")):
                 self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
         if {*map(abs, names.values())} - {1.0}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")

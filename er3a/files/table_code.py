@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
@@ -16,6 +16,7 @@ _COMMENT = re.compile(
 _BLOCK = re.compile(
     r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
 )
+_STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
 _ORDERS = {
@@ -68,6 +69,7 @@ def code_of(text: str) -> Code:
     """A program's text without its comments; the numbers of its lines stay."""
     comments: dict[int, str] = {}
     text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+    text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
     def kept(found: re.Match[str]) -> str:
         if found[1] is None and found[2]:
@@ -187,12 +189,10 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
-    for links in chosen:
-        if len(links) > 1 and None not in links:  # the arm's list of named links
-            rows = [link for link in links if link]
+    named = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
     lists = [each for each in lists if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in lists or _begun_again(rows)]
+    return [_grid([(row.line, row.cells) for row in each]) for each in named or lists or _begun_again(rows)]
 
 
 @dataclass(frozen=True)
@@ -204,13 +204,20 @@ class _Link:
 
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
-    """Links by the arms that they belong to: a name that is used again begins another arm."""
+    """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
     arms: list[list[_Link]] = []
     for row in rows:
-        if not arms or (row.name and any(row.name == other.name for other in arms[-1])):
+        last = arms[-1] if arms else []
+        again = row.name and any(row.name == other.name for other in last)
+        if again or not last or _list_of(row) != _list_of(last[-1]):
             arms.append([])
         arms[-1].append(row)
     return arms
+
+
+def _list_of(row: _Link) -> str:
+    """The name of the list that holds a link ``L(2)``; "" if it is in none."""
+    return "".join(re.findall(r"(.*)[(\[{]", row.name))
 
 
 def _arguments(function: str, text: str) -> dict[str, str] | None:
@@ -232,8 +239,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         elif part:
             given.append(part)
     if toolbox is None:
-        quantities = {found.quantity for key in cells if (found := heading_of(key))}
-        return cells if "alpha" in quantities and quantities & {"a", "d"} and not given else None
+        return cells if _is_row(cells) and not given else None
     if len(given) == 1 and given[0].startswith("["):
         order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
@@ -293,16 +299,21 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
     return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
 
 
+def _is_row(cells: Iterable[str]) -> bool:
+    """Whether keys are those of a D-H row."""
+    quantities = {found.quantity for key in cells if (found := heading_of(key))}
+    return "alpha" in quantities and bool(quantities & {"a", "d"})
+
+
 def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
     rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
     for each in sorted(groups, key=lambda group: group.start):
         if each.bracket != "{":
             continue
-        pairs = [part.partition(":")[::2] for part in parts(each.inside) if ":" in part]
-        cells = {key.strip(" \"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
-        quantities = {found.quantity for key in cells if (found := heading_of(key))}
-        if not ("alpha" in quantities and quantities & {"a", "d"}):
+        pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
+        cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+        if not _is_row(cells):
             continue
         lists = {key: row_cells(value[1:-1]) for key, value in cells.items() if value[:1] == "["}
         line = code.line(each.start)
@@ -328,11 +339,7 @@ def _blocks(code: Code) -> list[Grid]:
             rows.append((number, label))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [
-        (line, cells)
-        for line, cells in rows
-        if {"alpha", "d"} <= {each.quantity for key in cells if (each := heading_of(key))}
-    ]
+    full = [(line, cells) for line, cells in rows if _is_row(cells)]
     return [_grid(full)] if len(full) > 1 else []
 
 

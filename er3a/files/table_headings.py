@@ -26,6 +26,7 @@ _WORDS = words_of(
 """Each marks a heading that holds it; the first that is found counts."""
 _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
 _PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|speed)_\w+|(?:beta|theta)_(?:deg|rad)")
+_OF_RANGES = re.compile(r"(?i)(?<![a-z])(?:min|max|range|limit)|范围|限")
 _LETTER = re.compile(r"[^\W\d_]|#")
 _BEFORE = re.compile(r"[ijn]-1")
 
@@ -56,7 +57,7 @@ def heading_of(text: str) -> Heading | None:
     """
     if own := _OURS.fullmatch(text):
         return Heading(own[1] or own[2], own[3] or "", False)
-    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text):
+    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text) or _OF_RANGES.search(text):
         return None
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
     said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]

@@ -218,6 +218,10 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
         ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
+        (
+            "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
+            "one of them",
+        ),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -288,6 +292,10 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
         "double DH_q_offset1=0, DH_q_offset2=-M_PI/2;",
         "% a alpha d theta\ndh(1,:) = [0 -pi/2 0.29 0];\ndh(2,:) = [0.27 0 0 -pi/2];",
         "dh = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\nfor i, (a, alpha, d, theta_offset) in enumerate(dh):",
+        "// a alpha d theta\ndh << 0, -M_PI/2, 0.29, 0,\n 0.27, 0, 0, -M_PI/2;",
+        "DH dh[] = {{.a = 0, .alpha = -M_PI/2, .d = 0.29, .theta = 0},\n"
+        "{.a = 0.27, .alpha = 0, .d = 0, .theta = -M_PI/2}};",
+        "θ (deg);a (mm);α (deg);d (mm);θ range\nq1;0;-90;290;±90\nq2-90;270;0;0;±90\n",
         "i | alpha | a | d | theta\n--|--|--|--|--\n1 | -pi/2 | 0 | 0.29 | \n2 | 0 | 0.27 | 0 | θ2-pi/2\n",
         "| theta | d | a | alpha\nJ0 | t0 | 290 | 0 | -90°\nJ1 | t1-90 | 0 | 270 | 0°\n",
         "| i | a [mm] | α [°] | d [mm] | θ |\n|1|0|-90|290[mm]|$q_1^*$|\n|2|270|0|0|`q2` - β (variable)|\n\n"
