@@ -725,20 +725,14 @@ def _length_slips(robot_a: Robot, robot_b: Robot, only_nearest: bool = False) ->
         if _bears_out(getattr(robot_a, column), getattr(robot_b, column), factor)
     ]
     both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
-    mixed = [
-        pair
-        for pair in itertools.combinations(alone, 2)
-        if pair[0].entries != pair[1].entries and (pair[0].side, pair[0].amount) != (pair[1].side, pair[1].amount)
-    ]
-    return [(), *((each,) for each in both), *((each,) for each in alone), *mixed]
+    return [(), *((each,) for each in (*both, *alone))]
 
 
 def _bears_out(one: Reals, other: Reals, factor: float) -> bool:
     """Whether two or more lengths of a column (n,) agree times a factor, and more than without: one alone is an entry
     that is wrong."""
-    filled = one != 0
-    before, after = (int((filled & np.isclose(abs(one) * by, abs(other), 1e-3)).sum()) for by in (1.0, factor))
-    return after > max(before, 1)
+    before, after = (((one != 0) & np.isclose(abs(one) * by, abs(other), 1e-3)).sum() for by in (1.0, factor))
+    return bool(after > max(before, 1))
 
 
 def _likely_factor(ratio: float, only_nearest: bool = False) -> set[float]:

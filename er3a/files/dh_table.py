@@ -18,7 +18,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
@@ -298,9 +298,9 @@ def _in_own_units(
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unsaid = {"a_mm", "d_mm"} - own <= without_unit
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
-    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid, printed.said_unit)
+    unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
     if unit != (length_unit or "mm"):
-        word = {"m": "metres", "cm": "centimetres", "in": "inches"}[unit]
+        word = {"m": "metres", "in": "inches"}[unit]
         yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
@@ -323,16 +323,13 @@ def _in_own_units(
                 row[column] = _converted(column, value, scale)
 
 
-def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool, said: str) -> LengthUnit:
-    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted.
-    ``said``: what the text around the table says, which decides between units that are all likely."""
+def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: bool) -> LengthUnit:
+    """The unit of lengths that no heading says (``unsaid``), or mm; others are refused, with ``as_printed`` doubted."""
     likely = _likely_unit(lengths) if lengths else "mm"
     longest = max(lengths, default=0.0)
     # A small arm in mm, or a large one in cm, and no other for sure.
     small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
     if unsaid and small and (likely == "mm" or all(length == round(length) for length in lengths)):
-        if said in ("mm", "cm", "in"):
-            return cast(LengthUnit, said)
         problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
         raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
     if likely == "mm":

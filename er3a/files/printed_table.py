@@ -32,7 +32,6 @@ NEEDED = frozenset({"a", "alpha", "d"})
 PER_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 OWN = {"type", "theta", "beta", "calibrated", "direction", "convention", "lower", "upper", "speed"}
 _NUMBERED = re.compile(r"\d")
-_OF_LENGTHS = re.compile(r"(?:length|dimension|unit|长度|单位)[^.\n]*")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
@@ -46,7 +45,7 @@ _CELL = (
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
 _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
-_NAMED = re.compile(r"[^\W\d]+\.?\s*\d+\s*:?")
+_NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
@@ -67,12 +66,11 @@ _GIVEN = re.compile(
 @dataclass(frozen=True)
 class PrintedTable:
     """Lines as a file's lines, under er3a's headings; what was read into them, in words; columns of which neither the
-    heading nor cells say the unit; the unit of lengths that the text says."""
+    heading nor cells say the unit."""
 
     lines: Lines
     notes: tuple[str, ...]
     without_unit: frozenset[str] = frozenset()
-    said_unit: str = ""
 
 
 MAX_BYTES = 200_000
@@ -244,8 +242,7 @@ def _trimmed(table: Grid) -> Grid:
     """A table without what follows its last known column, with a heading for names of joints that have none."""
     header = table[0][1]
     firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
-    counted = firsts in ([str(n + start) for n in range(len(table) - 1)] for start in (0, 1))
-    if counted or (len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts))):
+    if len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts)):
         header = ["joint", *header]  # a column of names or numbers that has no heading
         table = [(table[0][0], header), *table[1:]]
     widths = {len(cells) for _, cells in table}
@@ -258,18 +255,32 @@ def _trimmed(table: Grid) -> Grid:
 
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own."""
-    lines = [(n, line) for n, line in enumerate(without_latex(plain(text)).split("\n"), 1) if line.strip()]
-    known = [heading_of(line.strip()) is not None for _, line in lines]
-    for start, width in ((k, w) for k in range(len(lines)) if all(known[k : k + 4]) for w in (6, 5, 4)):
-        cells = [line.strip() for _, line in lines[start:]]
-        if not is_printed_table(cells[:width]) or not all(known[start : start + width]):
-            continue
-        rows = [cells[place : place + width] for place in range(width, len(cells), width)]
-        good = next((n for n, row in enumerate(rows) if len(row) < width or not _numeric(row)), len(rows))
-        if good < len(rows) and re.fullmatch(r"[-\d.]+", rows[good][0]):
-            raise InputError(None, f"line {lines[start][0]}", "cells are missing in the last row", "Add them")
-        return [[(lines[start + n * width][0], row) for n, row in enumerate([cells[:width], *rows[:good]])]]
+    lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
+    cells = [(number, line) for number, line in enumerate(lines, 1) if line]
+    width = 0
+    for place, (_, cell) in enumerate(cells):
+        header = [name for _, name in cells[place - width : place]]
+        if heading_of(cell):
+            width += 1
+        elif is_printed_table(header):
+            return [_rows_of(width, header, cells[place - width :])]
+        else:
+            width = 0
     return []
+
+
+def _rows_of(width: int, header: list[str], cells: list[tuple[int, str]]) -> Grid:
+    """Cells from those of the header on, ``width`` in a row, as far as these are a table's."""
+    grid: Grid = [(cells[0][0], header)]
+    for place in range(width, len(cells), width):
+        row = [cell for _, cell in cells[place : place + width]]
+        if len(row) == width and _numeric(row):
+            grid.append((cells[place][0], row))
+        elif re.fullmatch(r"[-\d.]+", row[0]):
+            raise InputError(None, f"line {cells[0][0]}", "cells are missing in the last row", "Add them")
+        else:
+            break
+    return grid
 
 
 def _turned(grid: Grid) -> list[Grid]:
@@ -289,7 +300,7 @@ class _Table:
     """A table with its headings, of which each cell becomes an amount."""
 
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
-        self.path, self.whole, self.notes, self.unsaid = path, text, list[str](), set[str]()
+        self.path, self.notes, self.unsaid = path, list[str](), set[str]()
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
         check_widths(path, [(0, self.header), *self.rows])
         found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
@@ -386,10 +397,7 @@ class _Table:
         if unused:
             self.notes.append(f"not used: {', '.join(unused)}")
         made = [(line, list(cells)) for (line, _), cells in zip(self.rows, zip(*self.columns.values()))]
-        words = " ".join(_OF_LENGTHS.findall(self.whole.lower()))
-        units = {UNITS[word] for word in re.findall(r"[^\W\d_]+", words) if word != "in" and UNITS.get(word) in PER_MM}
-        said = units.pop() if len(units) == 1 else ""
-        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid), said)
+        return PrintedTable([(0, list(self.columns)), *made], tuple(self.notes), frozenset(self.unsaid))
 
     def _amounts(self, k: int) -> list[CellAmount | None]:
         """The amounts of a column's cells; None for an empty one."""

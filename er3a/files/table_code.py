@@ -36,7 +36,7 @@ LIBRARIES = {
     "sympybotics": ("alpha,a,d,theta", ""),
 }
 """Columns of a matrix, and the convention, by a name of the library that takes it."""
-_TAKEN_APART = re.compile(r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*(?:\bin\b|=(?!=))")
+_UNPACKED = re.compile(r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*(?:\bin\b|=(?!=))")
 _INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
@@ -189,10 +189,10 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
-    named = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
+    arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
     lists = [each for each in lists if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in named or lists or _begun_again(rows)]
+    return [_grid([(row.line, row.cells) for row in each]) for each in arms or lists or _begun_again(rows)]
 
 
 @dataclass(frozen=True)
@@ -412,10 +412,10 @@ def _symbols(row: list[str]) -> list[str]:
 
 
 def _order(code: Code, first: int, last: int, width: int) -> list[str]:
-    """The names of a matrix's columns, of a comment, of what its rows are taken apart into, or of a library."""
+    """The names of a matrix's columns, of a comment, of what its rows are unpacked into, or of a library."""
     near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
-    taken = {re.sub(r"\s", "", names) for names in _TAKEN_APART.findall(code.text)}
-    for comment in (*reversed(near), *(taken if len(taken) == 1 else ())):
+    unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
+    for comment in (*reversed(near), *(unpacked if len(unpacked) == 1 else ())):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):

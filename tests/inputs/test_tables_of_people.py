@@ -307,11 +307,6 @@ def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
 
 
-def test_the_text_decides_between_units_that_are_all_likely(tmp_path):
-    content, _ = read(tmp_path, "Lengths are in cm.\n\na,alpha,d\n15,90,20\n30,0,0\n")
-    np.testing.assert_allclose([row.a_mm for row in content.dh.rows], [150, 300])
-
-
 def test_links_are_in_the_order_of_their_arm(tmp_path):
     made = [f"K{j} = Link('d', 0, 'a', {j / 10}, 'alpha', 0);" for j in (3, 1, 9, 2)]
     content, _ = read(tmp_path, "\n".join([*made, "r = SerialLink([K1 K2 K3], 'name', 'x');"]))
