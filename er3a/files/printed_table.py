@@ -175,9 +175,9 @@ def is_printed_table(header: Iterable[str]) -> bool:
 
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
-    for grids, from_code in _read(text, columns):
-        if tables := [_trimmed(table) for grid in grids for table in _headed(grid, columns)]:
-            return tables, from_code
+    for grids, kind in _read(text, columns):
+        if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
+            return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
@@ -185,15 +185,15 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     return [], False
 
 
-def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], bool]]:
-    """What each reader makes of a text, and whether it reads programs."""
+def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]:
+    """What each reader makes of a text, and what it reads: a program, blanks between cells, or other marks."""
     if columns:
-        yield code_grids(text, headed=False), True
-    yield html_grids(text) or latex_grids(text), False
-    yield code_grids(text), True
-    for grid in line_grids(text):
-        yield [grid], False
-    yield _stacked(text), False
+        yield code_grids(text, headed=False), "program"
+    yield html_grids(text) or latex_grids(text), "marks"
+    yield code_grids(text), "program"
+    for mark, grid in line_grids(text):
+        yield [grid], "blanks" if mark.strip(" ") == "" else "marks"
+    yield _stacked(text), "marks"
 
 
 def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
@@ -238,13 +238,17 @@ def _with_units(header: list[str], cells: list[str]) -> list[str]:
     return [f"{name} [{_unit_in(cell)}]" if _unit_in(cell) else name for name, cell in zip(header, cells)]
 
 
+def _with_names(table: Grid) -> Grid:
+    """A table with a heading for a first column of joints' names or numbers that has none."""
+    (line, header), *rows = table
+    firsts = [cells[0] for _, cells in rows if len(cells) == len(header) + 1]
+    named = len(firsts) == len(rows) and all(map(_NAMED.fullmatch, firsts))
+    return [(line, ["joint", *header]), *rows] if named else table
+
+
 def _trimmed(table: Grid) -> Grid:
-    """A table without what follows its last known column, with a heading for names of joints that have none."""
+    """A table without what follows its last known column, where headings or cells hold blanks."""
     header = table[0][1]
-    firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
-    if len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts)):
-        header = ["joint", *header]  # a column of names or numbers that has no heading
-        table = [(table[0][0], header), *table[1:]]
     widths = {len(cells) for _, cells in table}
     known = [bool(heading_of(name)) for name in header]
     last = len(known) - known[::-1].index(True)

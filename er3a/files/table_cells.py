@@ -123,7 +123,7 @@ def latex_grids(text: str) -> list[Grid]:
     return found
 
 
-def line_grids(text: str) -> Iterator[Grid]:
+def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
     """A text's lines cut into cells, by each separator in turn; lines without it have one cell."""
     text = plain(text)
     broken = re.sub(r"[ \t]*\n\s*(-?π)\s*\n\s*(\d)[ \t]*(?=\n)", r" \1/\2\n\n", text)  # a fraction over three lines
@@ -134,11 +134,11 @@ def line_grids(text: str) -> Iterator[Grid]:
     ]
     for mark in MARKS:
         if mark in ";,\t":
-            yield _delimited(text, mark)
+            yield mark, _delimited(text, mark)
         elif mark.isspace():
-            yield [(number, _spaced(without_latex(line), mark)) for number, line in lines]
+            yield mark, [(number, _spaced(without_latex(line), mark)) for number, line in lines]
         else:
-            yield [(number, _edged(line, mark)) for number, line in lines]
+            yield mark, [(number, _edged(line, mark)) for number, line in lines]
 
 
 def _edged(line: str, mark: str) -> list[str]:

@@ -36,7 +36,11 @@ LIBRARIES = {
     "sympybotics": ("alpha,a,d,theta", ""),
 }
 """Columns of a matrix, and the convention, by a name of the library that takes it."""
-_UNPACKED = re.compile(r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*(?:\bin\b|=(?!=))")
+_UNPACKED = re.compile(
+    r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*"
+    r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
+)
+"""Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
