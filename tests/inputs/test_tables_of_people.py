@@ -203,7 +203,10 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
     [
         ("dh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "--column"),  # no names
         ("theta,d,a,alpha,a\n0,290,0,90,0\n0,0,270,0,0\n", "--column"),  # one twice
-        ("a, alpha, d, t = symbols('a:d')\ndh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "separators|--column"),  # of no row
+        (
+            "a, alpha, d, t = symbols('a:d')\ndh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]",
+            "separators|--column",
+        ),  # of no row
         ("a,alpha,d\n15,90,20\n30,0,0\n", "--length-unit"),
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
