@@ -719,14 +719,20 @@ def _length_slips(robot_a: Robot, robot_b: Robot, only_nearest: bool = False) ->
         sums = [float(np.abs(getattr(each, column)).sum()) for each in (one, other)]
         if min(sums) > 0:
             factors |= _likely_factor(sums[1] / sums[0], only_nearest)
-    alone = [_length_cause(robot_a, robot_b, (column,), factor) for column in used for factor in sorted(factors)]
-    both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
-    mixed = [
-        pair
-        for pair in itertools.combinations(alone, 2)
-        if pair[0].entries != pair[1].entries and (pair[0].side, pair[0].amount) != (pair[1].side, pair[1].amount)
+    alone = [
+        _length_cause(robot_a, robot_b, (column,), factor)
+        for column, factor in itertools.product(used, sorted(factors))
+        if _bears_out(getattr(robot_a, column), getattr(robot_b, column), factor)
     ]
-    return [(), *((each,) for each in both), *((each,) for each in alone), *mixed]
+    both = [_length_cause(robot_a, robot_b, tuple(used), factor) for factor in sorted(factors)] if len(used) > 1 else []
+    return [(), *((each,) for each in (*both, *alone))]
+
+
+def _bears_out(one: Reals, other: Reals, factor: float) -> bool:
+    """Whether two or more lengths of a column (n,) agree times a factor, and more than without: one alone is an entry
+    that is wrong."""
+    before, after = (((one != 0) & np.isclose(abs(one) * by, abs(other), 1e-3)).sum() for by in (1.0, factor))
+    return bool(after > max(before, 1))
 
 
 def _likely_factor(ratio: float, only_nearest: bool = False) -> set[float]:
@@ -811,7 +817,7 @@ def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> li
         widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
         usual = least < widest < most
         for factor in ANGLE_FACTORS:
-            gon = abs(ratio[1] - GON * ratio[0]) < NEAR_GON * ratio[0]
+            gon = (values > 0).sum() > 1 and abs(ratio[1] - GON * ratio[0]) < NEAR_GON * ratio[0]
             if (factor == GON and gon) if usual else least < widest * factor < most:
                 found.append((_of_unit("angle_unit", side, columns, factor),))
     return found

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -88,22 +88,15 @@ def read_dh_table(
     """
     path = Path(path)
     printed = _printed(path, columns, text)
-    names = {_usual_unit(column)[0]: column for column in (printed.lines[0][1] if printed.lines else ())}
+    header = printed.lines[0][1] if printed.lines else []
+    names = {_usual_unit(column)[0]: column for column in header}
     known = NEEDED | {column: kind for column, kind in OPTIONAL.items() if column in names}
-    rows = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
-    converted = {column: scale for column, name in names.items() if (scale := _usual_unit(name)[1]) is not None}
-    rows = [{_usual_unit(column)[0]: value for column, value in row.items()} for row in rows]
-    for row in rows:
-        row |= {
-            column: _converted(column, row[column], scale)
-            for column, scale in converted.items()
-            if row[column] is not None
-        }
+    raw = read_csv(path, {names.get(column, column): kind for column, kind in known.items()}, printed.lines)
+    rows = [_in_usual_units(row) for row in raw]
+    converted = {column for column, name in names.items() if column != name}
     notes = [*printed.notes]
-    notes += _in_own_units(
-        path, rows, length_unit, angle_unit, as_printed, own={*converted}, without_unit=printed.without_unit
-    )
-    short = _short_lengths(path, rows, {*converted}, as_printed, bool(length_unit or _calibrated(rows, convention)))
+    notes += _in_own_units(path, rows, length_unit, angle_unit, as_printed, own=converted, printed=printed)
+    short = _short_lengths(path, rows, converted, as_printed, bool(length_unit or _calibrated(rows, convention)))
     given = set(names)
     if len(stated := {row["convention"] for row in rows} if "convention" in given else {convention}) > 1:
         raise InputError(path, "column convention", "two conventions in one table", "Write the same in all rows")
@@ -229,16 +222,13 @@ def _join(before: dict[str, Any], fixed: Reals, after: dict[str, Any], conventio
     """Make a fixed transform (4, 4), mm, part of the link between two rows."""
     link = before if convention == "standard" else after
     T = _across(link) @ fixed if convention == "standard" else fixed @ _across(link)
-    (x, y, z), (u, v, w) = T[:3, 3], T[:3, 2]
+    (x, y, z), (u, v, w) = np.round(T[:3, 3], DIGITS) + 0.0, T[:3, 2]
     sine = math.hypot(u, v)
-    if sine > PARALLEL:
-        turn = math.atan2(u, -v)
-        a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
-        far = -across / sine
-    else:
-        turn, far = (math.atan2(y, x) if math.hypot(x, y) > 10.0**-DIGITS else 0.0), 0.0
-        a = math.hypot(x, y)
-    alpha = math.atan2(sine if sine > PARALLEL else 0.0, w)
+    skew = sine > PARALLEL
+    turn = math.atan2(u, -v) if skew else math.atan2(y, x)
+    a, across = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
+    far = -across / sine if skew else 0.0
+    alpha = math.atan2(sine if skew else 0.0, w)
     rest = rot_x(-alpha) @ rot_z(-turn) @ T
     link |= {"a_mm": round(a, DIGITS), "alpha_deg": round(math.degrees(alpha), DIGITS)}
     if link.get("beta_deg"):
@@ -274,10 +264,18 @@ def _unit_of(column: str) -> str:
     return column.removesuffix("_s").rpartition("_")[2]
 
 
-def _usual_unit(column: str) -> tuple[str, float | None]:
-    """A column's name in mm or degrees, and what takes its values to those; None if its name has them already."""
-    unit, scale = OTHER_UNITS.get(_unit_of(column), ("", None))
-    return (column if scale is None else re.sub(r"_(cm|m|in|rad)(_s)?$", rf"_{unit}\2", column)), scale
+def _usual_unit(column: str) -> tuple[str, float]:
+    """A column's name in mm or degrees, and what takes its values to those."""
+    unit, scale = OTHER_UNITS.get(_unit_of(column), ("", 1.0))
+    return (re.sub(r"_(cm|m|in|rad)(_s)?$", rf"_{unit}\2", column) if unit else column), scale
+
+
+def _in_usual_units(row: dict[str, Any]) -> dict[str, Any]:
+    found = {}
+    for column, value in row.items():
+        name, scale = _usual_unit(column)
+        found[name] = _converted(name, value, scale) if isinstance(value, float) else value
+    return found
 
 
 def _in_own_units(
@@ -288,14 +286,15 @@ def _in_own_units(
     as_printed: bool,
     *,
     own: set[str],
-    without_unit: frozenset[str],
+    printed: PrintedTable,
 ) -> Iterator[str]:
     """Take all values to mm and degrees, and doubt or refuse those that are another unit's.
 
     Lengths and twists are taken for what they can only be if no heading says their unit. Otherwise such lengths are
     refused, with ``as_printed`` doubted, and such twists stay degrees, with a note.
-    ``own``: columns that said their unit; ``without_unit``: those whose headings say none.
+    ``own``: columns that said their unit.
     """
+    without_unit = printed.without_unit
     lengths = [abs(row[key]) for row in rows for key in ("a_mm", "d_mm") if row[key] and key not in own]
     unsaid = {"a_mm", "d_mm"} - own <= without_unit
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
@@ -320,7 +319,7 @@ def _in_own_units(
     for row in rows:
         for column, value in row.items():
             if column not in own and isinstance(value, float):
-                scale = PER_RAD if column in turned else _scale_of(column, unit)
+                scale = PER_RAD if column in turned else {"mm": PER_MM[unit]}.get(_unit_of(column), 1.0)
                 row[column] = _converted(column, value, scale)
 
 
@@ -374,10 +373,6 @@ def headed_units(
     meant = {"mm": length_unit or "mm", "deg": angle_unit or "deg"}
     units = {name.partition("_")[0]: _unit_of(name) for name in (lines[0][1] if lines else ())}
     return {name: meant.get(unit, unit) for name, unit in units.items() if unit in (*PER_MM, "deg", "rad")}
-
-
-def _scale_of(column: str, length_unit: LengthUnit) -> float:
-    return PER_MM[length_unit] if _unit_of(column) == "mm" else 1.0
 
 
 def _in_radians(rows: list[dict[str, Any]], column: str) -> bool:
@@ -442,43 +437,40 @@ def _calibrated(rows: list[dict[str, Any]], convention: str) -> bool:
     return stated or _far_normals(rows, convention)
 
 
+def _filled(row: dict[str, Any]) -> dict[str, Any]:
+    """A row with what is assumed where its table has no column, without the columns of the other kind of joint."""
+    unit, other, angle = ("mm", "deg", "offset_deg") if _unit(row) == "mm" else ("deg", "mm", "theta_deg")
+    kind = {"type": "prismatic", "theta_deg": 0.0} if unit == "mm" else {"offset_deg": 0.0}
+    lower, upper = (0.0, ASSUMED_SLIDE_MM) if unit == "mm" else (-ASSUMED_LIMIT_DEG, ASSUMED_LIMIT_DEG)
+    assumed = {"direction": 1, f"lower_{unit}": lower, f"upper_{unit}": upper} | kind
+    others = {"type", angle, f"lower_{other}", f"upper_{other}", f"speed_{other}_s"}
+    return assumed | {key: value for key, value in row.items() if value is not None and key not in others}
+
+
 def _content(rows: list[dict[str, Any]], given: set[str], name: str, convention: str, source: str) -> dict[str, Any]:
-    def group(row_of: Callable[[dict[str, Any]], dict[str, Any]], known: bool) -> dict[str, Any]:
-        grade: Grade = "claim" if known else "inferred"
-        filled = [{"joint": row["joint"]} | row_of(row) for row in rows]
-        return {"source": f"Table {source}" if known else "Not in the table; assumed", "grade": grade, "rows": filled}
-
-    def table(row: dict[str, Any]) -> dict[str, Any]:
-        kind = {"type": "prismatic", "theta_deg": row.get("theta_deg") or 0.0} if _unit(row) == "mm" else {}
-        return kind | {key: row[key] for key in ("a_mm", "alpha_deg", "d_mm", "beta_deg") if key in row}
-
-    def zero(row: dict[str, Any]) -> dict[str, Any]:
-        turns = {"offset_deg": row.get("offset_deg") or 0.0} if _unit(row) == "deg" else {}
-        return {"direction": row.get("direction", 1)} | turns
-
-    def limits(row: dict[str, Any]) -> dict[str, Any]:
-        unit = _unit(row)
-        assumed = {"deg": (-ASSUMED_LIMIT_DEG, ASSUMED_LIMIT_DEG), "mm": (0.0, ASSUMED_SLIDE_MM)}[unit]
-        return {key: row.get(key, value) for key, value in zip((f"lower_{unit}", f"upper_{unit}"), assumed)}
-
-    def speed(row: dict[str, Any]) -> dict[str, Any]:
-        key = f"speed_{_unit(row)}_s"
-        return {key: row[key]}
-
     units = {_unit(row) for row in rows}
+    filled = [_filled(row) for row in rows]
+
+    def group(known: bool, *keys: str) -> dict[str, Any]:
+        grade: Grade = "claim" if known else "inferred"
+        own = [{key: row[key] for key in ("joint", *keys) if key in row} for row in filled]
+        return {"source": f"Table {source}" if known else "Not in the table; assumed", "grade": grade, "rows": own}
+
+    table = group(True, "type", "theta_deg", "a_mm", "alpha_deg", "d_mm", "beta_deg")
+    limits = [f"{end}_{unit}" for unit in units for end in ("lower", "upper")]
     content: dict[str, Any] = {
         "kind": "robot",
         "name": name,
         "title": name,
         "zero_pose": "not stated",
-        "dh": {"convention": convention, "calibrated": _calibrated(rows, convention)} | group(table, known=True),
-        "zero": group(zero, known=bool(given & {"offset_deg", "direction"})),
-        "limits": group(limits, known=all(f"lower_{unit}" in given for unit in units)),
+        "dh": {"convention": convention, "calibrated": _calibrated(rows, convention)} | table,
+        "zero": group(bool(given & {"offset_deg", "direction"}), "direction", "offset_deg"),
+        "limits": group(given >= {*limits}, *limits),
     }
     if convention == "standard" and "convention" not in given:
         content["dh"]["source"] += ", read as standard D-H, which it does not say"
     if "direction" not in given and "offset_deg" in given:
         content["zero"]["source"] += "; it gives no directions: all were assumed as +1"
-    if all(f"speed_{unit}_s" in given for unit in units):
-        content["speeds"] = group(speed, known=True)
+    if given >= (speeds := {f"speed_{unit}_s" for unit in units}):
+        content["speeds"] = group(True, *speeds)
     return content

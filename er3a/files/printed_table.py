@@ -35,16 +35,17 @@ _NUMBERED = re.compile(r"\d")
 _TOOL = re.compile(r"tool|tcp|grip|hand|effector|^\s*g\s*$|工具|夹")  # a row's name, of what the flange carries
 _CELL = (
     (r"[{}$]", ""),
-    (r"\(t\)", ""),
+    (r"\((?:t|fixed|var(?:iable|\.)?|变量)\)", ""),
+    (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
-    (r"\*+(?=$|\s*[-+])", ""),
+    (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
-_STARRED = re.compile(r"^\*$|\w\*+\s*(?:$|[-+])")
+_STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
-_NAMED = re.compile(r"[^\W\d]+\.?\s*\d+\s*:?")
+_NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
@@ -56,8 +57,9 @@ SIGNS = {
 }
 """What a text around a table says of its convention."""
 _GIVEN = re.compile(
-    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n(])+?)"
-    r"(?=[,;，；。%#\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b)?"
+    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
+    r"(?=[),;，；。%#≈`\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
 
@@ -174,7 +176,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
 def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
     """All tables of the first reader that finds one, their headings first; and whether they are a program's."""
     for grids, kind in _read(text, columns):
-        if tables := [table for grid in grids for table in _headed(grid, columns)]:
+        if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
             return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
         problem = "a matrix whose columns have no names"
@@ -190,7 +192,7 @@ def _read(text: str, columns: Sequence[str]) -> Iterator[tuple[list[Grid], str]]
     yield html_grids(text) or latex_grids(text), "marks"
     yield code_grids(text), "program"
     for mark, grid in line_grids(text):
-        yield [grid], "blanks" if mark in ("  ", " ") else "marks"
+        yield [grid], "blanks" if mark.strip(" ") == "" else "marks"
     yield _stacked(text), "marks"
 
 
@@ -236,14 +238,17 @@ def _with_units(header: list[str], cells: list[str]) -> list[str]:
     return [f"{name} [{_unit_in(cell)}]" if _unit_in(cell) else name for name, cell in zip(header, cells)]
 
 
+def _with_names(table: Grid) -> Grid:
+    """A table with a heading for a first column of joints' names or numbers that has none."""
+    (line, header), *rows = table
+    firsts = [cells[0] for _, cells in rows if len(cells) == len(header) + 1]
+    named = len(firsts) == len(rows) and all(map(_NAMED.fullmatch, firsts))
+    return [(line, ["joint", *header]), *rows] if named else table
+
+
 def _trimmed(table: Grid) -> Grid:
     """A table without what follows its last known column, where headings or cells hold blanks."""
     header = table[0][1]
-    firsts = [cells[0] for _, cells in table[1:] if len(cells) == len(header) + 1]
-    counted = firsts in ([str(n + start) for n in range(len(table) - 1)] for start in (0, 1))
-    if counted or (len(firsts) == len(table) - 1 and all(map(_NAMED.fullmatch, firsts))):
-        header = ["joint", *header]  # a column of names or numbers that has no heading
-        table = [(table[0][0], header), *table[1:]]
     widths = {len(cells) for _, cells in table}
     known = [bool(heading_of(name)) for name in header]
     last = len(known) - known[::-1].index(True)
@@ -254,18 +259,32 @@ def _trimmed(table: Grid) -> Grid:
 
 def _stacked(text: str) -> list[Grid]:
     """A table that was copied with each cell on a line of its own."""
-    lines = [(n, line) for n, line in enumerate(without_latex(plain(text)).split("\n"), 1) if line.strip()]
-    known = [heading_of(line.strip()) is not None for _, line in lines]
-    for start, width in ((k, w) for k in range(len(lines)) if all(known[k : k + 4]) for w in (6, 5, 4)):
-        cells = [line.strip() for _, line in lines[start:]]
-        if not is_printed_table(cells[:width]) or not all(known[start : start + width]):
-            continue
-        rows = [cells[place : place + width] for place in range(width, len(cells), width)]
-        good = next((n for n, row in enumerate(rows) if len(row) < width or not _numeric(row)), len(rows))
-        if good < len(rows) and re.fullmatch(r"[-\d.]+", rows[good][0]):
-            raise InputError(None, f"line {lines[start][0]}", "cells are missing in the last row", "Add them")
-        return [[(lines[start + n * width][0], row) for n, row in enumerate([cells[:width], *rows[:good]])]]
+    lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
+    cells = [(number, line) for number, line in enumerate(lines, 1) if line]
+    width = 0
+    for place, (_, cell) in enumerate(cells):
+        header = [name for _, name in cells[place - width : place]]
+        if heading_of(cell):
+            width += 1
+        elif is_printed_table(header):
+            return [_rows_of(width, header, cells[place - width :])]
+        else:
+            width = 0
     return []
+
+
+def _rows_of(width: int, header: list[str], cells: list[tuple[int, str]]) -> Grid:
+    """Cells from those of the header on, ``width`` in a row, as far as these are a table's."""
+    grid: Grid = [(cells[0][0], header)]
+    for place in range(width, len(cells), width):
+        row = [cell for _, cell in cells[place : place + width]]
+        if len(row) == width and _numeric(row):
+            grid.append((cells[place][0], row))
+        elif re.fullmatch(r"[-\d.]+", row[0]):
+            raise InputError(None, f"line {cells[0][0]}", "cells are missing in the last row", "Add them")
+        else:
+            break
+    return grid
 
 
 def _turned(grid: Grid) -> list[Grid]:
@@ -298,6 +317,7 @@ class _Table:
         self.convention = self._stated(text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
+        text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
@@ -328,12 +348,13 @@ class _Table:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
-        said = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        said |= {name for name, sign in SIGNS.items() if sign.search(near)}
-        for one in CONVENTIONS if len(said) == 1 else ():
-            if one in said:
-                self.notes.append(f"the text says {one} D-H, and was read so")
-                return one
+        library = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
+        for part in (near, text):
+            said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
+            for one in CONVENTIONS if len(said) == 1 else ():
+                if one in said:
+                    self.notes.append(f"the text says {one} D-H, and was read so")
+                    return one
         return None
 
     def _given(self) -> dict[str, str]:
@@ -412,6 +433,10 @@ class _Table:
         names = {name: times for name, times in found.variables.items() if times}
         if len(names) > 1:
             self._refuse(row, k, f"'{cell}' holds two variables", f"Give a value: {min(names)} = ... below the table")
+        for name in names if self.headings[k].quantity == "theta" else ():
+            own = heading_of(name)
+            if not (_NUMBERED.search(name) or (own and own.quantity == "theta")):
+                self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
         if {*map(abs, names.values())} - {1.0}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
         return replace(found, variables=names)
@@ -423,6 +448,7 @@ class _Table:
         if k is not None:
             return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
+        blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         moving = any(turns) or any(starred)
         names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
@@ -431,7 +457,8 @@ class _Table:
         found = []
         for row, name in enumerate(names):
             kind = "tool" if _TOOL.search(name.lower()) else "fixed"
-            if turns[row] or not (moving or (row in ends and name)):
+            unsaid = blank[row] and not slides[row] and row not in ends
+            if turns[row] or (unsaid if moving else not (row in ends and name)):
                 kind = "revolute"
             elif slides[row] and (starred[row] or any(turns)):
                 kind = "prismatic"

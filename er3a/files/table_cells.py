@@ -37,6 +37,7 @@ _LATEX = (
     (r"\\[()\[\],;!: ]|\$|~|\\q?quad|&nbsp;", " "),
 )
 _FRACTION = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(\\?\w))\s*(?:\{([^{}]*)\}|(\w))")
+_FUNCTION = re.compile(r"\\(sqrt|sin|cos|arctan|arcsin|arccos)\s*(?:\{([^{}]*)\})?")
 _WRAPPED = re.compile(r"\\[a-zA-Z]+\*?\s*\{([^{}]*)\}")
 
 
@@ -57,6 +58,7 @@ def without_latex(text: str) -> str:
         text = re.sub(pattern, plainly, text)
     for _ in range(4):
         text = _FRACTION.sub(lambda found: f"({found[1] or found[2]})/({found[3] or found[4]})", text)
+        text = _FUNCTION.sub(lambda found: f"{found[1]}({found[2]})" if found[2] else found[1], text)
         text = _WRAPPED.sub(r"\1", re.sub(r"([_^])\{([^{}]*)\}", r"\1\2", text))
     return re.sub(r"[{}]", "", text)
 
@@ -141,7 +143,8 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
 
 def _edged(line: str, mark: str) -> list[str]:
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
-    return cells[not cells[0] : len(cells) - (not cells[-1])]
+    framed = not cells[0]  # otherwise an empty cell at the end is one of the table's
+    return cells[framed : len(cells) - (framed and not cells[-1])]
 
 
 def _delimited(text: str, mark: str) -> Grid:

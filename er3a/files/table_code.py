@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
@@ -16,6 +16,7 @@ _COMMENT = re.compile(
 _BLOCK = re.compile(
     r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
 )
+_STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
 _ORDERS = {
@@ -35,6 +36,11 @@ LIBRARIES = {
     "sympybotics": ("alpha,a,d,theta", ""),
 }
 """Columns of a matrix, and the convention, by a name of the library that takes it."""
+_UNPACKED = re.compile(
+    r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*"
+    r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
+)
+"""Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
@@ -67,6 +73,7 @@ def code_of(text: str) -> Code:
     """A program's text without its comments; the numbers of its lines stay."""
     comments: dict[int, str] = {}
     text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+    text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
     def kept(found: re.Match[str]) -> str:
         if found[1] is None and found[2]:
@@ -186,12 +193,10 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
-    for links in chosen:
-        if len(links) > 1 and None not in links:  # the arm's list of named links
-            rows = [link for link in links if link]
+    arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
     lists = [each for each in lists if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in lists or _begun_again(rows)]
+    return [_grid([(row.line, row.cells) for row in each]) for each in arms or lists or _begun_again(rows)]
 
 
 @dataclass(frozen=True)
@@ -203,13 +208,20 @@ class _Link:
 
 
 def _begun_again(rows: list[_Link]) -> list[list[_Link]]:
-    """Links by the arms that they belong to: a name that is used again begins another arm."""
+    """Links by the arms that they belong to: a name that is used again begins another arm, another list does too."""
     arms: list[list[_Link]] = []
     for row in rows:
-        if not arms or (row.name and any(row.name == other.name for other in arms[-1])):
+        last = arms[-1] if arms else []
+        again = row.name and any(row.name == other.name for other in last)
+        if again or not last or _list_of(row) != _list_of(last[-1]):
             arms.append([])
         arms[-1].append(row)
     return arms
+
+
+def _list_of(row: _Link) -> str:
+    """The name of the list that holds a link ``L(2)``; "" if it is in none."""
+    return "".join(re.findall(r"(.*)[(\[{]", row.name))
 
 
 def _arguments(function: str, text: str) -> dict[str, str] | None:
@@ -231,8 +243,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         elif part:
             given.append(part)
     if toolbox is None:
-        quantities = {found.quantity for key in cells if (found := heading_of(key))}
-        return cells if "alpha" in quantities and quantities & {"a", "d"} and not given else None
+        return cells if _is_row(cells) and not given else None
     if len(given) == 1 and given[0].startswith("["):
         order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
@@ -292,16 +303,21 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
     return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
 
 
+def _is_row(cells: Iterable[str]) -> bool:
+    """Whether keys are those of a D-H row."""
+    quantities = {found.quantity for key in cells if (found := heading_of(key))}
+    return "alpha" in quantities and bool(quantities & {"a", "d"})
+
+
 def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
     rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
     for each in sorted(groups, key=lambda group: group.start):
         if each.bracket != "{":
             continue
-        pairs = [part.partition(":")[::2] for part in parts(each.inside) if ":" in part]
-        cells = {key.strip(" \"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
-        quantities = {found.quantity for key in cells if (found := heading_of(key))}
-        if not ("alpha" in quantities and quantities & {"a", "d"}):
+        pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
+        cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+        if not _is_row(cells):
             continue
         lists = {key: row_cells(value[1:-1]) for key, value in cells.items() if value[:1] == "["}
         line = code.line(each.start)
@@ -327,11 +343,7 @@ def _blocks(code: Code) -> list[Grid]:
             rows.append((number, label))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [
-        (line, cells)
-        for line, cells in rows
-        if {"alpha", "d"} <= {each.quantity for key in cells if (each := heading_of(key))}
-    ]
+    full = [(line, cells) for line, cells in rows if _is_row(cells)]
     return [_grid(full)] if len(full) > 1 else []
 
 
@@ -371,11 +383,11 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 
 def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
-    """A matrix with a line for each row, of YAML: ``joint1: [0, 270, 0, 0]``."""
+    """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
     rows = list[tuple[int, list[str]]]()
     for group in sorted(groups, key=lambda each: each.start):
-        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:)\s*$", group.before)
-        if group.bracket == "[" and label and "[" not in group.inside:
+        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
+        if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             if (
                 4 <= len(cells) <= 8
@@ -404,8 +416,10 @@ def _symbols(row: list[str]) -> list[str]:
 
 
 def _order(code: Code, first: int, last: int, width: int) -> list[str]:
+    """The names of a matrix's columns, of a comment, of what its rows are unpacked into, or of a library."""
     near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
-    for comment in reversed(near):
+    unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
+    for comment in (*reversed(near), *(unpacked if len(unpacked) == 1 else ())):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):
@@ -430,41 +444,58 @@ def elements(text: str) -> dict[str, str]:
 
 
 def _lists(code: Code) -> dict[str, list[str]]:
-    """The lists of a program by their names, each multiplied by what is written after it."""
-    found: dict[str, list[str]] = {}
+    """The lists of a program by their names; the last of a name that has several."""
+    return {name: cells for name, cells, _ in _named_lists(code)}
+
+
+def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int]]:
+    """The name and the cells of each list, multiplied by what is written after it, and its line."""
     for group in groups_of(code.text):
-        name = re.search(r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?$", group.before)
+        name = re.search(
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+        )
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
-        found[name[1]] = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
-    return found
+        cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
+        yield name[1], cells, code.line(group.start)
 
 
 def _vectors(code: Code) -> list[Grid]:
     """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
     named: dict[str, list[str]] = {}
-    for name, cells in _lists(code).items():
+    for name, cells, line in _named_lists(code):
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         if heading and len(cells) > 1:
-            named.setdefault(heading.quantity, cells)
+            quantity = heading.quantity
+            if named.setdefault(quantity, cells) != cells and quantity != "theta":  # poses may follow
+                raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     length = len(named["alpha"])
     columns = {quantity: cells for quantity, cells in named.items() if len(cells) == length}
     if not {"a", "alpha", "d"} <= {*columns}:
         return []
-    if any(re.sub(r"[0.,()\s]", "", cell) and not re.search(r"[^\W\d]", cell) for cell in columns.pop("theta", [])):
+    theta = [re.sub(r"\b(?:\w+[._])?pi\b", "1", cell, flags=re.I) for cell in columns.get("theta", [])]
+    if not any(re.search(r"[^\W\d]", cell) for cell in theta):
+        columns.pop("theta", None)
+        theta = [cell for cell in theta if re.sub(r"[0.,()\s]", "", cell)]
+    if theta and "theta" not in columns:
         problem = "the list theta may hold zeros of the joints, or a pose"
         raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
-    return [_columns(1, {key: cells for key, cells in columns.items() if key in ("a", "alpha", "d", "offset")})]
+    used = "a", "alpha", "d", "theta", "offset"
+    return [_columns(1, {key: columns[key] for key in used if key in columns})]
 
 
 def _pairs(code: Code) -> list[Grid]:
     """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(alpha|theta|a|d|q|r)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
-    entries = {(name, int(number)): (value.strip(), place) for name, number, value, place in _found(pattern, code.text)}
+    pattern = r"\b(?:DH_)?(alpha|theta|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
+    entries = {
+        (name.rpartition("_")[2], int(number)): (value.strip(), place)
+        for name, number, value, place in _found(pattern, code.text)
+    }
+    found_names = {name for name, _ in entries}
     joints = sorted(number for name, number in entries if name == "d")
     shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
     rows = list[tuple[int, dict[str, str]]]()
@@ -476,8 +507,11 @@ def _pairs(code: Code) -> list[Grid]:
             return []
         names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
         row = {name: cell[0] for name, cell in zip(names, cells) if cell}
-        rows.append((code.line(cells[2][1] if cells[2] else 0), {"joint": str(joint)} | row | {"theta": angle[0]}))
-    angles = {name for name, _ in entries} & {"q", "theta"}  # else they may be in a matrix of these symbols
+        row |= {"joint": str(joint), "theta": angle[0]}
+        if "offset" in found_names:
+            row["offset"] = entries.get(("offset", joint), ("0", 0))[0]
+        rows.append((code.line(cells[2][1] if cells[2] else 0), row))
+    angles = found_names & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
     return [_grid(rows)] if len(rows) > 1 and angles else []
 
 

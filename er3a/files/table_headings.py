@@ -14,7 +14,8 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta th=theta t= offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset "
+    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha "
+    "offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
     "type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(
@@ -25,6 +26,7 @@ _WORDS = words_of(
 """Each marks a heading that holds it; the first that is found counts."""
 _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
 _PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|speed)_\w+|(?:beta|theta)_(?:deg|rad)")
+_OF_RANGES = re.compile(r"(?i)(?<![a-z])(?:min|max|range|limit)|范围|限")
 _LETTER = re.compile(r"[^\W\d_]|#")
 _BEFORE = re.compile(r"[ijn]-1")
 
@@ -55,7 +57,7 @@ def heading_of(text: str) -> Heading | None:
     """
     if own := _OURS.fullmatch(text):
         return Heading(own[1] or own[2], own[3] or "", False)
-    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text):
+    if _PRIVATE.fullmatch(text) or len(text) > 60 or not _LETTER.search(text) or _OF_RANGES.search(text):
         return None
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
     said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]

@@ -203,6 +203,10 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
     [
         ("dh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]", "--column"),  # no names
         ("theta,d,a,alpha,a\n0,290,0,90,0\n0,0,270,0,0\n", "--column"),  # one twice
+        (
+            "a, alpha, d, t = symbols('a:d')\ndh = [[0, 0.29, 0, 1], [0.27, 0, 0, 2]]",
+            "separators|--column",
+        ),  # of no row
         ("a,alpha,d\n15,90,20\n30,0,0\n", "--length-unit"),
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
@@ -215,6 +219,13 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "one of them",
         ),
         ("a (mm),alpha (deg),d (mm)\n0,pi/2°,3\n", "one unit|without a unit"),
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
+        ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
+        (
+            "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
+            "one of them",
+        ),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -273,6 +284,31 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
     values = "d1 = 0.38; a1 = 0; alpha1 = 0;\nd2 = 0; a2 = 0.35; alpha2 = -pi/2;\n"
     content, _ = read(tmp_path, values + "M = [theta1 d1 a1 alpha1;\n     theta2-pi/2 d2 a2 alpha2];\n")
     np.testing.assert_allclose(numbers(content), [(0, 0, 380, 0), (350, -90, 0, -90)])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\ntheta = [q1, q2 - pi/2]",
+        "robot.DH.theta= '[q(1) q(2)-pi/2]';\nrobot.DH.d='[0.29 0]';\n"
+        "robot.DH.a='[0 0.27]';\nrobot.DH.alpha='[-pi/2 0]';",
+        "double DH_a1=0, DH_a2=0.27;\ndouble DH_d1=0.29, DH_d2=0;\ndouble DH_alpha1=-M_PI/2, DH_alpha2=0;\n"
+        "double DH_q_offset1=0, DH_q_offset2=-M_PI/2;",
+        "% a alpha d theta\ndh(1,:) = [0 -pi/2 0.29 0];\ndh(2,:) = [0.27 0 0 -pi/2];",
+        "dh = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\nfor i, (a, alpha, d, theta_offset) in enumerate(dh):",
+        "// a alpha d theta\ndh << 0, -M_PI/2, 0.29, 0,\n 0.27, 0, 0, -M_PI/2;",
+        "DH dh[] = {{.a = 0, .alpha = -M_PI/2, .d = 0.29, .theta = 0},\n"
+        "{.a = 0.27, .alpha = 0, .d = 0, .theta = -M_PI/2}};",
+        "θ (deg);a (mm);α (deg);d (mm);θ range\nq1;0;-90;290;±90\nq2-90;270;0;0;±90\n",
+        "i | alpha | a | d | theta\n--|--|--|--|--\n1 | -pi/2 | 0 | 0.29 | \n2 | 0 | 0.27 | 0 | θ2-pi/2\n",
+        "| theta | d | a | alpha\nJ0 | t0 | 290 | 0 | -90°\nJ1 | t1-90 | 0 | 270 | 0°\n",
+        "| i | a [mm] | α [°] | d [mm] | θ |\n|1|0|-90|290[mm]|$q_1^*$|\n|2|270|0|0|`q2` - β (variable)|\n\n"
+        "**Note:** `β = 90°`.",
+    ],
+)
+def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
 
 
 def test_links_are_in_the_order_of_their_arm(tmp_path):
