@@ -766,7 +766,7 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
     shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
 
     def off_of(part: PointObservations) -> Reals:
-        off: Reals = part.predict(here, (), np.zeros((1, 0)))[0] - part.values_mm
+        off: Reals = part.predict(here) - part.values_mm
         return off
 
     if not every.kinds or used.all():

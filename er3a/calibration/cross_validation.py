@@ -259,7 +259,7 @@ def choose_terms(
             break
     else:
         return ChosenTerms((), ())
-    off = observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]
+    off = observations.values_mm - observations.predict(here)
     if np.sqrt(np.mean(off**2)) < ROUNDING:
         return ChosenTerms((), ())
     J, rest = rows @ jacobian(here, kept, observations), rows @ off
@@ -347,8 +347,8 @@ class _RippleSearch:
 
     def __init__(self, here: Robot, observations: PointObservations):
         x, rows = observations.row_values, np.flatnonzero(~here.sliding)
-        effect = 1000 * effects(here, x, observations.points(here))[:, rows]
-        self._effect = effect.transpose(0, 2, 1)[observations.seen] / observations.deviation_mm[:, None]
+        effect = 1000 * effects(here, x, observations.points(here))[..., rows]
+        self._effect = effect[observations.seen] / observations.deviation_mm[:, None]
         count = len(observations)
         self._by_pose = scipy.sparse.csr_array((np.ones(count), (observations.pose_of, np.arange(count))))
         angle = x[:, rows].T[:, None] * np.array(RIPPLES)[:, None]

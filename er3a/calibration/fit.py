@@ -26,16 +26,17 @@ from er3a.calibration.parameters import (
     parallel_pairs,
     parameters_of,
     placements_of,
+    placing_axes,
 )
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
-from er3a.comparison.entries import Entry
+from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import nearest_rotations, rpy_of, transposed
+from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
-STEP = 1e-5  # m or rad, of central differences
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
 STEPS, MAX_STEPS = 30, 100
@@ -79,7 +80,7 @@ class Subspace:
 def jacobian(
     robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
 ) -> Reals:
-    """Derivatives of observed values by parameters, by central differences; exact to about 1e-8.
+    """Derivatives of observed values by parameters.
 
     Parameters
     ----------
@@ -90,13 +91,21 @@ def jacobian(
     -------
     J : (n, p), mm per m or rad, and mrad of orientations; small turns count, however far these are from measured ones
     """
-    count = len(parameters)
-    if observations.oriented:
-        observations = observations.agreeing(corrected(robot, parameters, np.broadcast_to(amounts, count)))
-    steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
-    values = observations.predict(robot, parameters, steps)
-    slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
-    return slopes
+    amounts = np.broadcast_to(amounts, len(parameters))
+    here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
+    xyz, turns = observations.positions(here), observations.turns(here)
+    rows = [each for each in parameters if each.joint]
+    shifts = np.empty((len(xyz), 6, len(parameters)))
+    shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
+    by_tool = np.where(observations.on_tool[:, None, None], turns, 0.0)
+    for k in np.flatnonzero(~of_rows):
+        along, about = placing_axes(parameters[k], parameters, amounts)
+        if parameters[k].column in BASE_COLUMNS:
+            along, about = robot.base[:3, :3] @ along, robot.base[:3, :3] @ about
+            shifts[:, :3, k], shifts[:, 3:, k] = along + np.cross(about, xyz - here.base[:3, 3]), about
+        else:
+            shifts[:, :3, k], shifts[:, 3:, k] = by_tool @ along, by_tool @ robot.tool[:3, :3] @ about
+    return MM * observations.relative_shift(shifts, xyz)[observations.seen]
 
 
 def subspace(
@@ -156,7 +165,7 @@ def left_of_touched(robot: Robot, observations: PointObservations) -> float:
     """
     if not observations.dropped:
         return 0.0
-    off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
+    off = (observations.predict(robot) - observations.values_mm) / observations.deviation_mm
     touching = observations.touched[observations.pose_of] >= 0
     taken = jacobian(robot, observations.placements, observations)[touching]
     taken /= observations.deviation_mm[touching, None]
@@ -186,7 +195,7 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
-    off = observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm
+    off = observations.predict(robot) - observations.values_mm
     known = np.linalg.norm(observations.slid(robot))
     min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
     return longest if known < min_known else None
@@ -452,8 +461,8 @@ def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservatio
     placing = [k for k, each in enumerate(kept) if each in by_name]
     amounts[placing] = [by_name[kept[k]] for k in placing]
     seen = observations.take(used)
-    off = np.linalg.norm(seen.predict(robot, kept, np.array([none, amounts])) - seen.values_mm, axis=1)
-    return amounts if FAR * off[1] < off[0] else none
+    off, there = (np.linalg.norm(seen.predict(arm) - seen.values_mm) for arm in (robot, corrected(robot, kept, amounts)))
+    return amounts if FAR * there < off else none
 
 
 def fit(
@@ -511,7 +520,7 @@ def _fit(
         return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
 
     def weighted(unknowns: Reals) -> Reals:
-        values = with_errors(unknowns[k:]).predict(robot, kept, unknowns[None, :k])[0]
+        values = with_errors(unknowns[k:]).predict(corrected(robot, kept, unknowns[:k]))
         return np.concatenate([(values - observations.values_mm) / deviation, prior * unknowns[k:], held @ unknowns])
 
     def slopes(unknowns: Reals) -> Reals:

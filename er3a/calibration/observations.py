@@ -12,8 +12,8 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import PARALLEL_RAD, placed, placements_of
-from er3a.comparison.entries import Entry, shifted
+from er3a.calibration.parameters import PARALLEL_RAD, placements_of
+from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.geometry.transforms import log_rotation, nearest_rotations, transposed
 from er3a.kinematics.chain import row_values
@@ -31,7 +31,6 @@ RICH_POSES = 64  # joint vectors all over the range
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
-AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
 @dataclass(frozen=True)
@@ -214,18 +213,19 @@ class PointObservations:
 
         Parameters
         ----------
-        shift : (P, 6), m and rad, base frame
+        shift : (P, 6, ...), m and rad, base frame
         around : (P, 3), m, where the points are
 
         Returns
         -------
-        change : (P, 6), m and rad, columns as of :meth:`relative`
+        change : (P, 6, ...), m and rad, columns as of :meth:`relative`
         """
         found = shift.copy()
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
-            own = found[rows] if kind == "place" else np.einsum("pi,pi->p", along, found[rows, :3])[:, None]
-            found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
+            own = shift[rows] if kind == "place" else np.einsum("pi,pi...->p...", along, shift[rows, :3])[:, None]
+            flat = own.reshape(len(rows), -1)
+            found[rows, : own.shape[1]] = own - (basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]).reshape(own.shape)
         return found
 
     def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
@@ -278,40 +278,20 @@ class PointObservations:
         """(n,), the place of each coordinate's point among the P."""
         return np.nonzero(self.seen)[0]
 
-    def predict(self, robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Reals:
-        """Observed values by a table with corrections.
+    def predict(self, robot: Robot) -> Reals:
+        """Observed values by a robot.
 
         Parameters
         ----------
-        parameters : p entries of table, base and tool
-        amounts : (H, p), m or rad, added to the robot's values
+        robot : with any base and tool
 
         Returns
         -------
-        values : (H, n), mm, and mrad from the measured orientations
+        values : (n,), mm, and mrad from the measured orientations
         """
-        own, base_inverse, points = tables_of(robot), np.linalg.inv(robot.base), self.points(robot)
-        placing = np.array([not parameter.joint for parameter in parameters], dtype=bool)
-        step = max(1, AT_ONCE // max(len(self.row_values), 1))
-        values = np.empty((len(amounts), len(self)))
-        for start in range(0, len(amounts), step):
-            part = amounts[start : start + step]
-            tables = shifted(own, parameters, part)
-            T = frames_of(tables, robot, self.row_values)[:, :, -1]
-            S, X = np.tile(np.eye(4), (2, len(part), 1, 1))
-            for k in np.flatnonzero(part[:, placing].any(axis=1)):
-                S[k], X[k] = placed(parameters, part[k])
-            world = robot.base @ S @ base_inverse
-            xyz = points + self.on_tool[:, None] * X[:, None, :3, 3]
-            xyz = np.einsum("hpij,hpj->hpi", T[..., :3, :3], xyz) + T[..., :3, 3]
-            xyz = xyz @ world[:, :3, :3].swapaxes(1, 2) + world[:, None, :3, 3]
-            seen = np.zeros((*xyz.shape[:2], 6))
-            seen[..., :3] = [self.relative(each) for each in xyz] if self.kinds else xyz
-            if self.oriented:
-                tool = np.where(self.on_tool[:, None, None], (robot.tool[:3, :3] @ X[:, :3, :3])[:, None], np.eye(3))
-                turned = world[:, None, :3, :3] @ T[..., :3, :3] @ tool
-                seen[..., 3:] = log_rotation(turned @ transposed(self.orientations))
-            values[start : start + step] = MM * seen[:, self.seen]
+        tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
+        turned = log_rotation(self.turns(robot) @ tool @ transposed(self.orientations))
+        values: Reals = MM * np.hstack([self.relative(self.positions(robot)), turned])[self.seen]
         return values
 
     def positions(self, robot: Robot) -> Reals:
@@ -342,20 +322,6 @@ class PointObservations:
         """
         found: Reals = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1, :3, :3]
         return found
-
-    def agreeing(self, robot: Robot) -> PointObservations:
-        """Observations with the orientations that a robot has, about which small turns are what is observed.
-
-        Parameters
-        ----------
-        robot : with any base and tool
-
-        Returns
-        -------
-        observations : the same where no orientations were measured
-        """
-        tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
-        return replace(self, orientations=self.turns(robot) @ tool) if self.oriented else self
 
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame.
@@ -498,7 +464,7 @@ class PointObservations:
         points = np.unique(self.on_tool)
         x = row_values(robot, meant(robot, np.repeat(np.array(spread(robot)), len(points), axis=0)))
         measured = np.asarray(self.seen[self.touched < 0].any(axis=0))
-        return self._coordinates(x, np.tile(points, RICH_POSES), measured).agreeing(robot)
+        return self._coordinates(x, np.tile(points, RICH_POSES), measured)
 
     def as_coordinates(self) -> PointObservations:
         """The same points as if their coordinates were measured.

@@ -69,5 +69,5 @@ def _by_joints(robot: Robot, q: Reals, seen: PointObservations) -> Reals:
     point = robot.tool[:3, 3] if seen.on_tool.any() else np.zeros(3)
     by_row = effects(robot, row_values(robot, q), np.broadcast_to(point, (len(q), 3)))
     coupling = np.eye(robot.rows, robot.joints) if robot.coupling is None else robot.coupling
-    found: Reals = np.einsum("pmc,mj->pcj", by_row[..., :3], coupling)
+    found: Reals = by_row[:, :3] @ coupling
     return found

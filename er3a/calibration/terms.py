@@ -23,6 +23,7 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.comparison.entries import row_twists
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
@@ -152,19 +153,11 @@ def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
 
     Returns
     -------
-    effects : (P, m, 6), m and rad per rad or m, in the base frame
+    effects : (P, 6, m), m and rad per rad or m, in the base frame
     """
-    T = frames_of(tables_of(robot), robot, row_values)[0]
-    return _moving(robot, T, np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3])
-
-
-def _moving(robot: Robot, T: Reals, p: Reals) -> Reals:
-    """How points p (P, 3) move and turn with each row, (P, m, 6); frames T (P, m + 1, 4, 4)."""
-    axis, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
-    sliding = np.concatenate([axis, np.zeros_like(axis)], axis=-1)
-    turning = np.concatenate([np.cross(axis, p[:, None] - origin), axis], axis=-1)
-    found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], sliding, turning)
-    return found
+    T = frames_of(tables_of(robot), robot, row_values)[0, :, -1]
+    xyz = np.einsum("pij,pj->pi", T[:, :3, :3], points) + T[:, :3, 3]
+    return row_twists(tables_of(robot), robot, row_values, xyz)
 
 
 def centre_climb(robot: Robot, row_values: Reals) -> Reals:
@@ -184,7 +177,8 @@ def centre_climb(robot: Robot, row_values: Reals) -> Reals:
         k = each.link
         if k and whole:
             centre = T[:, k - 1, :3, :3] @ np.array(each.body.centre) + T[:, k - 1, :3, 3]
-            found[:, :k] += each.body.mass / whole * _moving(robot, T, centre)[:, :k, 2]
+            climb = row_twists(tables_of(robot), robot, row_values, centre)[:, 2, :k]
+            found[:, :k] += each.body.mass / whole * climb
     return found
 
 
@@ -214,7 +208,7 @@ class JointErrors(ByValue):
         -------
         columns : for each coefficient the row (from 0) that it acts on, and its factors (P,)
         """
-        climb, own = effects(self.robot, x, points)[:, :, 2], centre_climb(self.robot, x)
+        climb, own = effects(self.robot, x, points)[:, 2], centre_climb(self.robot, x)
         shapes = [(term, term.shapes(x, climb, own)) for term in self.terms]
         return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
 
@@ -295,7 +289,7 @@ class CorrectedModel(ByValue):
         """
         seen = self._seen(measurements)
         found = np.full(seen.seen.shape, np.nan)
-        found[seen.seen] = seen.predict(self.robot, (), np.zeros((1, 0)))[0] - seen.values_mm
+        found[seen.seen] = seen.predict(self.robot) - seen.values_mm
         return found[:, :3]
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
@@ -342,10 +336,10 @@ def term_jacobian(
     x, shifted = observations.row_values, shifted or observations
     by_row = effects(here, shifted.row_values, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
-    around = shifted.positions(here)
-    shifts = [observations.relative_shift(values[:, None] * by_row[:, row], around) for row, values in columns]
-    found = [shift[observations.seen] for shift in shifts]
-    return np.stack(found, axis=1) if found else np.empty((len(observations), 0))
+    shifts = np.zeros((*by_row.shape[:2], len(columns)))
+    for k, (row, values) in enumerate(columns):
+        shifts[..., k] = values[:, None] * by_row[..., row]
+    return observations.relative_shift(shifts, shifted.positions(here))[observations.seen]
 
 
 def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
