@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linprog
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
 from er3a.diagnosis.faults import SIDES, Fault, Faults, LengthColumn, entry_of, repairs_of, wrong_number
-from er3a.diagnosis.fitting import ANGLES, MEETS, minimise_max, moved
+from er3a.diagnosis.fitting import ANGLES, MEETS, moved
 from er3a.diagnosis.ranking import Case, Ranking, rank, usable
 from er3a.finding import fact
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
@@ -298,10 +299,14 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
         for number in case.numbers
         if number.joint
     ]
-    column = np.array(slopes)[:, :, None]
-    left = np.tile(moved_by_both, (len(slopes), 1))
-    taken_up = np.einsum("bnk,bk->bn", column, minimise_max(column, left, enough=0.0))
-    return bool((np.abs(left + taken_up).max(axis=1) > 1).all())
+    return all(_least_largest(moved_by_both, slope) > 1 for slope in slopes)
+
+
+def _least_largest(left: Reals, slope: Reals) -> float:
+    """The least of the largest of ``|left + amount * slope|``, by linear programming in the amount and the largest."""
+    beyond = -np.ones(len(left))
+    rows = np.column_stack([np.r_[slope, -slope], np.r_[beyond, beyond]])
+    return float(linprog([0.0, 1.0], rows, np.r_[-left, left], bounds=[(None, None), (0.0, None)]).fun)
 
 
 def _drawn(entry: ScannedEntry, beyond: float, random: np.random.Generator) -> float:

@@ -38,7 +38,6 @@ from er3a.calibration.fit import (
     fit,
     held_with,
     jacobian,
-    left_of_touched,
     places_at,
     rough_places,
     scale_of,
@@ -56,7 +55,6 @@ from er3a.calibration.parameters import (
     settles,
     whole_length_mm,
 )
-from er3a.calibration.plan import touches
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
@@ -143,16 +141,14 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
     placed = observations.placements
     robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations)
-    left = left_of_touched(robot, observations)
     spare = len(observations) - observations.dropped
-    rich = _rich(robot, observations)
+    rich = observations.rich(robot)
     more: list[Finding] = []
     every: list[Entry] = []
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here = subspace(robot, parameters, observations, left, dependent)
-            best = subspace(robot, parameters, rich, left, dependent) if len(rich) else here
+            here, best = (subspace(robot, parameters, seen, dependent) for seen in (observations, rich))
             every = every or [parameters[k] for k in best.kept]
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
@@ -220,11 +216,6 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> F
         missing=missing,
         each=tuple(each),
     )
-
-
-def _rich(robot: Robot, observations: PointObservations) -> PointObservations:
-    """The same points all over the joint range, or more touches of the same things."""
-    return touches(robot, observations) if observations.all_touched else observations.rich(robot)
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,6 @@ OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution: the standard deviation over the median of the size
-LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
@@ -93,12 +92,12 @@ def jacobian(
     """
     amounts = np.broadcast_to(amounts, len(parameters))
     here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
-    xyz, turns = observations.positions(here), observations.turns(here)
+    xyz, turns = observations.gathered(observations.positions(here)), observations.turns(here)
     rows = [each for each in parameters if each.joint]
     shifts = np.empty((len(xyz), 6, len(parameters)))
     shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
     by_tool = np.where(observations.on_tool[:, None, None], turns, 0.0)
-    for k in np.flatnonzero(~of_rows):
+    for k in np.flatnonzero(~of_rows).tolist():
         along, about = placing_axes(parameters[k], parameters, amounts)
         if parameters[k].column in BASE_COLUMNS:
             along, about = robot.base[:3, :3] @ along, robot.base[:3, :3] @ about
@@ -112,19 +111,17 @@ def subspace(
     robot: Robot,
     parameters: Sequence[Entry],
     observations: PointObservations,
-    left: float | None = None,
     dependent: float = DEPENDENT,
 ) -> Subspace:
     """The identifiable part of the parameters.
 
     Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
-    ``dependent`` of its length) is held. So is one that only turns or shrinks what the table leaves of points which
-    touch something: all of these could be brought to one.
+    ``dependent`` of its length) is held.
 
     Parameters
     ----------
     parameters : p entries, the preferred ones first
-    left : of a point that touches something, in standard deviations; what the table leaves, unless given
+    dependent : share of a column's length that has to lie outside of the others' span
 
     Returns
     -------
@@ -133,16 +130,14 @@ def subspace(
     rows = observations.independent(robot)[0]
     J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
     norms = np.linalg.norm(J, axis=0)
-    left = left_of_touched(robot, observations) if left is None else left
-    turned = SCALE * left * len(J) ** 0.5
-    min_norm = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
+    min_norm = NO_EFFECT * max(np.linalg.norm(1 / observations.deviation_mm), norms.max())
     kept: list[int] = []
     held: list[Held] = []
     basis: Reals = np.empty((len(J), 0))
     for k, norm in enumerate(norms):
         rest = J[:, k] - basis @ (basis.T @ J[:, k])
         rest -= basis @ (basis.T @ rest)
-        if norm > min_norm and np.linalg.norm(rest) > max(dependent * norm, turned):
+        if norm > min_norm and np.linalg.norm(rest) > dependent * norm:
             kept.append(k)
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
@@ -150,27 +145,6 @@ def subspace(
         held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
     singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
     return Subspace(tuple(kept), tuple(held), singular_values)
-
-
-def left_of_touched(robot: Robot, observations: PointObservations) -> float:
-    """What a table leaves where points touch something, and base and tool can't take it up.
-
-    Parameters
-    ----------
-    observations : with places or planes that were touched
-
-    Returns
-    -------
-    left : root mean square, in standard deviations; 0 where nothing is touched
-    """
-    if not observations.dropped:
-        return 0.0
-    off = (observations.predict(robot) - observations.values_mm) / observations.deviation_mm
-    touching = observations.touched[observations.pose_of] >= 0
-    taken = jacobian(robot, observations.placements, observations)[touching]
-    taken /= observations.deviation_mm[touching, None]
-    off = off[touching] - taken @ np.linalg.lstsq(taken, off[touching], rcond=None)[0]
-    return float(np.sqrt(np.mean(off**2)))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
@@ -461,7 +435,9 @@ def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservatio
     placing = [k for k, each in enumerate(kept) if each in by_name]
     amounts[placing] = [by_name[kept[k]] for k in placing]
     seen = observations.take(used)
-    off, there = (np.linalg.norm(seen.predict(arm) - seen.values_mm) for arm in (robot, corrected(robot, kept, amounts)))
+    off, there = (
+        np.linalg.norm(seen.predict(arm) - seen.values_mm) for arm in (robot, corrected(robot, kept, amounts))
+    )
     return amounts if FAR * there < off else none
 
 

@@ -27,7 +27,7 @@ from er3a.robots.robot import Robot
 LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
-RICH_POSES = 64  # joint vectors all over the range
+RICH_POSES, FEW = 64, 6  # joint vectors all over the range; places and planes that are looked at there
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
@@ -206,6 +206,23 @@ class PointObservations:
                 found[rows] = own - own.mean(axis=0)
             else:
                 found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
+        return found
+
+    def gathered(self, xyz: Reals) -> Reals:
+        """Points with those of one place together, at their mean, so that what turns all of them shows in none.
+
+        Parameters
+        ----------
+        xyz : (P, 3), m, base frame
+
+        Returns
+        -------
+        gathered : (P, 3), m
+        """
+        found = xyz.copy()
+        for kind, rows in self.groups():
+            if kind == "place":
+                found[rows] = xyz[rows].mean(axis=0)
         return found
 
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
@@ -453,18 +470,23 @@ class PointObservations:
     def rich(self, robot: Robot) -> PointObservations:
         """The same points at poses all over the joint range, to see what could be determined.
 
+        Poses that would touch a place needn't be known: a Jacobian has all points of a place together in any case.
+
         Parameters
         ----------
         robot : whose limits the poses keep
 
         Returns
         -------
-        observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any; values are 0
+        observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any, or of the
+            first ``FEW`` things if all points touch one; values are 0
         """
-        points = np.unique(self.on_tool)
-        x = row_values(robot, meant(robot, np.repeat(np.array(spread(robot)), len(points), axis=0)))
-        measured = np.asarray(self.seen[self.touched < 0].any(axis=0))
-        return self._coordinates(x, np.tile(points, RICH_POSES), measured)
+        numbers = np.unique(self.touched)[:FEW] if self.all_touched else np.array([-1])
+        kinds = [(point, number) for point in np.unique(self.on_tool) for number in numbers]
+        seen = [self.seen[self.touched == number].any(axis=0) for _, number in kinds]
+        x = row_values(robot, meant(robot, np.array(spread(robot))))
+        on_tool, touched = np.repeat(np.array(kinds), len(x), axis=0).T
+        return self._imagined(np.tile(x, (len(kinds), 1)), on_tool > 0, np.repeat(seen, len(x), axis=0), touched)
 
     def as_coordinates(self) -> PointObservations:
         """The same points as if their coordinates were measured.
@@ -473,12 +495,12 @@ class PointObservations:
         -------
         observations : P points, nothing touched
         """
-        return self._coordinates(self.row_values, self.on_tool, np.arange(6) < 3)
+        count = len(self.row_values)
+        return self._imagined(self.row_values, self.on_tool, np.tile(np.arange(6) < 3, (count, 1)), np.full(count, -1))
 
-    def _coordinates(self, row_values: Reals, on_tool: Flags, measured: Flags) -> PointObservations:
-        """Values that are 0, of those of the six that are measured of each point."""
+    def _imagined(self, row_values: Reals, on_tool: Flags, seen: Flags, touched: Integers) -> PointObservations:
+        """Values that are 0, of points that could have been measured."""
         count, lengths = len(row_values), self.is_length
-        seen = np.tile(measured, (count, 1))
         usual = [np.median(self.deviation_mm[own]) if own.any() else 1.0 for own in (lengths, ~lengths)]
         return replace(
             self,
@@ -488,7 +510,7 @@ class PointObservations:
             values_mm=np.zeros(seen.sum()),
             deviation_mm=np.broadcast_to(np.repeat(usual, 3), seen.shape)[seen],
             lines=np.zeros(count, dtype=np.int64),
-            touched=np.full(count, -1),
+            touched=touched,
             orientations=np.tile(np.eye(3), (count, 1, 1)),
         )
 

@@ -154,7 +154,9 @@ def entry_twists(table: Tables, robot: Robot, x: Reals, entries: Sequence[Entry]
     """
     T = frames_of(table, robot, x)[0, :, :-1]
     a, alpha, d, offset, sliding = (getattr(table, name)[0] for name in ("a", "alpha", "d", "offset", "sliding"))
-    links = T @ np.array([rot_z(angle) for angle in np.where(sliding, offset, 0.0)])  # a sliding row's frame is unturned
+    links = T @ np.array(
+        [rot_z(angle) for angle in np.where(sliding, offset, 0.0)]
+    )  # a sliding row's frame is unturned
     if table.modified[0]:
         links = np.concatenate([np.broadcast_to(robot.base, links[:, :1].shape), links[:, :-1]], axis=1)
         d = np.append(0.0, d[:-1])

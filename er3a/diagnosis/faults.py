@@ -6,12 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Literal, cast
 
 import numpy as np
 
-from er3a.comparison.changes import Change, exchanged, in_order, other_convention, swapped, times
+from er3a.comparison.changes import SHAPE, Change, Slip, slips_of, times
 from er3a.comparison.entries import LENGTHS, Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import COLUMNS, Tables
@@ -150,21 +149,12 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
     -------
     repairs : each with the fault that it corrects
     """
-    joints, alphas = range(given.a.shape[-1]), np.degrees(given.alpha[0]).tolist()
+    joints = range(given.a.shape[-1])
     candidates = [
         *limit_repairs(given, references),
         *_units(),
-        *(
-            Repair(fact("wrong_alpha_sign", joint=j + 1, given_deg=alpha, fits_deg=-alpha), times(-1.0, ("alpha",), j))
-            for j, alpha in enumerate(alphas)
-        ),
-        *_swaps(joints),
+        *(Repair(fault, slip.undone) for slip in slips_of(len(joints)) if (fault := _fault_of(slip, given))),
         *_offsets(given, joints),
-        *(Repair(fact("reversed_direction", joint=j + 1), times(-1.0, ("direction",), j)) for j in joints),
-        Repair(
-            fact("wrong_convention", read_as="modified" if given.modified[0] else "standard"),
-            other_convention,
-        ),
         *_limits(joints),
     ]
     return [repair for repair in candidates if _differs(repair.apply(given), given)]
@@ -255,27 +245,28 @@ def _units() -> list[Repair]:
     ]
 
 
-_SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] = (
-    ("rows", ("a", "alpha", "d")),
-    ("a", ("a",)),
-    ("alpha", ("alpha",)),
-    ("d", ("d",)),
-)
+_SHIFTED = {SHAPE: "rows", ("a",): "a", ("alpha",): "alpha", ("d",): "d"}
 
 
-def _swaps(joints: range) -> list[Repair]:
-    rows = len(joints)
-    found = [Repair(fact("swapped_entries", joint=j + 1), swapped(j)) for j in joints]
-    found.append(Repair(fact("swapped_entries", joint=None), swapped()))
-    for i, j in combinations(joints, 2):
-        order, pair = exchanged(rows, i, j), {"first": i + 1, "second": j + 1}
-        found.append(Repair(fact("swapped_rows", **pair), in_order(order, ("a", "alpha", "d"))))
-        found.append(Repair(fact("swapped_limits", **pair), in_order(order, ("lower", "upper"))))
-    for entries, columns in _SHIFTS:
-        for toward, by in (("down", -1), ("up", 1)):
-            order = np.roll(joints, by).tolist()
-            found.append(Repair(fact("shifted_rows", entries=entries, toward=toward), in_order(order, columns)))
-    return found
+def _fault_of(slip: Slip, given: Tables) -> Fault | None:
+    """The fault that a slip of a pen is; None for those that are free numbers, or too many to be tried in pairs."""
+    joints = [row + 1 for row in slip.rows]
+    joint = joints[0] if len(joints) == 1 else None
+    if slip.code == "one_alpha_negated":
+        alpha = float(np.degrees(given.alpha[0, slip.rows[0]]))
+        return fact("wrong_alpha_sign", joint=joint, given_deg=alpha, fits_deg=-alpha)
+    if slip.code == "direction_reversed":
+        return fact("reversed_direction", joint=joint)
+    if slip.code == "other_convention":
+        return fact("wrong_convention", read_as="modified" if given.modified[0] else "standard")
+    if slip.code == "a_and_d_swapped":
+        return fact("swapped_entries", joint=joint)
+    if slip.code == "limits_exchanged" or (slip.code == "rows_exchanged" and slip.columns == SHAPE):
+        code = "swapped_limits" if slip.code == "limits_exchanged" else "swapped_rows"
+        return fact(code, first=joints[0], second=joints[1])
+    if slip.code == "rows_shifted" and slip.columns in _SHIFTED:
+        return fact("shifted_rows", entries=_SHIFTED[slip.columns], toward="up" if slip.amount > 0 else "down")
+    return None
 
 
 def _offsets(given: Tables, joints: range) -> list[Repair]:

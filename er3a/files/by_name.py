@@ -20,7 +20,7 @@ from er3a.calibration.outcomes import FixedName
 from er3a.calibration.parameters import all_parameters, corrected
 from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, starting_table, terms_of
 from er3a.diagnosis import diagnose as diagnosis
-from er3a.diagnosis.diagnose import Hypotheses
+from er3a.diagnosis.diagnose import Diagnosis
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import CsvColumn, columns_of, read_csv, read_header
 from er3a.files.orientations import POSITION
@@ -176,7 +176,7 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
                 raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Hypotheses:
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Diagnosis:
     """Hypotheses about the faults of a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
 
     Parameters
@@ -228,7 +228,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
         documents |= own.documents.by_name
     if references is None:
         check_robot_origins(robot, documents)
-    best = diagnosis.diagnosis_of(robot, stated).hypotheses[:1]
+    best = diagnosis.diagnosis_of(robot, stated)[:1]
     right = [each.corrected for each in best if each.explains]
     return evidence_of(robot, stated, Documents(documents), tolerance, corrected=right)
 
