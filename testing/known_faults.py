@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linprog
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
@@ -299,14 +298,19 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
         for number in case.numbers
         if number.joint
     ]
-    return all(_least_largest(moved_by_both, slope) > 1 for slope in slopes)
+    return bool((_least_largest(moved_by_both, np.array(slopes)) > 1).all())
 
 
-def _least_largest(left: Reals, slope: Reals) -> float:
-    """The least of the largest of ``|left + amount * slope|``, by linear programming in the amount and the largest."""
-    beyond = -np.ones(len(left))
-    rows = np.column_stack([np.r_[slope, -slope], np.r_[beyond, beyond]])
-    return float(linprog([0.0, 1.0], rows, np.r_[-left, left], bounds=[(None, None), (0.0, None)]).fun)
+def _least_largest(left: Reals, slopes: Reals) -> Reals:
+    """The least, over an amount, of the largest of ``|left + amount * slope|``, for each of (B, n) slopes, by thirds."""
+    steepest = np.abs(slopes).max(axis=1)
+    high = np.where(steepest > 0, 2 * np.abs(left).max() / np.maximum(steepest, 1e-300), 0.0)
+    low = -high
+    for _ in range(100):
+        one, other = low + (high - low) / 3, high - (high - low) / 3
+        nearer = [np.abs(left + amount[:, None] * slopes).max(axis=1) for amount in (one, other)]
+        low, high = np.where(nearer[0] < nearer[1], low, one), np.where(nearer[0] < nearer[1], other, high)
+    return np.asarray(np.abs(left + low[:, None] * slopes).max(axis=1))
 
 
 def _drawn(entry: ScannedEntry, beyond: float, random: np.random.Generator) -> float:

@@ -71,9 +71,7 @@ from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
-CLOSE = 0.9  # correlation of two estimates that are named together
 MAX_SCATTER = 3.0  # standard deviations, beyond which the model does not fit
-SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
 TOGETHER = 0.5
 """Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
 MAX_OUTLIER_SHARE = 0.1  # of the measurements, that is set aside at most
@@ -253,15 +251,6 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Close:
-    """Two estimates whose errors are correlated by more than 0.9."""
-
-    first: str
-    second: str
-    correlation: float
-
-
-@dataclass(frozen=True)
 class Outlier:
     """A measurement that was set aside: its line in the file, and how far it is from the model that the others fit."""
 
@@ -315,10 +304,9 @@ class Calibration(ByValue, Displayed):
     ----------
     robot : with the corrected table, base and tool, the best without terms but for those of its coupling
     level : which entries were estimated
-    estimates : one per identifiable entry; correlation : (k, k), of their errors
+    estimates : one per identifiable entry
     ratios : of joints, and couplings, where poses left out are met better with them
     held : why the other entries of the level keep their values
-    singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses; of those that were read again the means
     wrong : why measurements and table can't belong together; None if they can
     freedom : how many more independent coordinates than numbers there are; of one nothing is settled, unless the
@@ -344,10 +332,7 @@ class Calibration(ByValue, Displayed):
     robot: Robot
     level: outcomes.LevelName
     estimates: tuple[Estimate, ...]
-    correlation: Reals
     held: tuple[outcomes.Held, ...]
-    close: tuple[Close, ...]
-    singular_values: Reals
     coordinates: int
     poses: int
     rms_before_mm: float
@@ -493,19 +478,14 @@ def _result(robot: Robot, level: Level, observations: PointObservations, found: 
     """What the table, with ratios, has of a calibration."""
     beside = _beside(robot, level, observations, found)
     covariance, quantiles = _covariance(observations, found, beside)
-    error, count = np.sqrt(np.diag(covariance)), len(found.kept)
-    correlation = (covariance / np.maximum(np.outer(error, error), SMALLEST))[:count, :count]
-    rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
+    error, deviation = np.sqrt(np.diag(covariance)), observations.deviation_mm
+    here = corrected(robot, found.kept, found.amounts)
     return Calibration(
         robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
         estimates=_estimates(robot, observations, found, error, quantiles),
-        correlation=correlation,
         ratios=_term_estimates(found, error),
         held=level.held,
-        close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
-        singular_values=level.subspace.singular_values,
         coordinates=len(observations),
         poses=observations.poses,
         rms_before_mm=observations.rms_mm(found.before * deviation),
@@ -608,10 +588,7 @@ class _Model:
 
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
-    table = _fitted(robot, level, observations)
-    if not observations.deviation_known:
-        observations = _rescaled(observations, table)
-        table = fit(robot, level.kept, observations)
+    observations, table = _refitted(robot, observations, _fitted(robot, level, observations))
     here = corrected(robot, table.kept, table.amounts)
     unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
     ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
@@ -627,27 +604,23 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         and _error_left_out(observations, whole) >= _error_left_out(observations, table)
     ):
         choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
-    finer = observations
-    if not observations.deviation_known:  # that of the table alone would let the prior pull coefficients towards 0
-        if for_file.terms:
-            observations = _rescaled(observations, table)
-            table = fit(robot, level.kept, observations, for_file.terms)
-        if choice.terms:
-            finer = _rescaled(finer, whole)
-            whole = fit(robot, level.kept, finer, choice.terms)
-    if not choice.terms:
-        finer, whole = observations, table
-    return _Model(observations, finer, level, table, choice, for_file, whole)
+    # The deviation of the table alone would let the prior pull coefficients towards 0.
+    seen, table = _refitted(robot, observations, table) if for_file.terms else (observations, table)
+    finer, whole = _refitted(robot, observations, whole) if choice.terms else (seen, table)
+    return _Model(seen, finer, level, table, choice, for_file, whole)
 
 
-def _rescaled(observations: PointObservations, found: Fit) -> PointObservations:
-    """Observations with standard deviations by what a fit leaves, of coordinates and of orientations."""
+def _refitted(robot: Robot, observations: PointObservations, found: Fit) -> tuple[PointObservations, Fit]:
+    """A fit by standard deviations that it leaves, of coordinates and of orientations, where none is stated."""
+    if observations.deviation_known:
+        return observations, found
     lengths, deviation = observations.is_length, observations.deviation_mm.copy()
     for own in (lengths, ~lengths):
         left = found.rest[own[found.last]]
         share = found.freedom * len(left) / len(found.rest)
         deviation[own] *= np.sqrt(left @ left / share) if len(left) else 1.0
-    return observations.with_deviation(deviation)
+    seen = observations.with_deviation(deviation)
+    return seen, fit(robot, found.kept, seen, found.terms)
 
 
 def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:

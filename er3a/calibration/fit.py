@@ -31,7 +31,7 @@ from er3a.calibration.parameters import (
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
 from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import nearest_rotations, rpy_of, transposed
+from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, transposed
 from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
@@ -68,12 +68,10 @@ class Subspace:
     ----------
     kept : places of the parameters that are estimated
     held : why the others keep their values
-    singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
     """
 
     kept: tuple[int, ...]
     held: tuple[Held, ...]
-    singular_values: Reals
 
 
 def jacobian(
@@ -125,7 +123,7 @@ def subspace(
 
     Returns
     -------
-    subspace : places of the parameters kept, why others are held, and singular values (per mm or mrad)
+    subspace : places of the parameters kept, and why others are held
     """
     rows = observations.independent(robot)[0]
     J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
@@ -143,8 +141,7 @@ def subspace(
             continue
         nothing = fact("moves_nothing", entry=parameters[k].name)
         held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
-    singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
-    return Subspace(tuple(kept), tuple(held), singular_values)
+    return Subspace(tuple(kept), tuple(held))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
@@ -323,7 +320,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
-def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
+def aligned(points: Reals, measured: Reals) -> Reals:
     """Rigid transform that brings points nearest to measured ones, in the least squares (Kabsch).
 
     Parameters
@@ -333,22 +330,14 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
     Returns
     -------
     S : (4, 4), m, places the points at the measured ones
-    scale : how many times as large the measured figure is; NaN if all points of one are at one place
-    share : of the squares, what remains after such a scale, 0 to 1
 
     References
     ----------
     W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A 32, 1976.
     """
-    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
-    U, sizes, V = np.linalg.svd((measured - centre).T @ (points - at))
-    signs = np.array([1.0, 1.0, np.linalg.det(U @ V)])
-    S[:3, :3] = U @ np.diag(signs) @ V
-    S[:3, 3] = centre - S[:3, :3] @ at
-    both, own, theirs = sizes @ signs, ((points - at) ** 2).sum(), ((measured - centre) ** 2).sum()
-    if not own * theirs:
-        return S, float("nan"), 1.0
-    return S, float(both / own), float(1 - both**2 / (own * theirs))
+    at, centre = points.mean(axis=0), measured.mean(axis=0)
+    R = nearest_rotations((measured - centre).T @ (points - at))
+    return posed(R, centre - R @ at)
 
 
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
@@ -399,7 +388,7 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
         if "tool" in free:
             t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0].astype(float)
         return S, t
-    S = aligned(x, m)[0]
+    S = aligned(x, m)
     if "tool" not in free:
         return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
@@ -407,13 +396,12 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
     inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
     found = []
     for turn in (S[:3, :3], nearest_rotations(inverse.T)):
-        S = np.eye(4)
-        S[:3, :3] = turn
+        S = posed(turn, np.zeros(3))
         for _ in range(TURNS):
             back = (m @ S[:3, :3] - x).ravel()
             both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
             t = np.linalg.lstsq(both, back, rcond=None)[0][:3].astype(float)
-            S = aligned(x + R @ t, m)[0]
+            S = aligned(x + R @ t, m)
         found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
     return min(found, key=lambda each: each[0])[1:]
 
