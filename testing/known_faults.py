@@ -302,7 +302,7 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
 
 
 def _least_largest(left: Reals, slopes: Reals) -> Reals:
-    """The least, over an amount, of the largest of ``|left + amount * slope|``, for each of (B, n) slopes, by thirds."""
+    """The least, over an amount, of the largest of ``|left + amount * slope|`` for each of (B, n) slopes, by thirds."""
     steepest = np.abs(slopes).max(axis=1)
     high = np.where(steepest > 0, 2 * np.abs(left).max() / np.maximum(steepest, 1e-300), 0.0)
     low = -high
