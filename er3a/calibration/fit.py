@@ -1,6 +1,6 @@
 """Which numbers measurements can tell apart, and their values by weighted least squares.
 
-Gauss-Newton steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
+Levenberg-Marquardt steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
 
 References
 ----------
@@ -17,6 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import CalibrationError, Held, PlacementName
@@ -39,12 +40,10 @@ from er3a.robots.robot import Robot
 
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS, MAX_STEPS = 30, 100
+STEPS = 200  # of a fit, at most
+FLAT, EXACT = 1e-9, 1e-12  # share of the squares that the last step lowers, and of the numbers that it moves
 PLAUSIBLE = 0.05  # m and rad: a standard deviation of corrections
 FAR_OFF = 4.0  # of these
-SMALL_STEP = 1e-12  # m and rad
-SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
-HALVINGS = 12
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 MIN_OWN = 1e-9
 CLEAR = 10.0
@@ -320,7 +319,7 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
-def aligned(points: Reals, measured: Reals) -> Reals:
+def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
     """Rigid transform that brings points nearest to measured ones, in the least squares (Kabsch).
 
     Parameters
@@ -330,14 +329,19 @@ def aligned(points: Reals, measured: Reals) -> Reals:
     Returns
     -------
     S : (4, 4), m, places the points at the measured ones
+    scale : how many times as large the measured figure is; NaN if all points of one are at one place
+    share : of the squares, what remains after such a scale, 0 to 1
 
     References
     ----------
     W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A 32, 1976.
     """
     at, centre = points.mean(axis=0), measured.mean(axis=0)
-    R = nearest_rotations((measured - centre).T @ (points - at))
-    return posed(R, centre - R @ at)
+    products = (measured - centre).T @ (points - at)
+    R = nearest_rotations(products)
+    both, own, theirs = (R * products).sum(), ((points - at) ** 2).sum(), ((measured - centre) ** 2).sum()
+    scale, share = (both / own, 1 - both**2 / (own * theirs)) if own * theirs else (np.nan, 1.0)
+    return posed(R, centre - R @ at), float(scale), float(share)
 
 
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
@@ -388,7 +392,7 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
         if "tool" in free:
             t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0].astype(float)
         return S, t
-    S = aligned(x, m)
+    S = aligned(x, m)[0]
     if "tool" not in free:
         return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
@@ -401,7 +405,7 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
             back = (m @ S[:3, :3] - x).ravel()
             both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
             t = np.linalg.lstsq(both, back, rcond=None)[0][:3].astype(float)
-            S = aligned(x + R @ t, m)
+            S = aligned(x + R @ t, m)[0]
         found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
     return min(found, key=lambda each: each[0])[1:]
 
@@ -496,28 +500,15 @@ def _fit(
             J = np.block([[J, by_terms], [np.zeros((len(prior), k)), np.diag(prior)]])
         return np.vstack([J, held])
 
-    before, rest = weighted(np.zeros(len(unknowns)))[:n], weighted(unknowns)
-    for number in range(MAX_STEPS):
-        J = slopes(unknowns)
-        step = np.linalg.lstsq(J, -rest, rcond=None)[0]
-        gain = np.linalg.norm(J @ step)
-        for _ in range(HALVINGS):
-            trial = unknowns + step
-            new = weighted(trial)
-            if new @ new <= rest @ rest * (1 + 1e-9):
-                break
-            step = step / 2
-        unknowns, rest = trial, new
-        small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
-        if gain < small * np.linalg.norm(rest) or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
-            rows, last = with_errors(unknowns[k:]).independent(corrected(robot, kept, unknowns[:k]))
-            own = np.sqrt(rows**2 @ deviation**2)
-            return Fit(
-                kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last
-            )
-    rest_mm = observations.rms_mm(rest[:n] * deviation)
-    raise CalibrationError(
-        fact("no_correction_fits", steps=MAX_STEPS, rest_mm=rest_mm),
-        f"no corrections make the table fit: after {MAX_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
-        "The table has a gross fault or is another arm's; er3a confirm names what is other",
-    )
+    solved = least_squares(weighted, unknowns, slopes, method="lm", ftol=FLAT, xtol=EXACT, gtol=EXACT, max_nfev=STEPS)
+    before, amounts, rest = weighted(np.zeros(len(unknowns)))[:n], solved.x, solved.fun[:n]
+    if not solved.success:
+        rest_mm = observations.rms_mm(rest * deviation)
+        raise CalibrationError(
+            fact("no_correction_fits", steps=STEPS, rest_mm=rest_mm),
+            f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+            "The table has a gross fault or is another arm's; er3a confirm names what is other",
+        )
+    rows, last = with_errors(amounts[k:]).independent(corrected(robot, kept, amounts[:k]))
+    own, J = np.sqrt(rows**2 @ deviation**2), rows @ solved.jac[:n]
+    return Fit(kept, terms, amounts[:k], amounts[k:], before, rest, J, rows @ rest, own, last)
