@@ -9,7 +9,7 @@ import numpy as np
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
-from er3a.diagnosis.faults import SIDES, Fault, Faults, LengthColumn, entry_of, repairs_of, wrong_number
+from er3a.diagnosis.faults import SIDES, Fault, Faults, entry_of, repairs_of, wrong_number
 from er3a.diagnosis.fitting import ANGLES, MEETS, moved
 from er3a.diagnosis.ranking import Case, Ranking, rank, usable
 from er3a.finding import fact
@@ -20,7 +20,7 @@ from er3a.references.quantities import MM, Limit, Quantity, Side
 from er3a.references.reference import Reference, ReferenceSet, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
-LENGTH_COLUMNS: tuple[LengthColumn, ...] = ("a", "d")
+LENGTH_COLUMNS = ("a", "d")
 SCALES = (0.9, 1.05, 25.4)
 WRONG_BY_M = (0.005, -0.02)
 SAME_LENGTH_M = 2e-3

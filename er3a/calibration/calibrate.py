@@ -61,7 +61,7 @@ from er3a.calibration.terms import (
     TYPICAL,
     CorrectedModel,
     JointErrors,
-    TermKind,
+    JointTerm,
     places_of,
 )
 from er3a.comparison.entries import Entry
@@ -91,28 +91,16 @@ class Level:
     Attributes
     ----------
     name : one of ``LEVELS``
-    parameters : its entries, behind those of base and tool; subspace : which of them the observations determine
+    kept : its entries that are estimated, with those of base and tool; held : why the others keep their values
     more : what a fuller level would take; None if all entries are estimated
-    scale : the length that is taken as it is because nothing else sets the scale; None where coordinates were measured
     left : entries, base and tool that are not estimated although more observations could settle them
     """
 
     name: LevelName
-    parameters: tuple[Entry, ...]
-    subspace: Subspace
+    kept: tuple[Entry, ...]
+    held: tuple[outcomes.Held, ...]
     more: Finding | None
-    scale: Entry | None = None
     left: tuple[Entry, ...] = ()
-
-    @property
-    def held(self) -> tuple[outcomes.Held, ...]:
-        """Why the others keep their values."""
-        return (*self.subspace.held, *held_with(self.scale))
-
-    @property
-    def kept(self) -> list[Entry]:
-        """Those that are estimated."""
-        return [self.parameters[i] for i in self.subspace.kept]
 
 
 def choose_level(robot: Robot, observations: PointObservations) -> Level:
@@ -142,19 +130,19 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
     spare = len(observations) - observations.dropped
     rich = observations.rich(robot)
     more: list[Finding] = []
-    every: list[Entry] = []
+    every: tuple[Entry, ...] = ()
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
             here, best = (subspace(robot, parameters, seen, dependent) for seen in (observations, rich))
-            every = every or [parameters[k] for k in best.kept]
+            every = every or best.kept
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
-                more.append(_what_more(name, parameters, (here, best), observations))
+                more.append(_what_more(name, (here, best), observations))
             if (settled or is_one(more[-1], "more_touches")) and spare > len(here.kept) > 0:
                 what = next((each for each in more if is_one(each, "more_touches")), more[-1] if more else None)
-                left_out_of_it = tuple(each for each in every if each not in parameters)
-                return Level(name, parameters, here, what, scale, left_out_of_it)
+                left = tuple(each for each in every if each not in parameters)
+                return Level(name, here.kept, (*here.held, *held_with(scale)), what, left)
     if not more[-1].determinable:
         raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
     lack = "numbers" if is_one(more[-1], "more_touches") else "positions"
@@ -174,12 +162,7 @@ def _with_rough_tool(robot: Robot, observations: PointObservations) -> tuple[Rob
     return corrected(robot, placed, shift), ROUGHLY * DEPENDENT
 
 
-def _what_more(
-    level: LevelName,
-    parameters: tuple[Entry, ...],
-    subspaces: tuple[Subspace, Subspace],
-    observations: PointObservations,
-) -> Finding:
+def _what_more(level: LevelName, subspaces: tuple[Subspace, Subspace], observations: PointObservations) -> Finding:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
     if observations.all_touched:
@@ -192,7 +175,7 @@ def _what_more(
         determinable=len(best.kept),
         fitted=level,
         missing=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
-        entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
+        entries=tuple(each.name for each in best.kept if each not in here.kept),
     )
 
 
@@ -258,22 +241,17 @@ class Outlier:
     distance_mm: float
 
 
-@dataclass(frozen=True)
-class TermEstimate:
+@dataclass(frozen=True, kw_only=True)
+class TermEstimate(JointTerm):
     """A term beyond the table, in units of 1/1000 (rad, m; each per rad, m of what it is multiplied by).
 
     Attributes
     ----------
     coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
-    turns : how often a ripple returns in a turn; by : the joint that it is coupled to
     """
 
-    kind: TermKind
-    joint: int
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
-    turns: int = 0
-    by: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -756,12 +734,9 @@ def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
     own_error = error[len(found.kept) :]
     return tuple(
         TermEstimate(
-            term.kind,
-            term.joint,
-            tuple((1000 * found.coefficients[own]).tolist()),
-            tuple((1000 * own_error[own]).tolist()),
-            term.turns,
-            term.by,
+            **vars(term),
+            coefficients=tuple((1000 * found.coefficients[own]).tolist()),
+            standard_errors=tuple((1000 * own_error[own]).tolist()),
         )
         for term, own in zip(found.terms, places_of(found.terms))
     )

@@ -65,11 +65,11 @@ class Subspace:
 
     Attributes
     ----------
-    kept : places of the parameters that are estimated
+    kept : the parameters that are estimated
     held : why the others keep their values
     """
 
-    kept: tuple[int, ...]
+    kept: tuple[Entry, ...]
     held: tuple[Held, ...]
 
 
@@ -122,7 +122,7 @@ def subspace(
 
     Returns
     -------
-    subspace : places of the parameters kept, and why others are held
+    subspace : the parameters kept, and why others are held
     """
     rows = observations.independent(robot)[0]
     J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
@@ -140,7 +140,7 @@ def subspace(
             continue
         nothing = fact("moves_nothing", entry=parameters[k].name)
         held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
-    return Subspace(tuple(kept), tuple(held))
+    return Subspace(tuple(parameters[k] for k in kept), tuple(held))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:

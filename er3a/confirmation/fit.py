@@ -285,6 +285,25 @@ class Fitter:
         count = len(self.pairs) * self.dimensions
         return self._jacobian(state, whiten)[:count], self._left(state, whiten)[:count]
 
+    def effects(self, state: State, more: Sequence[Entry]) -> tuple[Reals, Reals, Reals]:
+        """What k entries more do, to first order.
+
+        Parameters
+        ----------
+        state : at which; none of its entries is among them
+
+        Returns
+        -------
+        own, beside, left : (r, k), derivatives of the differences, (r, k), the part of these that nothing which is free
+            takes up, and (r,), the differences, all in standard deviations
+        """
+        entries, amounts = (*state.entries, *more), np.append(state.amounts, np.zeros(len(more)))
+        explanation = replace(state.explanation, entries=entries, small=False)
+        J, left = self.linear(State(explanation, entries, state.Y, state.X, amounts))
+        free, own = np.split(J, [J.shape[1] - len(more)], axis=1)
+        Q = np.linalg.qr(free)[0]
+        return own, own - Q @ (Q.T @ own), left
+
     def at(self, solution: Solution, rows: Flags | None = None) -> Solution:
         """A solution's differences at all of the pairs.
 

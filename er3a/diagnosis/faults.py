@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
 
 import numpy as np
 
@@ -17,12 +16,6 @@ from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, LimitExcess, Side, value_at
 from er3a.references.reference import Reference, expected_of
-
-Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
-Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
-LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
-LengthColumn = Literal["a", "d"]
-
 
 Fault = Finding
 Faults = tuple[Fault, ...]
@@ -56,9 +49,7 @@ def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
     if entry.column == "scale":
         return fact("wrong_scale", factor=fits)
     if entry.column in LENGTHS:
-        return fact(
-            "wrong_length", joint=entry.joint, column=cast(LengthColumn, entry.column), given_mm=given, fits_mm=fits
-        )
+        return fact("wrong_length", joint=entry.joint, column=entry.column, given_mm=given, fits_mm=fits)
     return fact(
         "wrong_alpha" if entry.column == "alpha" else "wrong_offset", joint=entry.joint, given_deg=given, fits_deg=fits
     )
@@ -219,18 +210,18 @@ def _differs(left: Tables, right: Tables) -> bool:
     return any(np.abs(getattr(left, name) - getattr(right, name).astype(float)).max() > SAME for name in COLUMNS)
 
 
-_LENGTHS: tuple[tuple[Entries, tuple[str, ...]], ...] = (("a", ("a",)), ("d", ("d",)), ("lengths", ("a", "d")))
-_ANGLES: tuple[tuple[Entries, tuple[str, ...]], ...] = (
+_LENGTHS = (("a", ("a",)), ("d", ("d",)), ("lengths", ("a", "d")))
+_ANGLES = (
     ("alpha", ("alpha",)),
     ("offset", ("offset",)),
     ("limits", ("lower", "upper")),
     ("angles", ("alpha", "offset", "lower", "upper")),
 )
-_MISREAD_LENGTHS: tuple[tuple[float, Misread], ...] = (
+_MISREAD_LENGTHS = (
     (1000.0, "metres_as_millimetres"),
     (0.001, "millimetres_as_metres"),
 )
-_MISREAD_ANGLES: tuple[tuple[float, Misread], ...] = (
+_MISREAD_ANGLES = (
     (1 / RADIANS_PER_DEGREE, "radians_as_degrees"),
     (RADIANS_PER_DEGREE, "degrees_as_radians"),
 )
@@ -289,7 +280,7 @@ def _offset_moved(joint: int, angle: float) -> Change:
     return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
 
 
-_LIMIT_FAULTS: tuple[tuple[LimitFault, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (
+_LIMIT_FAULTS: tuple[tuple[str, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (
     ("crossed", lambda low, high: (high, low)),
     ("signs_swapped", lambda low, high: (-high, -low)),
     ("lower_sign", lambda low, high: (-low, high)),
