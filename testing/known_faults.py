@@ -11,7 +11,7 @@ from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
 from er3a.diagnosis.faults import SIDES, Fault, Faults, entry_of, repairs_of, wrong_number
 from er3a.diagnosis.fitting import ANGLES, MEETS, moved
-from er3a.diagnosis.ranking import Case, Ranking, rank, usable
+from er3a.diagnosis.ranking import Case, Ranking, case_of, rank_case, usable
 from er3a.finding import fact
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -56,6 +56,12 @@ class Outcome:
     explained: bool
     needless: bool
     set_size: int
+
+
+def rank(robot: Robot, references: Sequence[Reference]) -> Ranking | None:
+    """Single and double faults of a table in order; None if there is nothing to explain."""
+    stated = usable(references)
+    return rank_case(case_of(robot, stated)) if stated else None
 
 
 def mutations_of(robot: Robot) -> Iterator[Mutation]:
