@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import log_rotation, rot_x, rot_y, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -40,7 +40,7 @@ ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, 
 ALIGN_POWER = 4  # of a distance, by which it counts
 TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
-HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
+NO_TURN, HALF_TURN = 1e-9, np.pi - 1e-4  # rad, below and above which an axis has no sense
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 NEAR_ROW = 1e-5  # m, and of a turn, by which base or flange may miss what a row of the table can hold
 ROUNDED = 4  # decimals of mm and deg in a corrected table
@@ -424,14 +424,12 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, R = mechanism.turn_of(T), T[:3, :3]
+    angle, about = mechanism.turn_of(T), log_rotation(T[:3, :3])
+    size = float(np.linalg.norm(about))
+    axis = about / size if size > NO_TURN else np.array([0.0, 0.0, 1.0])
     if angle > HALF_TURN:
-        outer = 0.5 * (R + np.eye(3))
-        axis = outer[:, int(np.argmax(np.diag(outer)))]
-    else:
-        axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    size = float(np.linalg.norm(axis))
-    u, v, w = (axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])).tolist()
+        axis *= np.sign(axis[np.abs(axis).argmax()])
+    u, v, w = (axis + 0.0).tolist()
     turn = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
 
