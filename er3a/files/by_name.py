@@ -283,10 +283,9 @@ def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
         own = record["beyond"] or {"entries": record["entries"], "terms": record["ratios"]}
-        weighs = any(each["kind"] == "weight" for each in own["terms"])
         for name, value in starting_table(robot).items():
             then = record["start"][name]
-            if (name != "masses" or weighs) and then != value and not _are_near(then, value):
+            if then != value and not _are_near(then, value):
                 problem = f"the calibration did not start from {robot.name}'s {name}"
                 remedy = "Give the robot that was calibrated, not the corrected one"
                 raise InputError(path, f"start, {name}", problem, remedy)
