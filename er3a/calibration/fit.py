@@ -1,6 +1,6 @@
 """Which numbers measurements can tell apart, and their values by weighted least squares.
 
-Levenberg-Marquardt steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
+Trust-region steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
 
 References
 ----------
@@ -500,7 +500,7 @@ def _fit(
             J = np.block([[J, by_terms], [np.zeros((len(prior), k)), np.diag(prior)]])
         return np.vstack([J, held])
 
-    solved = least_squares(weighted, unknowns, slopes, method="lm", ftol=FLAT, xtol=EXACT, gtol=EXACT, max_nfev=STEPS)
+    solved = least_squares(weighted, unknowns, slopes, ftol=FLAT, xtol=EXACT, gtol=EXACT, max_nfev=STEPS)
     before, amounts, rest = weighted(np.zeros(len(unknowns)))[:n], solved.x, solved.fun[:n]
     if not solved.success:
         rest_mm = observations.rms_mm(rest * deviation)

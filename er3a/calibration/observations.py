@@ -28,6 +28,7 @@ LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 RICH_POSES, FEW = 64, 6  # joint vectors all over the range; places and planes that are looked at there
+IN_LINE = 1e-9  # m, of points that no plane is seen from
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
@@ -532,11 +533,13 @@ def plane(xyz: Reals) -> tuple[Reals, Reals]:
 
     Returns
     -------
-    normal, within : (3,), unit vector whose largest component is positive, and (P, 2), m, where the points are in it
+    normal, within : (3,), unit vector whose largest component is positive, 0 for points in one line, and (P, 2), m,
+        where the points are in it
     """
     here = xyz - xyz.mean(axis=0)
-    axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
-    return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
+    _, sizes, axes = np.linalg.svd(np.linalg.qr(here, mode="r"))
+    sense = np.sign(axes[2][np.abs(axes[2]).argmax()])
+    return axes[2] * sense * (sizes[1] > IN_LINE), here @ axes[:2].T
 
 
 def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[FixedName] = ()) -> PointObservations:

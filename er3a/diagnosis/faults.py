@@ -252,9 +252,10 @@ def _fault_of(slip: Slip, given: Tables) -> Fault | None:
         return fact("wrong_convention", read_as="modified" if given.modified[0] else "standard")
     if slip.code == "a_and_d_swapped":
         return fact("swapped_entries", joint=joint)
-    if slip.code == "limits_exchanged" or (slip.code == "rows_exchanged" and slip.columns == SHAPE):
-        code = "swapped_limits" if slip.code == "limits_exchanged" else "swapped_rows"
-        return fact(code, first=joints[0], second=joints[1])
+    if slip.code == "limits_exchanged":
+        return fact("swapped_limits", first=joints[0], second=joints[1])
+    if slip.code == "rows_exchanged" and slip.columns == SHAPE:
+        return fact("swapped_rows", first=joints[0], second=joints[1])
     if slip.code == "rows_shifted" and slip.columns in _SHIFTED:
         return fact("shifted_rows", entries=_SHIFTED[slip.columns], toward="up" if slip.amount > 0 else "down")
     return None
