@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import log_rotation, rot_x, rot_y, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -529,8 +529,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
     q = np.random.default_rng(0).uniform(a.lower, a.upper, (ALIGN_POSES, a.joints))
 
     def moved(x: Reals) -> Alignment:
-        ends = (translation(*own[:3]) @ rot_z(own[3]) @ rot_y(own[4]) @ rot_x(own[5]) for own in (x[:6], x[6:12]))
-        base, flange = ends
+        base, flange = (posed(exp_rotation(own[3:]), own[:3]) for own in (x[:6], x[6:12]))
         return Alignment(base @ start.base, start.flange @ flange, start.zeros + x[12:], start.signs)
 
     def flanges(x: Reals, poses: Reals) -> tuple[Reals, Reals]:
