@@ -1,6 +1,6 @@
 """Which numbers measurements can tell apart, and their values by weighted least squares.
 
-Trust-region steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
+Gauss-Newton steps on the weighted differences; the covariance of the estimates is ``inv(J^T W J)`` [1]_.
 
 References
 ----------
@@ -17,7 +17,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from er3a.calibration.observations import PointObservations
 from er3a.calibration.outcomes import CalibrationError, Held, PlacementName
@@ -40,10 +39,12 @@ from er3a.robots.robot import Robot
 
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
-STEPS = 200  # of a fit, at most
-FLAT, EXACT = 1e-9, 1e-12  # share of the squares that the last step lowers, and of the numbers that it moves
+STEPS, MAX_STEPS = 30, 100
 PLAUSIBLE = 0.05  # m and rad: a standard deviation of corrections
 FAR_OFF = 4.0  # of these
+SMALL_STEP = 1e-12  # m and rad
+SMALL_CHANGE, SLOW_CHANGE = 1e-6, 1e-3  # of the weighted differences, of measured points; after STEPS
+HALVINGS = 12
 ROUNDING = 1e-6  # mm: a fit that leaves less has met its points exactly
 MIN_OWN = 1e-9
 CLEAR = 10.0
@@ -74,7 +75,12 @@ class Subspace:
 
 
 def jacobian(
-    robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
+    robot: Robot,
+    parameters: Sequence[Entry],
+    observations: PointObservations,
+    amounts: Reals | float = 0.0,
+    *,
+    gathered: bool = False,
 ) -> Reals:
     """Derivatives of observed values by parameters.
 
@@ -82,6 +88,7 @@ def jacobian(
     ----------
     parameters : p entries of table, base and tool
     amounts : (p,), m or rad, added to the robot's values, where the derivatives are taken
+    gathered : whether all points of a place are taken to be together, so that what turns all of them shows in none
 
     Returns
     -------
@@ -89,7 +96,8 @@ def jacobian(
     """
     amounts = np.broadcast_to(amounts, len(parameters))
     here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
-    xyz, turns = observations.gathered(observations.positions(here)), observations.turns(here)
+    xyz, turns = observations.positions(here), observations.turns(here)
+    xyz = observations.gathered(xyz) if gathered else xyz
     rows = [each for each in parameters if each.joint]
     shifts = np.empty((len(xyz), 6, len(parameters)))
     shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
@@ -113,7 +121,8 @@ def subspace(
     """The identifiable part of the parameters.
 
     Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
-    ``dependent`` of its length) is held.
+    ``dependent`` of its length) is held. So is one for which that is so if points of one place are together, as a
+    corrected table will have them: then what only turns them shows in none.
 
     Parameters
     ----------
@@ -124,23 +133,30 @@ def subspace(
     -------
     subspace : the parameters kept, and why others are held
     """
-    rows = observations.independent(robot)[0]
-    J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
-    norms = np.linalg.norm(J, axis=0)
-    min_norm = NO_EFFECT * max(np.linalg.norm(1 / observations.deviation_mm), norms.max())
+    rows, scale = observations.independent(robot)[0], SCALE / observations.deviation_mm[:, None]
+    ways = (False, True) if observations.kinds else (False,)
+    every = [rows @ (scale * jacobian(robot, parameters, observations, gathered=way)) for way in ways]
+    no_effect = NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm)
     kept: list[int] = []
     held: list[Held] = []
-    basis: Reals = np.empty((len(J), 0))
-    for k, norm in enumerate(norms):
-        rest = J[:, k] - basis @ (basis.T @ J[:, k])
-        rest -= basis @ (basis.T @ rest)
-        if norm > min_norm and np.linalg.norm(rest) > dependent * norm:
+    bases: list[Reals] = [np.empty((len(J), 0)) for J in every]
+    for k, parameter in enumerate(parameters):
+        norms = [(float(np.linalg.norm(J[:, k])), np.linalg.norm(J, axis=0).max()) for J in every]
+        rests = [_outside(J[:, k], basis) for J, basis in zip(every, bases)]
+        if any(norm <= max(no_effect, NO_EFFECT * most) for norm, most in norms):
+            held.append(fact("moves_nothing", entry=parameter.name))
+        elif any(np.linalg.norm(rest) <= dependent * norm for rest, (norm, _) in zip(rests, norms)):
+            held.append(_confounded_with(robot, parameters, k, kept, every[0]))
+        else:
             kept.append(k)
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-            continue
-        nothing = fact("moves_nothing", entry=parameters[k].name)
-        held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
+            bases = [np.column_stack([basis, rest / np.linalg.norm(rest)]) for basis, rest in zip(bases, rests)]
     return Subspace(tuple(parameters[k] for k in kept), tuple(held))
+
+
+def _outside(column: Reals, basis: Reals) -> Reals:
+    """What of a column is outside the span of a basis; taken off twice, against rounding."""
+    rest = column - basis @ (basis.T @ column)
+    return np.asarray(rest - basis @ (basis.T @ rest))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
@@ -158,7 +174,7 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
-    effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
+    effect = np.linalg.norm(jacobian(robot, lengths, observations.rich(robot), gathered=True), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
     replaceable = _replaceable(robot, moving, observations)
     alone = [entry for entry in moving if entry not in replaceable] or moving
@@ -500,15 +516,28 @@ def _fit(
             J = np.block([[J, by_terms], [np.zeros((len(prior), k)), np.diag(prior)]])
         return np.vstack([J, held])
 
-    solved = least_squares(weighted, unknowns, slopes, ftol=FLAT, xtol=EXACT, gtol=EXACT, max_nfev=STEPS)
-    before, amounts, rest = weighted(np.zeros(len(unknowns)))[:n], solved.x, solved.fun[:n]
-    if not solved.success:
-        rest_mm = observations.rms_mm(rest * deviation)
-        raise CalibrationError(
-            fact("no_correction_fits", steps=STEPS, rest_mm=rest_mm),
-            f"no corrections make the table fit: after {STEPS} steps the positions are still {rest_mm:.3g} mm off. "
-            "The table has a gross fault or is another arm's; er3a confirm names what is other",
-        )
-    rows, last = with_errors(amounts[k:]).independent(corrected(robot, kept, amounts[:k]))
-    own, J = np.sqrt(rows**2 @ deviation**2), rows @ solved.jac[:n]
-    return Fit(kept, terms, amounts[:k], amounts[k:], before, rest, J, rows @ rest, own, last)
+    before, rest = weighted(np.zeros(len(unknowns)))[:n], weighted(unknowns)
+    for number in range(MAX_STEPS):
+        J = slopes(unknowns)
+        step = np.linalg.lstsq(J, -rest, rcond=None)[0]
+        gain = np.linalg.norm(J @ step)
+        for _ in range(HALVINGS):
+            trial = unknowns + step
+            new = weighted(trial)
+            if new @ new <= rest @ rest * (1 + 1e-9):
+                break
+            step = step / 2
+        unknowns, rest = trial, new
+        small = SMALL_CHANGE if number < STEPS else SLOW_CHANGE
+        if gain < small * np.linalg.norm(rest) or np.abs(step).max() < SMALL_STEP + 1e-9 * np.abs(unknowns).max():
+            rows, last = with_errors(unknowns[k:]).independent(corrected(robot, kept, unknowns[:k]))
+            own = np.sqrt(rows**2 @ deviation**2)
+            return Fit(
+                kept, terms, unknowns[:k], unknowns[k:], before, rest[:n], rows @ J[:n], rows @ rest[:n], own, last
+            )
+    rest_mm = observations.rms_mm(rest[:n] * deviation)
+    raise CalibrationError(
+        fact("no_correction_fits", steps=MAX_STEPS, rest_mm=rest_mm),
+        f"no corrections make the table fit: after {MAX_STEPS} steps the positions are still {rest_mm:.3g} mm off. "
+        "The table has a gross fault or is another arm's; er3a confirm names what is other",
+    )

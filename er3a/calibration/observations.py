@@ -471,7 +471,7 @@ class PointObservations:
     def rich(self, robot: Robot) -> PointObservations:
         """The same points at poses all over the joint range, to see what could be determined.
 
-        Poses that would touch a place needn't be known: a Jacobian has all points of a place together in any case.
+        They needn't touch anything: what touches can tell apart shows at any poses, points of a place together.
 
         Parameters
         ----------
