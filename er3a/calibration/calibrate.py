@@ -134,7 +134,8 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here, best = (subspace(robot, parameters, seen, dependent) for seen in (observations, rich))
+            here = subspace(robot, parameters, observations, dependent)
+            best = subspace(robot, parameters, rich, dependent, imagined=True)
             every = every or best.kept
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):

@@ -117,17 +117,20 @@ def subspace(
     parameters: Sequence[Entry],
     observations: PointObservations,
     dependent: float = DEPENDENT,
+    *,
+    imagined: bool = False,
 ) -> Subspace:
     """The identifiable part of the parameters.
 
     Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
     ``dependent`` of its length) is held. So is one for which that is so if points of one place are together, as a
-    corrected table will have them: then what only turns them shows in none.
+    corrected table will have them, or that shows no more than what the table leaves between them.
 
     Parameters
     ----------
     parameters : p entries, the preferred ones first
     dependent : share of a column's length that has to lie outside of the others' span
+    imagined : whether the poses touch nothing, so that what is left between points of a place means nothing
 
     Returns
     -------
@@ -143,9 +146,10 @@ def subspace(
     for k, parameter in enumerate(parameters):
         norms = [(float(np.linalg.norm(J[:, k])), np.linalg.norm(J, axis=0).max()) for J in every]
         rests = [_outside(J[:, k], basis) for J, basis in zip(every, bases)]
+        apart = 0.0 if imagined else float(np.linalg.norm(every[0][:, k] - every[-1][:, k]))
         if any(norm <= max(no_effect, NO_EFFECT * most) for norm, most in norms):
             held.append(fact("moves_nothing", entry=parameter.name))
-        elif any(np.linalg.norm(rest) <= dependent * norm for rest, (norm, _) in zip(rests, norms)):
+        elif any(np.linalg.norm(rest) <= max(dependent * norm, apart) for rest, (norm, _) in zip(rests, norms)):
             held.append(_confounded_with(robot, parameters, k, kept, every[0]))
         else:
             kept.append(k)
