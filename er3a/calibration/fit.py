@@ -146,10 +146,10 @@ def subspace(
     for k, parameter in enumerate(parameters):
         norms = [(float(np.linalg.norm(J[:, k])), np.linalg.norm(J, axis=0).max()) for J in every]
         rests = [_outside(J[:, k], basis) for J, basis in zip(every, bases)]
-        apart = 0.0 if imagined else float(np.linalg.norm(every[0][:, k] - every[-1][:, k]))
+        spread = 0.0 if imagined else float(np.linalg.norm(every[0][:, k] - every[-1][:, k]))
         if any(norm <= max(no_effect, NO_EFFECT * most) for norm, most in norms):
             held.append(fact("moves_nothing", entry=parameter.name))
-        elif any(np.linalg.norm(rest) <= max(dependent * norm, apart) for rest, (norm, _) in zip(rests, norms)):
+        elif any(np.linalg.norm(rest) <= max(dependent * norm, spread) for rest, (norm, _) in zip(rests, norms)):
             held.append(_confounded_with(robot, parameters, k, kept, every[0]))
         else:
             kept.append(k)

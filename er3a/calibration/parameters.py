@@ -127,7 +127,7 @@ def placed(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
 
 
 def placing_axes(parameter: Entry, parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
-    """Along and about which axis a parameter of base or tool moves what stands there.
+    """Along and about which axis a parameter of base or tool moves what it places.
 
     Parameters
     ----------

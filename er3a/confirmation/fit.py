@@ -294,7 +294,7 @@ class Fitter:
 
         Returns
         -------
-        own, beside, left : (r, k), derivatives of the differences, (r, k), the part of these that nothing which is free
+        own, rest, left : (r, k), derivatives of the differences, (r, k), the part of these that nothing which is free
             takes up, and (r,), the differences, all in standard deviations
         """
         entries, amounts = (*state.entries, *more), np.append(state.amounts, np.zeros(len(more)))
