@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from er3a import load_references, load_robot
-from er3a.diagnosis.ranking import case_of, rank, usable
+from er3a.diagnosis.ranking import case_of, usable
 from er3a.pipeline.messages.diagnosis import both
 from testing.evidence import sized
 from testing.known_faults import (
@@ -20,6 +20,7 @@ from testing.known_faults import (
     mutations_of,
     noisy,
     random_pairs,
+    rank,
     single_scan,
     try_mutation,
 )

@@ -9,9 +9,9 @@ import numpy as np
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import missed
-from er3a.diagnosis.faults import SIDES, Fault, Faults, LengthColumn, entry_of, repairs_of, wrong_number
-from er3a.diagnosis.fitting import ANGLES, MEETS, minimise_max, moved
-from er3a.diagnosis.ranking import Case, Ranking, rank, usable
+from er3a.diagnosis.faults import SIDES, Fault, Faults, entry_of, repairs_of, wrong_number
+from er3a.diagnosis.fitting import ANGLES, MEETS, moved
+from er3a.diagnosis.ranking import Case, Ranking, case_of, rank_case, usable
 from er3a.finding import fact
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -20,7 +20,7 @@ from er3a.references.quantities import MM, Limit, Quantity, Side
 from er3a.references.reference import Reference, ReferenceSet, expected_of, quantities_of
 from er3a.robots.robot import Robot
 
-LENGTH_COLUMNS: tuple[LengthColumn, ...] = ("a", "d")
+LENGTH_COLUMNS = ("a", "d")
 SCALES = (0.9, 1.05, 25.4)
 WRONG_BY_M = (0.005, -0.02)
 SAME_LENGTH_M = 2e-3
@@ -56,6 +56,12 @@ class Outcome:
     explained: bool
     needless: bool
     set_size: int
+
+
+def rank(robot: Robot, references: Sequence[Reference]) -> Ranking | None:
+    """Single and double faults of a table in order; None if there is nothing to explain."""
+    stated = usable(references)
+    return rank_case(case_of(robot, stated)) if stated else None
 
 
 def mutations_of(robot: Robot) -> Iterator[Mutation]:
@@ -298,10 +304,19 @@ def is_identifiable(robot: Robot, pair: Pair, case: Case) -> bool:
         for number in case.numbers
         if number.joint
     ]
-    column = np.array(slopes)[:, :, None]
-    left = np.tile(moved_by_both, (len(slopes), 1))
-    taken_up = np.einsum("bnk,bk->bn", column, minimise_max(column, left, enough=0.0))
-    return bool((np.abs(left + taken_up).max(axis=1) > 1).all())
+    return bool((_least_largest(moved_by_both, np.array(slopes)) > 1).all())
+
+
+def _least_largest(left: Reals, slopes: Reals) -> Reals:
+    """The least, over an amount, of the largest of ``|left + amount * slope|`` for each of (B, n) slopes, by thirds."""
+    steepest = np.abs(slopes).max(axis=1)
+    high = np.where(steepest > 0, 2 * np.abs(left).max() / np.maximum(steepest, 1e-300), 0.0)
+    low = -high
+    for _ in range(100):
+        one, other = low + (high - low) / 3, high - (high - low) / 3
+        nearer = [np.abs(left + amount[:, None] * slopes).max(axis=1) for amount in (one, other)]
+        low, high = np.where(nearer[0] < nearer[1], low, one), np.where(nearer[0] < nearer[1], other, high)
+    return np.asarray(np.abs(left + low[:, None] * slopes).max(axis=1))
 
 
 def _drawn(entry: ScannedEntry, beyond: float, random: np.random.Generator) -> float:

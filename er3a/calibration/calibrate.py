@@ -38,7 +38,6 @@ from er3a.calibration.fit import (
     fit,
     held_with,
     jacobian,
-    left_of_touched,
     places_at,
     rough_places,
     scale_of,
@@ -56,14 +55,13 @@ from er3a.calibration.parameters import (
     settles,
     whole_length_mm,
 )
-from er3a.calibration.plan import touches
 from er3a.calibration.terms import (
     FOR_ALL_JOINTS,
     FOR_ROBOT_FILE,
     TYPICAL,
     CorrectedModel,
     JointErrors,
-    TermKind,
+    JointTerm,
     places_of,
 )
 from er3a.comparison.entries import Entry
@@ -73,9 +71,7 @@ from er3a.references.quantities import MM
 from er3a.references.reference import INTERVAL_95
 from er3a.robots.robot import Robot
 
-CLOSE = 0.9  # correlation of two estimates that are named together
 MAX_SCATTER = 3.0  # standard deviations, beyond which the model does not fit
-SMALLEST = np.finfo(float).tiny  # instead of 0, to divide by
 TOGETHER = 0.5
 """Ratio to the farthest point's distance: points at least this far out are set aside in one go."""
 MAX_OUTLIER_SHARE = 0.1  # of the measurements, that is set aside at most
@@ -95,28 +91,16 @@ class Level:
     Attributes
     ----------
     name : one of ``LEVELS``
-    parameters : its entries, behind those of base and tool; subspace : which of them the observations determine
+    kept : its entries that are estimated, with those of base and tool; held : why the others keep their values
     more : what a fuller level would take; None if all entries are estimated
-    scale : the length that is taken as it is because nothing else sets the scale; None where coordinates were measured
     left : entries, base and tool that are not estimated although more observations could settle them
     """
 
     name: LevelName
-    parameters: tuple[Entry, ...]
-    subspace: Subspace
+    kept: tuple[Entry, ...]
+    held: tuple[outcomes.Held, ...]
     more: Finding | None
-    scale: Entry | None = None
     left: tuple[Entry, ...] = ()
-
-    @property
-    def held(self) -> tuple[outcomes.Held, ...]:
-        """Why the others keep their values."""
-        return (*self.subspace.held, *held_with(self.scale))
-
-    @property
-    def kept(self) -> list[Entry]:
-        """Those that are estimated."""
-        return [self.parameters[i] for i in self.subspace.kept]
 
 
 def choose_level(robot: Robot, observations: PointObservations) -> Level:
@@ -143,24 +127,23 @@ def choose_level(robot: Robot, observations: PointObservations) -> Level:
     placed = observations.placements
     robot, dependent = _with_rough_tool(robot, observations)
     scale = scale_of(robot, observations)
-    left = left_of_touched(robot, observations)
     spare = len(observations) - observations.dropped
-    rich = _rich(robot, observations)
+    rich = observations.rich(robot)
     more: list[Finding] = []
-    every: list[Entry] = []
+    every: tuple[Entry, ...] = ()
     for first in (placed, ()) if placed else ((),):
         for name in LEVELS[::-1]:
             parameters = (*first, *without_scale(parameters_of(robot, name), scale))
-            here = subspace(robot, parameters, observations, left, dependent)
-            best = subspace(robot, parameters, rich, left, dependent) if len(rich) else here
-            every = every or [parameters[k] for k in best.kept]
+            here = subspace(robot, parameters, observations, dependent)
+            best = subspace(robot, parameters, rich, dependent, imagined=True)
+            every = every or best.kept
             settled = len(best.kept) <= len(here.kept)
             if not (settled and here.kept) or spare <= len(here.kept):
-                more.append(_what_more(name, parameters, (here, best), observations))
+                more.append(_what_more(name, (here, best), observations))
             if (settled or is_one(more[-1], "more_touches")) and spare > len(here.kept) > 0:
                 what = next((each for each in more if is_one(each, "more_touches")), more[-1] if more else None)
-                left_out_of_it = tuple(each for each in every if each not in parameters)
-                return Level(name, parameters, here, what, scale, left_out_of_it)
+                left = tuple(each for each in every if each not in parameters)
+                return Level(name, here.kept, (*here.held, *held_with(scale)), what, left)
     if not more[-1].determinable:
         raise CalibrationError(more[-1], "no entry of the table moves what was measured; touch or measure elsewhere")
     lack = "numbers" if is_one(more[-1], "more_touches") else "positions"
@@ -180,12 +163,7 @@ def _with_rough_tool(robot: Robot, observations: PointObservations) -> tuple[Rob
     return corrected(robot, placed, shift), ROUGHLY * DEPENDENT
 
 
-def _what_more(
-    level: LevelName,
-    parameters: tuple[Entry, ...],
-    subspaces: tuple[Subspace, Subspace],
-    observations: PointObservations,
-) -> Finding:
+def _what_more(level: LevelName, subspaces: tuple[Subspace, Subspace], observations: PointObservations) -> Finding:
     here, best = subspaces
     lacking = len(best.kept) - len(here.kept)
     if observations.all_touched:
@@ -198,7 +176,7 @@ def _what_more(
         determinable=len(best.kept),
         fitted=level,
         missing=-(-max(lacking, len(best.kept) + 1 - len(observations)) // 3),
-        entries=tuple(parameters[k].name for k in best.kept if k not in here.kept),
+        entries=tuple(each.name for each in best.kept if each not in here.kept),
     )
 
 
@@ -220,11 +198,6 @@ def _what_touches(settled: int, best: int, observations: PointObservations) -> F
         missing=missing,
         each=tuple(each),
     )
-
-
-def _rich(robot: Robot, observations: PointObservations) -> PointObservations:
-    """The same points all over the joint range, or more touches of the same things."""
-    return touches(robot, observations) if observations.all_touched else observations.rich(robot)
 
 
 @dataclass(frozen=True)
@@ -262,15 +235,6 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Close:
-    """Two estimates whose errors are correlated by more than 0.9."""
-
-    first: str
-    second: str
-    correlation: float
-
-
-@dataclass(frozen=True)
 class Outlier:
     """A measurement that was set aside: its line in the file, and how far it is from the model that the others fit."""
 
@@ -278,22 +242,17 @@ class Outlier:
     distance_mm: float
 
 
-@dataclass(frozen=True)
-class TermEstimate:
+@dataclass(frozen=True, kw_only=True)
+class TermEstimate(JointTerm):
     """A term beyond the table, in units of 1/1000 (rad, m; each per rad, m of what it is multiplied by).
 
     Attributes
     ----------
     coefficients, standard_errors : one for a ratio and for sag; else of sine and cosine
-    turns : how often a ripple returns in a turn; by : the joint that it is coupled to
     """
 
-    kind: TermKind
-    joint: int
     coefficients: tuple[float, ...]
     standard_errors: tuple[float, ...]
-    turns: int = 0
-    by: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,10 +283,9 @@ class Calibration(ByValue, Displayed):
     ----------
     robot : with the corrected table, base and tool, the best without terms but for those of its coupling
     level : which entries were estimated
-    estimates : one per identifiable entry; correlation : (k, k), of their errors
+    estimates : one per identifiable entry
     ratios : of joints, and couplings, where poses left out are met better with them
     held : why the other entries of the level keep their values
-    singular_values : of the scaled Jacobian (standard deviations per mm or mrad), descending
     coordinates, poses : how many measured coordinates at how many poses; of those that were read again the means
     wrong : why measurements and table can't belong together; None if they can
     freedom : how many more independent coordinates than numbers there are; of one nothing is settled, unless the
@@ -353,10 +311,7 @@ class Calibration(ByValue, Displayed):
     robot: Robot
     level: outcomes.LevelName
     estimates: tuple[Estimate, ...]
-    correlation: Reals
     held: tuple[outcomes.Held, ...]
-    close: tuple[Close, ...]
-    singular_values: Reals
     coordinates: int
     poses: int
     rms_before_mm: float
@@ -502,19 +457,14 @@ def _result(robot: Robot, level: Level, observations: PointObservations, found: 
     """What the table, with ratios, has of a calibration."""
     beside = _beside(robot, level, observations, found)
     covariance, quantiles = _covariance(observations, found, beside)
-    error, count = np.sqrt(np.diag(covariance)), len(found.kept)
-    correlation = (covariance / np.maximum(np.outer(error, error), SMALLEST))[:count, :count]
-    rows, columns = np.nonzero(np.triu(np.abs(correlation) > CLOSE, 1))
-    kept, deviation, here = found.kept, observations.deviation_mm, corrected(robot, found.kept, found.amounts)
+    error, deviation = np.sqrt(np.diag(covariance)), observations.deviation_mm
+    here = corrected(robot, found.kept, found.amounts)
     return Calibration(
         robot=coupled(here, {(t.joint, t.by or t.joint): float(c) for t, c in zip(found.terms, found.coefficients)}),
         level=level.name,
         estimates=_estimates(robot, observations, found, error, quantiles),
-        correlation=correlation,
         ratios=_term_estimates(found, error),
         held=level.held,
-        close=tuple(Close(kept[i].name, kept[j].name, float(correlation[i, j])) for i, j in zip(rows, columns)),
-        singular_values=level.subspace.singular_values,
         coordinates=len(observations),
         poses=observations.poses,
         rms_before_mm=observations.rms_mm(found.before * deviation),
@@ -617,10 +567,7 @@ class _Model:
 
 def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> _Model:
     level = choose_level(robot, observations)
-    table = _fitted(robot, level, observations)
-    if not observations.deviation_known:
-        observations = _rescaled(observations, table)
-        table = fit(robot, level.kept, observations)
+    observations, table = _refitted(robot, observations, _fitted(robot, level, observations))
     here = corrected(robot, table.kept, table.amounts)
     unclear = level.left or (observations.all_touched and not _settled(robot, observations, table))
     ways = () if unclear else FOR_ALL_JOINTS  # terms would stand for what entries that are left out do
@@ -636,27 +583,23 @@ def _model(robot: Robot, observations: PointObservations, free_ratios: bool) -> 
         and _error_left_out(observations, whole) >= _error_left_out(observations, table)
     ):
         choice, whole = ChosenTerms((), ()), table  # they stand for a coupling, which was not tried beside them
-    finer = observations
-    if not observations.deviation_known:  # that of the table alone would let the prior pull coefficients towards 0
-        if for_file.terms:
-            observations = _rescaled(observations, table)
-            table = fit(robot, level.kept, observations, for_file.terms)
-        if choice.terms:
-            finer = _rescaled(finer, whole)
-            whole = fit(robot, level.kept, finer, choice.terms)
-    if not choice.terms:
-        finer, whole = observations, table
-    return _Model(observations, finer, level, table, choice, for_file, whole)
+    # The deviation of the table alone would let the prior pull coefficients towards 0.
+    seen, table = _refitted(robot, observations, table) if for_file.terms else (observations, table)
+    finer, whole = _refitted(robot, observations, whole) if choice.terms else (seen, table)
+    return _Model(seen, finer, level, table, choice, for_file, whole)
 
 
-def _rescaled(observations: PointObservations, found: Fit) -> PointObservations:
-    """Observations with standard deviations by what a fit leaves, of coordinates and of orientations."""
+def _refitted(robot: Robot, observations: PointObservations, found: Fit) -> tuple[PointObservations, Fit]:
+    """A fit by standard deviations that it leaves, of coordinates and of orientations, where none is stated."""
+    if observations.deviation_known:
+        return observations, found
     lengths, deviation = observations.is_length, observations.deviation_mm.copy()
     for own in (lengths, ~lengths):
         left = found.rest[own[found.last]]
         share = found.freedom * len(left) / len(found.rest)
         deviation[own] *= np.sqrt(left @ left / share) if len(left) else 1.0
-    return observations.with_deviation(deviation)
+    seen = observations.with_deviation(deviation)
+    return seen, fit(robot, found.kept, seen, found.terms)
 
 
 def _settled(robot: Robot, observations: PointObservations, table: Fit) -> bool:
@@ -766,7 +709,7 @@ def _off_mm(robot: Robot, every: PointObservations, model: _Model, used: Flags) 
     shifted = every.shifted(errors.amounts(every.row_values, every.points(robot)))
 
     def off_of(part: PointObservations) -> Reals:
-        off: Reals = part.predict(here, (), np.zeros((1, 0)))[0] - part.values_mm
+        off: Reals = part.predict(here) - part.values_mm
         return off
 
     if not every.kinds or used.all():
@@ -792,12 +735,9 @@ def _term_estimates(found: Fit, error: Reals) -> tuple[TermEstimate, ...]:
     own_error = error[len(found.kept) :]
     return tuple(
         TermEstimate(
-            term.kind,
-            term.joint,
-            tuple((1000 * found.coefficients[own]).tolist()),
-            tuple((1000 * own_error[own]).tolist()),
-            term.turns,
-            term.by,
+            **vars(term),
+            coefficients=tuple((1000 * found.coefficients[own]).tolist()),
+            standard_errors=tuple((1000 * own_error[own]).tolist()),
         )
         for term, own in zip(found.terms, places_of(found.terms))
     )

@@ -69,27 +69,22 @@ class HeldOutErrors:
     far_worst_mm: float
 
 
-@dataclass(frozen=True)
-class TriedTerm:
-    """A term that was tried.
+@dataclass(frozen=True, kw_only=True)
+class TriedTerm(JointTerm):
+    """A term that was tried; of ripples the one of the joint that explains most.
 
     Attributes
     ----------
-    kind, joint, turns : which; of ripples the one of the joint that explains most
     change, far_change : of the mean squared error at poses left out, as a share, tenths at random and neighbourhoods:
         when a term was taken, or of a term that was not, or was dropped, beside those that were
     probability : of so large a share by chance, if there is only noise, of ripples for all numbers a turn
     verdict : whether it was taken, or why not
     """
 
-    kind: TermKind
-    joint: int
     change: float
     far_change: float
     probability: float
     verdict: TermVerdict
-    turns: int = 0
-    by: int = 0
 
 
 class _Linear:
@@ -259,7 +254,7 @@ def choose_terms(
             break
     else:
         return ChosenTerms((), ())
-    off = observations.values_mm - observations.predict(here, kept, np.zeros((1, count)))[0]
+    off = observations.values_mm - observations.predict(here)
     if np.sqrt(np.mean(off**2)) < ROUNDING:
         return ChosenTerms((), ())
     J, rest = rows @ jacobian(here, kept, observations), rows @ off
@@ -278,12 +273,12 @@ def choose_terms(
         trials = [_Trial(linear, used, *pair) for pair in zip(open_terms, places)]
         before = linear.squares(used)
         by_gain = sorted((trial for trial in trials if trial.probability <= SURE), key=lambda trial: trial.rest)
-        outcome = next((found for trial in by_gain if (found := trial.outcome(before)).verdict == "taken"), None)
-        if outcome is not None:
-            taken[JointTerm(outcome.kind, outcome.joint, outcome.turns, outcome.by)] = outcome
-        elif (needless := _needless(linear, used, list(taken), count)) is not None:
-            dropped[JointTerm(needless.kind, needless.joint, needless.turns, needless.by)] = needless
-            taken = {term: each for term, each in taken.items() if term not in dropped}
+        outcomes = ((trial.term, trial.outcome(before)) for trial in by_gain)
+        if pair := next((pair for pair in outcomes if pair[1].verdict == "taken"), None):
+            taken[pair[0]] = pair[1]
+        elif pair := _needless(linear, used, list(taken), count):
+            dropped[pair[0]] = pair[1]
+            del taken[pair[0]]
         else:
             others = (trial.outcome(before) for trial in trials)
             return ChosenTerms(tuple(taken), (*taken.values(), *dropped.values(), *others))
@@ -295,15 +290,17 @@ def _by_chance(before: float, after: float, numbers: int, freedom: int) -> float
     return float(scipy.special.fdtrc(numbers, freedom, ratio))
 
 
-def _needless(linear: _Linear, used: list[int], taken: Sequence[JointTerm], count: int) -> TriedTerm | None:
+def _needless(
+    linear: _Linear, used: list[int], taken: Sequence[JointTerm], count: int
+) -> tuple[JointTerm, TriedTerm] | None:
     """Of the terms that were taken the one that lowers the errors least, if it would not be taken beside the others."""
     found = []
     for term, own in zip(taken, places_of(taken, count)):
         rest = [place for place in used if place not in own]
         outcome = _Trial(linear, rest, term, own).outcome(linear.squares(rest))
         if outcome.verdict != "taken":
-            found.append(outcome)
-    return max(found, key=lambda each: each.change + each.far_change, default=None)
+            found.append((term, outcome))
+    return max(found, key=lambda pair: pair[1].change + pair[1].far_change, default=None)
 
 
 class _Trial:
@@ -339,7 +336,7 @@ class _Trial:
         elif wrong_way(term, self._amounts):
             verdict = "wrong_way"
         near, far = change.tolist()
-        return TriedTerm(term.kind, term.joint, near, far, self.probability, verdict, term.turns, term.by)
+        return TriedTerm(**vars(term), change=near, far_change=far, probability=self.probability, verdict=verdict)
 
 
 class _RippleSearch:
@@ -347,8 +344,8 @@ class _RippleSearch:
 
     def __init__(self, here: Robot, observations: PointObservations):
         x, rows = observations.row_values, np.flatnonzero(~here.sliding)
-        effect = 1000 * effects(here, x, observations.points(here))[:, rows]
-        self._effect = effect.transpose(0, 2, 1)[observations.seen] / observations.deviation_mm[:, None]
+        effect = 1000 * effects(here, x, observations.points(here))[..., rows]
+        self._effect = effect[observations.seen] / observations.deviation_mm[:, None]
         count = len(observations)
         self._by_pose = scipy.sparse.csr_array((np.ones(count), (observations.pose_of, np.arange(count))))
         angle = x[:, rows].T[:, None] * np.array(RIPPLES)[:, None]

@@ -26,16 +26,17 @@ from er3a.calibration.parameters import (
     parallel_pairs,
     parameters_of,
     placements_of,
+    placing_axes,
 )
 from er3a.calibration.terms import TAKEN, JointErrors, JointTerm, term_jacobian
-from er3a.comparison.entries import Entry
+from er3a.comparison.entries import BASE_COLUMNS, Entry, entry_twists
 from er3a.finding import Finding, fact
-from er3a.geometry.transforms import nearest_rotations, rpy_of, transposed
+from er3a.geometry.transforms import nearest_rotations, posed, rpy_of, transposed
+from er3a.kinematics.table_batch import tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
 
-STEP = 1e-5  # m or rad, of central differences
 SCALE = 1e-3  # m and rad alike: 1 mm, and 1 mrad, which moves a flange about as far
 NO_EFFECT = 1e-6
 STEPS, MAX_STEPS = 30, 100
@@ -55,7 +56,6 @@ OUTLIER_ROUNDS = 3
 FAR_OUT = 6.0
 """Standard deviations beyond which a point is set aside: noise goes there once in 500 million."""
 MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution: the standard deviation over the median of the size
-LEVER = 0.3  # m, at which a length turns points as an angle does
 TURNS_ALL = Entry("offset", 1)
 """Turns all points alike, which is nothing to points that are seen against each other alone."""
 
@@ -66,102 +66,101 @@ class Subspace:
 
     Attributes
     ----------
-    kept : places of the parameters that are estimated
+    kept : the parameters that are estimated
     held : why the others keep their values
-    singular_values : of the scaled Jacobian over all parameters (one standard deviation per mm or mrad), descending
     """
 
-    kept: tuple[int, ...]
+    kept: tuple[Entry, ...]
     held: tuple[Held, ...]
-    singular_values: Reals
 
 
 def jacobian(
-    robot: Robot, parameters: Sequence[Entry], observations: PointObservations, amounts: Reals | float = 0.0
+    robot: Robot,
+    parameters: Sequence[Entry],
+    observations: PointObservations,
+    amounts: Reals | float = 0.0,
+    *,
+    gathered: bool = False,
 ) -> Reals:
-    """Derivatives of observed values by parameters, by central differences; exact to about 1e-8.
+    """Derivatives of observed values by parameters.
 
     Parameters
     ----------
     parameters : p entries of table, base and tool
     amounts : (p,), m or rad, added to the robot's values, where the derivatives are taken
+    gathered : whether all points of a place are taken to be together, so that what turns all of them shows in none
 
     Returns
     -------
     J : (n, p), mm per m or rad, and mrad of orientations; small turns count, however far these are from measured ones
     """
-    count = len(parameters)
-    if observations.oriented:
-        observations = observations.agreeing(corrected(robot, parameters, np.broadcast_to(amounts, count)))
-    steps = amounts + STEP * np.concatenate([np.eye(count), -np.eye(count)])
-    values = observations.predict(robot, parameters, steps)
-    slopes: Reals = (values[:count] - values[count:]).T / (2 * STEP)
-    return slopes
+    amounts = np.broadcast_to(amounts, len(parameters))
+    here, of_rows = corrected(robot, parameters, amounts), np.array([bool(each.joint) for each in parameters])
+    xyz, turns = observations.positions(here), observations.turns(here)
+    xyz = observations.gathered(xyz) if gathered else xyz
+    rows = [each for each in parameters if each.joint]
+    shifts = np.empty((len(xyz), 6, len(parameters)))
+    shifts[..., of_rows] = entry_twists(tables_of(here), here, observations.row_values, rows, xyz)
+    by_tool = np.where(observations.on_tool[:, None, None], turns, 0.0)
+    for k in np.flatnonzero(~of_rows).tolist():
+        along, about = placing_axes(parameters[k], parameters, amounts)
+        if parameters[k].column in BASE_COLUMNS:
+            along, about = robot.base[:3, :3] @ along, robot.base[:3, :3] @ about
+            shifts[:, :3, k], shifts[:, 3:, k] = along + np.cross(about, xyz - here.base[:3, 3]), about
+        else:
+            shifts[:, :3, k], shifts[:, 3:, k] = by_tool @ along, by_tool @ robot.tool[:3, :3] @ about
+    return MM * observations.relative_shift(shifts, xyz)[observations.seen]
 
 
 def subspace(
     robot: Robot,
     parameters: Sequence[Entry],
     observations: PointObservations,
-    left: float | None = None,
     dependent: float = DEPENDENT,
+    *,
+    imagined: bool = False,
 ) -> Subspace:
     """The identifiable part of the parameters.
 
     Columns of the weighted Jacobian are taken in order of preference. One that lies in the span of those before it (to
-    ``dependent`` of its length) is held. So is one that only turns or shrinks what the table leaves of points which
-    touch something: all of these could be brought to one.
+    ``dependent`` of its length) is held. So is one for which that is so if points of one place are together, as a
+    corrected table will have them, or that shows no more than what the table leaves between them.
 
     Parameters
     ----------
     parameters : p entries, the preferred ones first
-    left : of a point that touches something, in standard deviations; what the table leaves, unless given
+    dependent : share of a column's length that has to lie outside of the others' span
+    imagined : whether the poses touch nothing, so that what is left between points of a place means nothing
 
     Returns
     -------
-    subspace : places of the parameters kept, why others are held, and singular values (per mm or mrad)
+    subspace : the parameters kept, and why others are held
     """
-    rows = observations.independent(robot)[0]
-    J = rows @ (SCALE * jacobian(robot, parameters, observations) / observations.deviation_mm[:, None])
-    norms = np.linalg.norm(J, axis=0)
-    left = left_of_touched(robot, observations) if left is None else left
-    turned = SCALE * left * len(J) ** 0.5
-    min_norm = max(NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm), NO_EFFECT * norms.max(), turned / LEVER)
+    rows, scale = observations.independent(robot)[0], SCALE / observations.deviation_mm[:, None]
+    ways = (False, True) if observations.kinds else (False,)
+    every = [rows @ (scale * jacobian(robot, parameters, observations, gathered=way)) for way in ways]
+    no_effect = NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm)
     kept: list[int] = []
     held: list[Held] = []
-    basis: Reals = np.empty((len(J), 0))
-    for k, norm in enumerate(norms):
-        rest = J[:, k] - basis @ (basis.T @ J[:, k])
-        rest -= basis @ (basis.T @ rest)
-        if norm > min_norm and np.linalg.norm(rest) > max(dependent * norm, turned):
+    bases: list[Reals] = [np.empty((len(J), 0)) for J in every]
+    for k, parameter in enumerate(parameters):
+        norms = [(float(np.linalg.norm(J[:, k])), np.linalg.norm(J, axis=0).max()) for J in every]
+        rests = [_outside(J[:, k], basis) for J, basis in zip(every, bases)]
+        spread = 0.0 if imagined else float(np.linalg.norm(every[0][:, k] - every[-1][:, k]))
+        if any(norm <= max(no_effect, NO_EFFECT * most) for norm, most in norms):
+            held.append(fact("moves_nothing", entry=parameter.name))
+        elif any(np.linalg.norm(rest) <= max(dependent * norm, spread) for rest, (norm, _) in zip(rests, norms)):
+            held.append(_confounded_with(robot, parameters, k, kept, every[0]))
+        else:
             kept.append(k)
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-            continue
-        nothing = fact("moves_nothing", entry=parameters[k].name)
-        held.append(nothing if norm <= min_norm else _confounded_with(robot, parameters, k, kept, J))
-    singular_values = np.asarray(np.linalg.svd(J, compute_uv=False), np.float64)
-    return Subspace(tuple(kept), tuple(held), singular_values)
+            bases = [np.column_stack([basis, rest / np.linalg.norm(rest)]) for basis, rest in zip(bases, rests)]
+    return Subspace(tuple(parameters[k] for k in kept), tuple(held))
 
 
-def left_of_touched(robot: Robot, observations: PointObservations) -> float:
-    """What a table leaves where points touch something, and base and tool can't take it up.
-
-    Parameters
-    ----------
-    observations : with places or planes that were touched
-
-    Returns
-    -------
-    left : root mean square, in standard deviations; 0 where nothing is touched
-    """
-    if not observations.dropped:
-        return 0.0
-    off = (observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm) / observations.deviation_mm
-    touching = observations.touched[observations.pose_of] >= 0
-    taken = jacobian(robot, observations.placements, observations)[touching]
-    taken /= observations.deviation_mm[touching, None]
-    off = off[touching] - taken @ np.linalg.lstsq(taken, off[touching], rcond=None)[0]
-    return float(np.sqrt(np.mean(off**2)))
+def _outside(column: Reals, basis: Reals) -> Reals:
+    """What of a column is outside the span of a basis; taken off twice, against rounding."""
+    rest = column - basis @ (basis.T @ column)
+    return np.asarray(rest - basis @ (basis.T @ rest))
 
 
 def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
@@ -179,14 +178,14 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     if not observations.all_touched:
         return None
     lengths = parameters_of(robot, "lengths")
-    effect = np.linalg.norm(jacobian(robot, lengths, observations), axis=0)
+    effect = np.linalg.norm(jacobian(robot, lengths, observations.rich(robot), gathered=True), axis=0)
     moving = [entry for entry, size in zip(lengths, effect) if size > NO_EFFECT * effect.max()]
     replaceable = _replaceable(robot, moving, observations)
     alone = [entry for entry in moving if entry not in replaceable] or moving
     longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
-    off = observations.predict(robot, (), np.zeros((1, 0)))[0] - observations.values_mm
+    off = observations.predict(robot) - observations.values_mm
     known = np.linalg.norm(observations.slid(robot))
     min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
     return longest if known < min_known else None
@@ -357,15 +356,12 @@ def aligned(points: Reals, measured: Reals) -> tuple[Reals, float, float]:
     ----------
     W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A 32, 1976.
     """
-    S, at, centre = np.eye(4), points.mean(axis=0), measured.mean(axis=0)
-    U, sizes, V = np.linalg.svd((measured - centre).T @ (points - at))
-    signs = np.array([1.0, 1.0, np.linalg.det(U @ V)])
-    S[:3, :3] = U @ np.diag(signs) @ V
-    S[:3, 3] = centre - S[:3, :3] @ at
-    both, own, theirs = sizes @ signs, ((points - at) ** 2).sum(), ((measured - centre) ** 2).sum()
-    if not own * theirs:
-        return S, float("nan"), 1.0
-    return S, float(both / own), float(1 - both**2 / (own * theirs))
+    at, centre = points.mean(axis=0), measured.mean(axis=0)
+    products = (measured - centre).T @ (points - at)
+    R = nearest_rotations(products)
+    both, own, theirs = (R * products).sum(), ((points - at) ** 2).sum(), ((measured - centre) ** 2).sum()
+    scale, share = (both / own, 1 - both**2 / (own * theirs)) if own * theirs else (np.nan, 1.0)
+    return posed(R, centre - R @ at), float(scale), float(share)
 
 
 def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, Flags]:
@@ -424,8 +420,7 @@ def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) 
     inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
     found = []
     for turn in (S[:3, :3], nearest_rotations(inverse.T)):
-        S = np.eye(4)
-        S[:3, :3] = turn
+        S = posed(turn, np.zeros(3))
         for _ in range(TURNS):
             back = (m @ S[:3, :3] - x).ravel()
             both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
@@ -452,8 +447,10 @@ def places_at(robot: Robot, kept: Sequence[Entry], observations: PointObservatio
     placing = [k for k, each in enumerate(kept) if each in by_name]
     amounts[placing] = [by_name[kept[k]] for k in placing]
     seen = observations.take(used)
-    off = np.linalg.norm(seen.predict(robot, kept, np.array([none, amounts])) - seen.values_mm, axis=1)
-    return amounts if FAR * off[1] < off[0] else none
+    off, there = (
+        np.linalg.norm(seen.predict(arm) - seen.values_mm) for arm in (robot, corrected(robot, kept, amounts))
+    )
+    return amounts if FAR * there < off else none
 
 
 def fit(
@@ -511,7 +508,7 @@ def _fit(
         return observations.shifted(errors.amounts(observations.row_values, observations.points(robot)))
 
     def weighted(unknowns: Reals) -> Reals:
-        values = with_errors(unknowns[k:]).predict(robot, kept, unknowns[None, :k])[0]
+        values = with_errors(unknowns[k:]).predict(corrected(robot, kept, unknowns[:k]))
         return np.concatenate([(values - observations.values_mm) / deviation, prior * unknowns[k:], held @ unknowns])
 
     def slopes(unknowns: Reals) -> Reals:

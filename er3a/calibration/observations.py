@@ -12,8 +12,8 @@ import scipy.sparse
 from scipy.spatial import cKDTree
 
 from er3a.calibration.outcomes import FixedName, PlacementName
-from er3a.calibration.parameters import PARALLEL_RAD, placed, placements_of
-from er3a.comparison.entries import Entry, shifted
+from er3a.calibration.parameters import PARALLEL_RAD, placements_of
+from er3a.comparison.entries import Entry
 from er3a.errors import InputError
 from er3a.geometry.transforms import log_rotation, nearest_rotations, transposed
 from er3a.kinematics.chain import row_values
@@ -27,11 +27,11 @@ from er3a.robots.robot import Robot
 LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
-RICH_POSES = 64  # joint vectors all over the range
+RICH_POSES, FEW = 64, 6  # joint vectors all over the range; places and planes that are looked at there
+IN_LINE = 1e-9  # m, of points that no plane is seen from
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
 """How many numbers of each coordinate drop out, because nobody knows where a thing is."""
-AT_ONCE = 8_000  # poses of tables whose frames are held at once
 
 
 @dataclass(frozen=True)
@@ -209,23 +209,41 @@ class PointObservations:
                 found[rows, 0] = (own - own.mean(axis=0)) @ plane(own)[0]
         return found
 
+    def gathered(self, xyz: Reals) -> Reals:
+        """Points with those of one place together, at their mean, so that what turns all of them shows in none.
+
+        Parameters
+        ----------
+        xyz : (P, 3), m, base frame
+
+        Returns
+        -------
+        gathered : (P, 3), m
+        """
+        found = xyz.copy()
+        for kind, rows in self.groups():
+            if kind == "place":
+                found[rows] = xyz[rows].mean(axis=0)
+        return found
+
     def relative_shift(self, shift: Reals, around: Reals) -> Reals:
         """By how much small shifts of points change what is observed, to first order.
 
         Parameters
         ----------
-        shift : (P, 6), m and rad, base frame
+        shift : (P, 6, ...), m and rad, base frame
         around : (P, 3), m, where the points are
 
         Returns
         -------
-        change : (P, 6), m and rad, columns as of :meth:`relative`
+        change : (P, 6, ...), m and rad, columns as of :meth:`relative`
         """
         found = shift.copy()
         for kind, rows in self.groups():
             along, basis = self._dropping(kind, rows, around)
-            own = found[rows] if kind == "place" else np.einsum("pi,pi->p", along, found[rows, :3])[:, None]
-            found[rows, : own.shape[1]] = own - basis @ np.linalg.lstsq(basis, own, rcond=None)[0]
+            own = shift[rows] if kind == "place" else np.einsum("pi,pi...->p...", along, shift[rows, :3])[:, None]
+            flat = own.reshape(len(rows), -1)
+            found[rows, : own.shape[1]] = own - (basis @ np.linalg.lstsq(basis, flat, rcond=None)[0]).reshape(own.shape)
         return found
 
     def _dropping(self, kind: TouchKind, rows: Integers, around: Reals) -> tuple[Reals, Reals]:
@@ -278,40 +296,20 @@ class PointObservations:
         """(n,), the place of each coordinate's point among the P."""
         return np.nonzero(self.seen)[0]
 
-    def predict(self, robot: Robot, parameters: Sequence[Entry], amounts: Reals) -> Reals:
-        """Observed values by a table with corrections.
+    def predict(self, robot: Robot) -> Reals:
+        """Observed values by a robot.
 
         Parameters
         ----------
-        parameters : p entries of table, base and tool
-        amounts : (H, p), m or rad, added to the robot's values
+        robot : with any base and tool
 
         Returns
         -------
-        values : (H, n), mm, and mrad from the measured orientations
+        values : (n,), mm, and mrad from the measured orientations
         """
-        own, base_inverse, points = tables_of(robot), np.linalg.inv(robot.base), self.points(robot)
-        placing = np.array([not parameter.joint for parameter in parameters], dtype=bool)
-        step = max(1, AT_ONCE // max(len(self.row_values), 1))
-        values = np.empty((len(amounts), len(self)))
-        for start in range(0, len(amounts), step):
-            part = amounts[start : start + step]
-            tables = shifted(own, parameters, part)
-            T = frames_of(tables, robot, self.row_values)[:, :, -1]
-            S, X = np.tile(np.eye(4), (2, len(part), 1, 1))
-            for k in np.flatnonzero(part[:, placing].any(axis=1)):
-                S[k], X[k] = placed(parameters, part[k])
-            world = robot.base @ S @ base_inverse
-            xyz = points + self.on_tool[:, None] * X[:, None, :3, 3]
-            xyz = np.einsum("hpij,hpj->hpi", T[..., :3, :3], xyz) + T[..., :3, 3]
-            xyz = xyz @ world[:, :3, :3].swapaxes(1, 2) + world[:, None, :3, 3]
-            seen = np.zeros((*xyz.shape[:2], 6))
-            seen[..., :3] = [self.relative(each) for each in xyz] if self.kinds else xyz
-            if self.oriented:
-                tool = np.where(self.on_tool[:, None, None], (robot.tool[:3, :3] @ X[:, :3, :3])[:, None], np.eye(3))
-                turned = world[:, None, :3, :3] @ T[..., :3, :3] @ tool
-                seen[..., 3:] = log_rotation(turned @ transposed(self.orientations))
-            values[start : start + step] = MM * seen[:, self.seen]
+        tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
+        turned = log_rotation(self.turns(robot) @ tool @ transposed(self.orientations))
+        values: Reals = MM * np.hstack([self.relative(self.positions(robot)), turned])[self.seen]
         return values
 
     def positions(self, robot: Robot) -> Reals:
@@ -342,20 +340,6 @@ class PointObservations:
         """
         found: Reals = frames_of(tables_of(robot), robot, self.row_values)[0][:, -1, :3, :3]
         return found
-
-    def agreeing(self, robot: Robot) -> PointObservations:
-        """Observations with the orientations that a robot has, about which small turns are what is observed.
-
-        Parameters
-        ----------
-        robot : with any base and tool
-
-        Returns
-        -------
-        observations : the same where no orientations were measured
-        """
-        tool = np.where(self.on_tool[:, None, None], robot.tool[:3, :3], np.eye(3))
-        return replace(self, orientations=self.turns(robot) @ tool) if self.oriented else self
 
     def points(self, robot: Robot) -> Reals:
         """Where the measured points are in the flange's frame.
@@ -487,18 +471,23 @@ class PointObservations:
     def rich(self, robot: Robot) -> PointObservations:
         """The same points at poses all over the joint range, to see what could be determined.
 
+        They needn't touch anything: what touches can tell apart shows at any poses, points of a place together.
+
         Parameters
         ----------
         robot : whose limits the poses keep
 
         Returns
         -------
-        observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any; values are 0
+        observations : ``RICH_POSES`` poses of each point, with the coordinates that were measured of any, or of the
+            first ``FEW`` things if all points touch one; values are 0
         """
-        points = np.unique(self.on_tool)
-        x = row_values(robot, meant(robot, np.repeat(np.array(spread(robot)), len(points), axis=0)))
-        measured = np.asarray(self.seen[self.touched < 0].any(axis=0))
-        return self._coordinates(x, np.tile(points, RICH_POSES), measured).agreeing(robot)
+        numbers = np.unique(self.touched)[:FEW] if self.all_touched else np.array([-1])
+        kinds = [(point, number) for point in np.unique(self.on_tool) for number in numbers]
+        seen = [self.seen[self.touched == number].any(axis=0) for _, number in kinds]
+        x = row_values(robot, meant(robot, np.array(spread(robot))))
+        on_tool, touched = np.repeat(np.array(kinds), len(x), axis=0).T
+        return self._imagined(np.tile(x, (len(kinds), 1)), on_tool > 0, np.repeat(seen, len(x), axis=0), touched)
 
     def as_coordinates(self) -> PointObservations:
         """The same points as if their coordinates were measured.
@@ -507,12 +496,12 @@ class PointObservations:
         -------
         observations : P points, nothing touched
         """
-        return self._coordinates(self.row_values, self.on_tool, np.arange(6) < 3)
+        count = len(self.row_values)
+        return self._imagined(self.row_values, self.on_tool, np.tile(np.arange(6) < 3, (count, 1)), np.full(count, -1))
 
-    def _coordinates(self, row_values: Reals, on_tool: Flags, measured: Flags) -> PointObservations:
-        """Values that are 0, of those of the six that are measured of each point."""
+    def _imagined(self, row_values: Reals, on_tool: Flags, seen: Flags, touched: Integers) -> PointObservations:
+        """Values that are 0, of points that could have been measured."""
         count, lengths = len(row_values), self.is_length
-        seen = np.tile(measured, (count, 1))
         usual = [np.median(self.deviation_mm[own]) if own.any() else 1.0 for own in (lengths, ~lengths)]
         return replace(
             self,
@@ -522,7 +511,7 @@ class PointObservations:
             values_mm=np.zeros(seen.sum()),
             deviation_mm=np.broadcast_to(np.repeat(usual, 3), seen.shape)[seen],
             lines=np.zeros(count, dtype=np.int64),
-            touched=np.full(count, -1),
+            touched=touched,
             orientations=np.tile(np.eye(3), (count, 1, 1)),
         )
 
@@ -544,11 +533,13 @@ def plane(xyz: Reals) -> tuple[Reals, Reals]:
 
     Returns
     -------
-    normal, within : (3,), unit vector whose largest component is positive, and (P, 2), m, where the points are in it
+    normal, within : (3,), unit vector whose largest component is positive, 0 for points in one line, and (P, 2), m,
+        where the points are in it
     """
     here = xyz - xyz.mean(axis=0)
-    axes = np.linalg.svd(np.linalg.qr(here, mode="r"))[2]
-    return axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()]), here @ axes[:2].T
+    _, sizes, axes = np.linalg.svd(np.linalg.qr(here, mode="r"))
+    sense = np.sign(axes[2][np.abs(axes[2]).argmax()])
+    return axes[2] * sense * (sizes[1] > IN_LINE), here @ axes[:2].T
 
 
 def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[FixedName] = ()) -> PointObservations:

@@ -126,6 +126,28 @@ def placed(parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
     return at(BASE_COLUMNS), at((*TOOL_COLUMNS, *TOOL_TURNS))
 
 
+def placing_axes(parameter: Entry, parameters: Sequence[Entry], amounts: Reals) -> tuple[Reals, Reals]:
+    """Along and about which axis a parameter of base or tool moves what it places.
+
+    Parameters
+    ----------
+    parameter : of base or tool
+    parameters, amounts : p entries and (p,), m or rad, at which it is asked
+
+    Returns
+    -------
+    along, about : (3,), of which one is 0; in the axes that base or tool have without corrections
+    """
+    S, X = placed(parameters, amounts)
+    place, _, part = parameter.column.partition("_")
+    yaw = dict(zip((each.column for each in parameters), amounts)).get(f"{place}_rz", 0.0)
+    axes: Reals = np.eye(3)
+    if len(part) == 1:
+        return axes["xyz".index(part)], np.zeros(3)
+    axes[0], axes[1] = (S if place == "base" else X)[:3, 0], rot_z(yaw)[:3, 1]
+    return np.zeros(3), axes["xyz".index(part[1])]
+
+
 WIDEST = 0.05
 """Rad, and in sizes of the arm, its lengths and strokes: a table that is off by more is another arm's."""
 

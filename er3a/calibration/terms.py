@@ -1,11 +1,9 @@
 """Errors of joints that no table holds: of a gear's ratio, once, twice and many times a turn, and sag under a load.
 
 A row that is meant to move by x moves by ``x + sum_k c_k s_k``: ``s = x`` for its ratio, what another row is meant to
-move by for a coupling to it, ``(sin kx, cos kx)`` for what
-returns k times a turn (eccentric gears and encoders once and twice, teeth many times), and ``-dh/dx`` for sag: the
-torque of a unit weight, by its Jacobian [1]_. h is the height (m) of the measured point, for a load there; or, where
-the robot's file gives masses, that of the centre of mass of its known links, for the arm's own weight. A weight that
-sinks lowers the arm, so the compliance c can't be negative.
+move by for a coupling to it, ``(sin kx, cos kx)`` for what returns k times a turn (eccentric gears and encoders once
+and twice, teeth many times), and ``-dh/dx`` for sag: the torque of a unit weight at the measured point, of height h
+(m), by its Jacobian [1]_. A weight that sinks lowers the arm, so the compliance c can't be negative.
 
 References
 ----------
@@ -23,13 +21,14 @@ import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.calibration.observations import Measurement, PointObservations, observed
+from er3a.comparison.entries import row_twists
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
 
-TermKind = Literal["ratio", "once", "twice", "sag", "weight", "ripple", "coupling"]
+TermKind = Literal["ratio", "once", "twice", "sag", "ripple", "coupling"]
 KINDS: tuple[TermKind, ...] = get_args(TermKind)
 WITHOUT_COUPLINGS = tuple(kind for kind in KINDS if kind != "coupling")
 WITHOUT_RIPPLES = tuple(kind for kind in WITHOUT_COUPLINGS if kind != "ripple")
@@ -60,13 +59,13 @@ class JointTerm:
         """Number of coefficients."""
         return 2 if self.kind in ("once", "twice", "ripple") else 1
 
-    def shapes(self, x: Reals, climb: Reals, own_climb: Reals) -> Reals:
+    def shapes(self, x: Reals, climb: Reals) -> Reals:
         """What the coefficients are multiplied by.
 
         Parameters
         ----------
         x : (P, m), rad or m, what the rows are meant to move by
-        climb, own_climb : (P, m), derivative of the measured point's height by it, and of the centre of mass's
+        climb : (P, m), derivative of the measured point's height by it
 
         Returns
         -------
@@ -77,8 +76,6 @@ class JointTerm:
             return own[:, None]
         if self.kind == "sag":
             return -climb[:, [self.joint - 1]]
-        if self.kind == "weight":
-            return -own_climb[:, [self.joint - 1]]
         turns = {"once": 1, "twice": 2}.get(self.kind, self.turns)
         return np.column_stack([np.sin(turns * own), np.cos(turns * own)])
 
@@ -92,7 +89,7 @@ def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTe
 
     Returns
     -------
-    terms : kind by kind, rows from 1; weights only for rows that carry a link with known mass
+    terms : kind by kind, rows from 1
     """
     joints = range(1, robot.rows + 1)
     return tuple(
@@ -100,10 +97,7 @@ def candidates(robot: Robot, kinds: Sequence[TermKind] = KINDS) -> tuple[JointTe
         for kind in kinds
         for row in joints
         for by in (joints if kind == "coupling" else [0])
-        if kind != "ripple"
-        and row != by
-        and (kind != "weight" or any(each.link >= row for each in robot.masses.links))
-        and (kind not in ("once", "twice") or not robot.sliding[row - 1])
+        if kind != "ripple" and row != by and (kind not in ("once", "twice") or not robot.sliding[row - 1])
     )
 
 
@@ -131,14 +125,13 @@ def starting_table(robot: Robot) -> dict[str, Any]:
 
     Returns
     -------
-    table : columns in m and rad, transforms as lists, and of each body its link, mass (kg) and centre (m)
+    table : columns in m and rad, transforms as lists
     """
     names = ("a", "alpha", "beta", "d", "direction", "offset", "sliding", "base", "flange", "tool")
     return {
         "convention": robot.convention,
         **{name: getattr(robot, name).tolist() for name in names},
         "coupling": (np.eye(robot.rows) if robot.coupling is None else robot.coupling).tolist(),
-        "masses": [[each.link, each.body.mass, *each.body.centre] for each in robot.masses.links],
     }
 
 
@@ -152,40 +145,11 @@ def effects(robot: Robot, row_values: Reals, points: Reals) -> Reals:
 
     Returns
     -------
-    effects : (P, m, 6), m and rad per rad or m, in the base frame
+    effects : (P, 6, m), m and rad per rad or m, in the base frame
     """
-    T = frames_of(tables_of(robot), robot, row_values)[0]
-    return _moving(robot, T, np.einsum("pij,pj->pi", T[:, -1, :3, :3], points) + T[:, -1, :3, 3])
-
-
-def _moving(robot: Robot, T: Reals, p: Reals) -> Reals:
-    """How points p (P, 3) move and turn with each row, (P, m, 6); frames T (P, m + 1, 4, 4)."""
-    axis, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
-    sliding = np.concatenate([axis, np.zeros_like(axis)], axis=-1)
-    turning = np.concatenate([np.cross(axis, p[:, None] - origin), axis], axis=-1)
-    found: Reals = robot.direction[:, None] * np.where(robot.sliding[:, None], sliding, turning)
-    return found
-
-
-def centre_climb(robot: Robot, row_values: Reals) -> Reals:
-    """How the centre of mass of all known links rises with what the rows move by.
-
-    Parameters
-    ----------
-    row_values : (P, m), rad or m
-
-    Returns
-    -------
-    climb : (P, m), m per rad or m; 0 without known masses
-    """
-    T = frames_of(tables_of(robot), robot, row_values)[0]
-    found, whole = np.zeros_like(row_values), sum(each.body.mass for each in robot.masses.links)
-    for each in robot.masses.links:
-        k = each.link
-        if k and whole:
-            centre = T[:, k - 1, :3, :3] @ np.array(each.body.centre) + T[:, k - 1, :3, 3]
-            found[:, :k] += each.body.mass / whole * _moving(robot, T, centre)[:, :k, 2]
-    return found
+    T = frames_of(tables_of(robot), robot, row_values)[0, :, -1]
+    xyz = np.einsum("pij,pj->pi", T[:, :3, :3], points) + T[:, :3, 3]
+    return row_twists(tables_of(robot), robot, row_values, xyz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +178,8 @@ class JointErrors(ByValue):
         -------
         columns : for each coefficient the row (from 0) that it acts on, and its factors (P,)
         """
-        climb, own = effects(self.robot, x, points)[:, :, 2], centre_climb(self.robot, x)
-        shapes = [(term, term.shapes(x, climb, own)) for term in self.terms]
+        climb = effects(self.robot, x, points)[:, 2]
+        shapes = [(term, term.shapes(x, climb)) for term in self.terms]
         return [(term.joint - 1, values[:, k]) for term, values in shapes for k in range(term.count)]
 
     def amounts(self, x: Reals, points: Reals) -> Reals:
@@ -295,7 +259,7 @@ class CorrectedModel(ByValue):
         """
         seen = self._seen(measurements)
         found = np.full(seen.seen.shape, np.nan)
-        found[seen.seen] = seen.predict(self.robot, (), np.zeros((1, 0)))[0] - seen.values_mm
+        found[seen.seen] = seen.predict(self.robot) - seen.values_mm
         return found[:, :3]
 
     def distances_mm(self, measurements: Sequence[Measurement]) -> Reals:
@@ -342,10 +306,10 @@ def term_jacobian(
     x, shifted = observations.row_values, shifted or observations
     by_row = effects(here, shifted.row_values, observations.points(here)) * 1000
     columns = JointErrors(robot, tuple(terms), np.empty(0)).columns(x, observations.points(robot))
-    around = shifted.positions(here)
-    shifts = [observations.relative_shift(values[:, None] * by_row[:, row], around) for row, values in columns]
-    found = [shift[observations.seen] for shift in shifts]
-    return np.stack(found, axis=1) if found else np.empty((len(observations), 0))
+    shifts = np.zeros((*by_row.shape[:2], len(columns)))
+    for k, (row, values) in enumerate(columns):
+        shifts[..., k] = values[:, None] * by_row[..., row]
+    return observations.relative_shift(shifts, shifted.positions(here))[observations.seen]
 
 
 def places_of(terms: Sequence[JointTerm], first: int = 0) -> list[list[int]]:
@@ -373,6 +337,6 @@ def wrong_way(term: JointTerm, coefficients: Reals) -> bool:
 
     Returns
     -------
-    wrong : False for terms other than sag and weight
+    wrong : False for terms other than sag
     """
-    return term.kind in ("sag", "weight") and float(coefficients[0]) < 0
+    return term.kind == "sag" and float(coefficients[0]) < 0

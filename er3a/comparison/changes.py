@@ -1,9 +1,11 @@
-"""What a slip of a pen does to a table, and undoes if it is made again: for comparison, diagnosis and evidence."""
+"""The slips of a pen that a table may have, with the changes that undo them: for comparison, diagnosis, evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import Literal
 
 import numpy as np
 
@@ -11,6 +13,81 @@ from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.robots.robot import Robot
 
 Change = Callable[[Tables], Tables]
+SlipCode = Literal[
+    "one_alpha_negated",
+    "one_length_negated",
+    "direction_reversed",
+    "all_alphas_negated",
+    "offsets_negated",
+    "other_convention",
+    "a_and_d_swapped",
+    "rows_exchanged",
+    "limits_exchanged",
+    "rows_shifted",
+    "half_turn",
+]
+SHAPE, LIMITS = ("a", "alpha", "d"), ("lower", "upper")
+SIGNS: dict[str, SlipCode] = {
+    "alpha": "one_alpha_negated",
+    "a": "one_length_negated",
+    "d": "one_length_negated",
+    "direction": "direction_reversed",
+}
+EXCHANGED = SHAPE, (*SHAPE, "offset"), LIMITS
+SHIFTED = ("offset",), SHAPE, ("a", "alpha"), ("d",), ("a",), ("alpha",)
+
+
+@dataclass(frozen=True, eq=False)
+class Slip:
+    """A slip of a pen.
+
+    Attributes
+    ----------
+    code : what was done
+    columns, rows : where, rows from 0; both empty for the convention
+    undone : the change that undoes it
+    amount : by how many rows, of those that are shifted
+    """
+
+    code: SlipCode
+    columns: tuple[str, ...]
+    rows: tuple[int, ...]
+    undone: Change
+    amount: int = 0
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the entries that it changes."""
+        return tuple(f"{column}{row + 1}" for row in self.rows for column in self.columns) or ("convention",)
+
+
+def slips_of(count: int) -> Iterator[Slip]:
+    """The slips that any table may have, those of single numbers first.
+
+    Parameters
+    ----------
+    count : of rows
+
+    Yields
+    ------
+    slips : those that change nothing of a table among them
+    """
+    rows = tuple(range(count))
+    for (column, code), row in product(SIGNS.items(), rows):
+        yield Slip(code, (column,), (row,), times(-1.0, (column,), row))
+    yield Slip("all_alphas_negated", ("alpha",), rows, times(-1.0, ("alpha",)))
+    yield Slip("offsets_negated", ("offset",), rows, times(-1.0, ("offset",)))
+    yield Slip("other_convention", (), (), other_convention)
+    for row in rows:
+        yield Slip("a_and_d_swapped", ("a", "d"), (row,), swapped(row))
+    yield Slip("a_and_d_swapped", ("a", "d"), rows, swapped())
+    for columns, (one, other) in product(EXCHANGED, combinations(rows, 2)):
+        order = list(rows)
+        order[one], order[other] = other, one
+        code = "limits_exchanged" if columns == LIMITS else "rows_exchanged"
+        yield Slip(code, columns, (one, other), in_order(order, columns))
+    for columns, by in product(SHIFTED, (1, -1)):
+        yield Slip("rows_shifted", columns, rows, in_order(np.roll(rows, by).tolist(), columns), by)
 
 
 def times(factor: float, columns: Sequence[str], row: int | None = None) -> Change:
@@ -47,23 +124,6 @@ def in_order(order: Sequence[int], columns: Sequence[str]) -> Change:
     change : of H tables at once
     """
     return lambda tables: replace(tables, **{name: getattr(tables, name)[:, list(order)] for name in columns})
-
-
-def exchanged(rows: int, one: int, other: int) -> list[int]:
-    """The order of rows with two of them exchanged.
-
-    Parameters
-    ----------
-    rows : how many there are
-    one, other : from 0
-
-    Returns
-    -------
-    order : (m,)
-    """
-    order = list(range(rows))
-    order[one], order[other] = other, one
-    return order
 
 
 def swapped(row: int | None = None) -> Change:

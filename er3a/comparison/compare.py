@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -40,33 +40,25 @@ ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, 
 ALIGN_POWER = 4  # of a distance, by which it counts
 TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
 SAME_RATIO = 0.005  # relative difference of speeds, and of lengths in two units, that counts as none
-HALF_TURN = np.pi - 1e-4  # rad, from which on a rotation's skew part has no digits left for its axis
+NO_TURN, HALF_TURN = 1e-9, np.pi - 1e-4  # rad, below and above which an axis has no sense
 NO_OFFSET = 1e-6  # m, of a row from an axis; sine of its tilt; entry of a coupling; largest distance worth a search
 NEAR_ROW = 1e-5  # m, and of a turn, by which base or flange may miss what a row of the table can hold
 ROUNDED = 4  # decimals of mm and deg in a corrected table
 SHOWN = 6  # of differences
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.8}  # mm
 RAD = math.degrees(1.0)
-ANGLE_UNITS = {"deg": 1.0, "rad": RAD, "gon": 0.9, "π/180 deg": 1 / RAD, "180/π rad": RAD**2}
+ANGLE_UNITS = {"deg": 1.0, "rad": RAD, "π/180 deg": 1 / RAD, "180/π rad": RAD**2}
 """In deg; the last two are those of angles that were converted once too often."""
 LENGTH_FACTORS = {own / read for own, read in itertools.permutations(LENGTH_UNITS.values(), 2)}
-GON = ANGLE_UNITS["gon"]
-ANGLE_FACTORS = RAD, 1 / RAD, RAD**2, GON, GON / RAD
+ANGLE_FACTORS = RAD, 1 / RAD, RAD**2
 """What takes values from the unit they were read in to their own."""
 NEAR_FACTOR = math.log(1.35)  # of a ratio, as one wrong entry may change it
 USUAL_SUMS = {2: (0.25, 4.0), 1: (0.1, 2.5)}  # m, of the lengths a and d of an arm's table, and of one of both
 LEAST_SUM = 0.02  # m, of one of both, where two units are as near as cm and mm
 NEAR_UNITS = math.log(20.0)
 STRANGER = math.log(1.5)  # how much farther outside of these a table has to be than another to be the one in error
-USUAL_ANGLES = {
-    "alpha": (6.3, 361.0),
-    "offset": (6.3, 361.0),
-    "lower": (12.6, 1000.0),
-    "upper": (12.6, 1000.0),
-    "speed": (20.0, 1500.0),
-}
-"""Between which (deg, deg/s) the widest of an arm's angles is: no radians, and not converted once too often."""
-NEAR_GON = 0.02  # of the sum of all angles of a column
+LEAST_ANGLE, MOST_ANGLE = 6.3, 361.0
+"""Between which (deg) the widest of a table's angles is: no radians, and not converted once too often."""
 SAME_FACTOR = 1e-6
 TINY = 0.01  # m, of all lengths of two arms that are both in another unit
 FINEST = 5e-3  # by which part of all its lengths such an arm may differ
@@ -298,18 +290,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     at_ends = _ends_as_entries(robot_a, rows_at_ends(robot_a, found, tolerances))
     base, flange = (_placement(T, entries, tolerances) for T, entries in zip((found.base, found.flange), at_ends))
     joint_zeros = _joint_zeros(robot_a, found)
-    layers_of: dict[Uncompared, Callable[[Robot, Robot], RangeLayer]] = {
-        "limits": lambda one, other: _limits(one, other, reverses, joint_zeros, tolerances),
-        "speeds": _speeds,
-    }
-    ranges = {name: layer_of(robot_a, robot_b) for name, layer_of in layers_of.items()}
-    for name in (name for name, layer in ranges.items() if layer.same is False):
-        for slip in _range_slips(robot_a, robot_b, RANGES[name]):
-            arms = in_units(robot_a, [slip], "a"), in_units(robot_b, [slip], "b")
-            if (layer := layers_of[name](*arms)).same is not False:
-                (robot_a, robot_b), slips, ranges[name] = arms, (*slips, slip), layer
-                break
-    limits, speeds = ranges["limits"], ranges["speeds"]
+    limits, speeds = _limits(robot_a, robot_b, reverses, joint_zeros, tolerances), _speeds(robot_a, robot_b)
     units = UnitLayer(not slips, slips)
     agree = zero.same and directions.same and base.same and flange.same and coupled.same
     agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
@@ -318,7 +299,8 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     off = _distances(printed, in_right_units, alignment, robot_a)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
-    missing = [name for name, layer in ranges.items() if layer.same is None]
+    missing: list[Uncompared] = ["limits"] if limits.same is None else []
+    missing += ["speeds"] if speeds.same is None else []
     missing += ["limits_on_sums"] if robot_a.combined or robot_b.combined else []
     return Comparison(verdict, *layers, *off, counts, corrected, alignment, (*missing, *beside))
 
@@ -442,14 +424,12 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, R = mechanism.turn_of(T), T[:3, :3]
+    angle, about = mechanism.turn_of(T), log_rotation(T[:3, :3])
+    size = float(np.linalg.norm(about))
+    axis = about / size if size > NO_TURN else np.array([0.0, 0.0, 1.0])
     if angle > HALF_TURN:
-        outer = 0.5 * (R + np.eye(3))
-        axis = outer[:, int(np.argmax(np.diag(outer)))]
-    else:
-        axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    size = float(np.linalg.norm(axis))
-    u, v, w = (axis / size if size > 1e-9 else np.array([0.0, 0.0, 1.0])).tolist()
+        axis *= np.sign(axis[np.abs(axis).argmax()])
+    u, v, w = (axis + 0.0).tolist()
     turn = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
 
@@ -549,8 +529,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
     q = np.random.default_rng(0).uniform(a.lower, a.upper, (ALIGN_POSES, a.joints))
 
     def moved(x: Reals) -> Alignment:
-        ends = (translation(*own[:3]) @ rot_z(own[3]) @ rot_y(own[4]) @ rot_x(own[5]) for own in (x[:6], x[6:12]))
-        base, flange = ends
+        base, flange = (posed(exp_rotation(own[3:]), own[:3]) for own in (x[:6], x[6:12]))
         return Alignment(base @ start.base, start.flange @ flange, start.zeros + x[12:], start.signs)
 
     def flanges(x: Reals, poses: Reals) -> tuple[Reals, Reals]:
@@ -645,8 +624,6 @@ def worst_pose(
 
 # Units ----------------------------------------------------------------------------------------------------------------
 
-RANGES: dict[Uncompared, tuple[str, ...]] = {"limits": ("lower", "upper"), "speeds": ("speed",)}
-
 
 def in_units(robot: Robot, slips: Iterable[Cause], side: Literal["a", "b"]) -> Robot:
     """A robot with the columns that were read in another unit taken to their own.
@@ -658,16 +635,12 @@ def in_units(robot: Robot, slips: Iterable[Cause], side: Literal["a", "b"]) -> R
 
     Returns
     -------
-    robot : SI; of limits and speeds only joints that turn, or only those that slide, are changed, by the kind of slip
+    robot : SI
     """
     columns: dict[str, Reals] = {}
     for slip in slips:
         for column in slip.entries if (slip.side or "a") == side else ():
-            values = getattr(robot, column)
-            of_unit = (
-                robot.slides == (slip.code == "unit") if column in (*RANGES["limits"], *RANGES["speeds"]) else True
-            )
-            columns[column] = np.where(of_unit, values * slip.amount, values)
+            columns[column] = getattr(robot, column) * slip.amount
     return robot.replace(**columns) if columns else robot
 
 
@@ -675,7 +648,7 @@ def _unit_slips(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances
     """The columns a, d, alpha and offset that, in another unit, make two tables agree; of several sets the one that
     leaves the fewest conventions different, then the smallest. If geometry agrees with none, and it is to be explained,
     one that leaves less than half of the entries different."""
-    twists, offsets = (_angle_slips(robot_a, robot_b, columns) for columns in (("alpha",), ("offset",)))
+    twists, offsets = (_angle_slips(robot_a, robot_b, column) for column in ("alpha", "offset"))
     sets = [(*lengths, *angles) for lengths, angles in itertools.product(_length_slips(robot_a, robot_b), twists)]
 
     def arms(slips: tuple[Cause, ...]) -> tuple[Robot, Robot]:
@@ -803,34 +776,17 @@ def _is_named(slip: Cause) -> bool:
     return slip.unit.rpartition("→ ")[2] in (*LENGTH_UNITS, *ANGLE_UNITS)
 
 
-def _angle_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> list[tuple[Cause, ...]]:
-    """Ways in which angles of two tables can be in another unit: none, and for either those that make them usual, or
-    gon that make them the other's."""
+def _angle_slips(robot_a: Robot, robot_b: Robot, column: str) -> list[tuple[Cause, ...]]:
+    """Ways in which angles of two tables can be in another unit: none, and for either those that make them usual."""
     found: list[tuple[Cause, ...]] = [()]
-    turning = ~robot_a.slides if columns in RANGES.values() else slice(None)
-    every = [
-        np.abs(np.concatenate([getattr(robot, column)[turning] for column in columns])) for robot in (robot_a, robot_b)
-    ]
-    sums = [float(values[np.isfinite(values)].sum()) for values in every]
     sides: tuple[Literal["a", "b"], ...] = ("a", "b")
-    for side, values, ratio in zip(sides, every, (sums, sums[::-1])):
-        widest, (least, most) = math.degrees(values[np.isfinite(values)].max(initial=0.0)), USUAL_ANGLES[columns[0]]
-        usual = least < widest < most
-        for factor in ANGLE_FACTORS:
-            gon = (values > 0).sum() > 1 and abs(ratio[1] - GON * ratio[0]) < NEAR_GON * ratio[0]
-            if (factor == GON and gon) if usual else least < widest * factor < most:
-                found.append((_of_unit("angle_unit", side, columns, factor),))
+    for side, robot in zip(sides, (robot_a, robot_b)):
+        widest = math.degrees(np.abs(getattr(robot, column)).max(initial=0.0))
+        usual = LEAST_ANGLE < widest < MOST_ANGLE
+        for factor in () if usual else ANGLE_FACTORS:
+            if LEAST_ANGLE < widest * factor < MOST_ANGLE:
+                found.append((_of_unit("angle_unit", side, (column,), factor),))
     return found
-
-
-def _range_slips(robot_a: Robot, robot_b: Robot, columns: tuple[str, ...]) -> Iterator[Cause]:
-    """Ways in which limits or speeds of one of two tables can be in another unit."""
-    for own in (columns, *((column,) for column in columns if len(columns) > 1)):
-        for slips in _angle_slips(robot_a, robot_b, own):
-            yield from slips
-    sums = [sum(float(np.abs(getattr(each, key)[each.slides]).sum()) for key in columns) for each in (robot_a, robot_b)]
-    for factor in _likely_factor(sums[1] / sums[0]) if min(sums) > 0 else ():
-        yield _of_unit("unit", None, columns, factor)
 
 
 # The corrected table --------------------------------------------------------------------------------------------------

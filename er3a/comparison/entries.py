@@ -1,5 +1,5 @@
-"""One entry of a table, and tables with amounts added to entries: what comparison, diagnosis, calibration and evidence
-name and change."""
+"""One entry of a table, tables with amounts added to entries, and how these move a tool: what comparison, diagnosis,
+calibration and evidence name and change."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from er3a.kinematics.table_batch import Tables
+from er3a.geometry.transforms import rot_x, rot_z, translation
+from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM
 from er3a.robots.robot import Robot
@@ -131,3 +132,63 @@ def wrapped_between(tables: Tables, other: Tables, entry: Entry) -> Reals:
     """
     off = entry.of(tables) - entry.of(other)
     return off if entry.unit == "mm" else (off + np.pi) % (2 * np.pi) - np.pi
+
+
+def entry_twists(table: Tables, robot: Robot, x: Reals, entries: Sequence[Entry], points: Reals) -> Reals:
+    """How points on the flange move and turn with entries of a table's rows.
+
+    A row is ``Rz(offset) Tz(d) Tx(a) Rx(alpha) Ry(beta)``, a modified one begins with the last three: lengths move
+    along an axis of such a frame, angles turn about it.
+
+    Parameters
+    ----------
+    table : a batch of one
+    robot : for base and flange
+    x : (N, m), rad or m, what the rows move by
+    entries : k of them, none of base, tool or scale
+    points : (N, 3), m, base frame
+
+    Returns
+    -------
+    twists : (N, 6, k), m and rad per m or rad, base frame
+    """
+    T = frames_of(table, robot, x)[0, :, :-1]
+    a, alpha, d, offset, sliding = (getattr(table, name)[0] for name in ("a", "alpha", "d", "offset", "sliding"))
+    links = T @ np.array(
+        [rot_z(angle) for angle in np.where(sliding, offset, 0.0)]
+    )  # a sliding row's frame is unturned
+    if table.modified[0]:
+        links = np.concatenate([np.broadcast_to(robot.base, links[:, :1].shape), links[:, :-1]], axis=1)
+        d = np.append(0.0, d[:-1])
+    found: Reals = np.zeros((len(x), 6, len(entries)))
+    for k, entry in enumerate(entries):
+        row, column = entry.joint - 1, 2
+        frame = T[:, row]
+        if entry.column not in ("d", "offset"):
+            frame = links[:, row] @ translation(a[row], 0.0, d[row]) @ rot_x(alpha[row])
+            column = 1 if entry.column == "beta" else 0
+        axis = frame[:, :3, column]
+        if entry.column in LENGTHS:
+            found[:, :3, k] = axis
+        else:
+            found[:, :3, k], found[:, 3:, k] = np.cross(axis, points - frame[:, :3, 3]), axis
+    return found
+
+
+def row_twists(table: Tables, robot: Robot, x: Reals, points: Reals) -> Reals:
+    """How points on the flange move and turn with what the rows move by.
+
+    Parameters
+    ----------
+    table : a batch of one
+    robot : for base and flange
+    x : (N, m), rad or m, what the rows move by
+    points : (N, 3), m, base frame
+
+    Returns
+    -------
+    twists : (N, 6, m), m and rad per m or rad, base frame
+    """
+    moved = [Entry("d" if slides else "offset", k) for k, slides in enumerate(table.sliding[0], 1)]
+    found: Reals = table.direction[0] * entry_twists(table, robot, x, moved, points)
+    return found

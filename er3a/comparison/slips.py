@@ -13,7 +13,6 @@ the arms are merely defined otherwise.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -22,25 +21,12 @@ from typing import Literal
 import numpy as np
 
 from er3a.comparison import mechanism
-from er3a.comparison.changes import Change, changed, exchanged, in_order, other_convention, swapped, times
+from er3a.comparison.changes import Change, Slip, SlipCode, changed, slips_of, times
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.robot import Robot
 
-CauseCode = Literal[
-    "a_and_d_swapped",
-    "other_convention",
-    "all_alphas_negated",
-    "one_alpha_negated",
-    "one_length_negated",
-    "offsets_negated",
-    "unit",
-    "angle_unit",
-    "rows_exchanged",
-    "scale",
-    "rows_shifted",
-]
-SHIFTED = ("a", "alpha", "d"), ("a", "alpha"), ("d",), ("a",), ("alpha",)
-EXCHANGED = ("a", "alpha", "d"), ("a", "alpha", "d", "offset")
+CauseCode = SlipCode | Literal["unit", "angle_unit", "scale"]
+SIDES: tuple[Literal["a", "b"], ...] = ("a", "b")
 SAME_RATIO = math.log(1.005)
 WHOLE = 2.0  # of a slip that changes more than one number
 TOGETHER, KEPT, MATCHED = 3, 6, 6
@@ -183,56 +169,28 @@ def _with_alternatives(slips: tuple[Cause, ...], tied: Sequence[tuple[_Edit, ...
 
 
 def _edits(one: Robot, other: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
-    """All slips that could be undone, those of single numbers first."""
-    yield from _signs(one, tolerances)
-    yield _Edit(Cause("all_alphas_negated"), WHOLE, times(-1.0, ("alpha",)))
-    yield from _of_offsets(one, tolerances)
-    sides: tuple[Literal["a", "b"], ...] = "a", "b"
-    for side in sides:
-        yield _Edit(Cause("other_convention", side), WHOLE, other_convention)
-    for row in range(one.rows):
-        if abs(one.a[row] - one.d[row]) > tolerances.length:
-            yield _Edit(Cause("a_and_d_swapped", "a", (f"a{row + 1}", f"d{row + 1}")), WHOLE, swapped(row))
-    yield _Edit(Cause("a_and_d_swapped"), WHOLE, swapped())
-    yield from _exchanges(one)
-    yield from _scales(one, other)
-    for rows, names in itertools.product((1, -1), SHIFTED):
-        yield _Edit(Cause("rows_shifted", "a", (), float(rows), ", ".join(names)), WHOLE, _rolled(one, names, rows))
-
-
-def _signs(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
-    """Numbers that could have the wrong sign."""
-    for column in ("alpha", "a", "d"):
-        size = np.abs(np.sin(robot.alpha)) if column == "alpha" else np.abs(getattr(robot, column))
-        least = tolerances.angle if column == "alpha" else tolerances.length
-        code: CauseCode = "one_alpha_negated" if column == "alpha" else "one_length_negated"
-        for row in np.flatnonzero(size > least).tolist():
-            if not (column == "d" and robot.sliding[row]):
-                yield _Edit(Cause(code, "a", (f"{column}{row + 1}",)), 1.0, times(-1.0, (column,), row))
-
-
-def _of_offsets(robot: Robot, tolerances: mechanism.Tolerances) -> Iterator[_Edit]:
-    """Mistakes in all offsets at once, which leave some other than 0 between the ends."""
-    inner = ~robot.sliding & (np.arange(robot.rows) > 0) & (np.arange(robot.rows) < robot.rows - 1)
-    mistakes = [(Cause("offsets_negated"), times(-1.0, ("offset",)))]
-    for rows in (1, -1):
-        mistakes.append((Cause("rows_shifted", "a", (), float(rows), "offset"), _rolled(robot, ("offset",), rows)))
-    for slip, undone in mistakes:
-        meant = changed(robot, undone).offset
-        if np.abs(wrap_to_pi(meant))[inner].max(initial=0.0) > tolerances.angle:
-            yield _Edit(slip, 1.0, undone)
-
-
-def _exchanges(robot: Robot) -> Iterator[_Edit]:
-    """Two rows that stand in each other's place, with or without their offsets."""
-    for names in EXCHANGED:
-        if "offset" in names and not np.ptp(robot.offset):
+    """All slips that could be undone; directions and limits are said as such."""
+    for slip in slips_of(one.rows):
+        if slip.code in ("direction_reversed", "limits_exchanged") or not _matters(slip, one, tolerances):
             continue
-        for pair in itertools.combinations(range(robot.rows), 2):
-            if robot.sliding[list(pair)].any():
-                continue
-            entries = tuple(f"{name}{row + 1}" for row in pair for name in names)
-            yield _Edit(Cause("rows_exchanged", "a", entries), WHOLE, in_order(exchanged(robot.rows, *pair), names))
+        price = 1.0 if slip.code.startswith("one_") or slip.columns == ("offset",) else WHOLE
+        entries = slip.entries if 0 < len(slip.rows) < one.rows else ()
+        columns = ", ".join(slip.columns) if slip.amount else ""
+        for side in SIDES if not slip.rows else SIDES[:1]:
+            yield _Edit(Cause(slip.code, side, entries, float(slip.amount) or None, columns), price, slip.undone)
+    yield from _scales(one, other)
+
+
+def _matters(slip: Slip, robot: Robot, tolerances: mechanism.Tolerances) -> bool:
+    """Whether undoing a slip changes more than zeros at the ends and values of joints that slide."""
+    meant = changed(robot, slip.undone)
+    if slip.columns == ("offset",):
+        inner = ~robot.sliding & (np.arange(robot.rows) > 0) & (np.arange(robot.rows) < robot.rows - 1)
+        return bool(np.abs(wrap_to_pi(meant.offset))[inner].max(initial=0.0) > tolerances.angle)
+    if robot.sliding[list(slip.rows)].any() and (slip.code == "rows_exchanged" or slip.columns == ("d",)):
+        return slip.amount != 0
+    gaps = [np.abs(getattr(meant, name) - getattr(robot, name)).max() for name in slip.columns]
+    return not slip.columns or max(gaps) > tolerances.length
 
 
 def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:
@@ -242,7 +200,3 @@ def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:
     ratio = float(longest[1] / longest[0]) if min(longest) > 0 else 1.0
     if abs(math.log(ratio)) > SAME_RATIO:
         yield _Edit(Cause("scale", "a", (), ratio), WHOLE, times(ratio, ("a", "d")))
-
-
-def _rolled(robot: Robot, names: Sequence[str], rows: int) -> Change:
-    return in_order(np.roll(np.arange(robot.rows), rows).tolist(), names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -12,7 +12,7 @@ import numpy as np
 from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Fitter, Solution, State
+from er3a.confirmation.fit import Fitter, Solution
 from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
@@ -368,14 +368,9 @@ def _parts(solution: Solution) -> frozenset[object]:
 def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Entries that could be off by 1 mm or 0.1 deg: without a trace, and because base or tool acts alike."""
     every = [each for each in fitter.every if each not in solution.entries]
-    explanation = replace(solution.explanation, entries=(*solution.entries, *every), small=False)
-    amounts = np.concatenate([solution.amounts, np.zeros(len(every))])
-    J, _ = fitter.linear(State(explanation, explanation.entries, solution.Y, solution.X, amounts))
-    first = J.shape[1] - len(every)
+    own, rest, _ = fitter.effects(solution, every)
     least = INTERVAL_95 / np.array([OPEN_M if each.unit == "mm" else OPEN_RAD for each in every])
-    Q = np.linalg.qr(J[:, :first])[0]
-    rest = J[:, first:] - Q @ (Q.T @ J[:, first:])
-    unseen = np.linalg.norm(J[:, first:], axis=0) < least
+    unseen = np.linalg.norm(own, axis=0) < least
     taken = ~unseen & (np.linalg.norm(rest, axis=0) < least)
     by_kind = [tuple(each.name for each, holds in zip(every, flags) if holds) for flags in (unseen, taken)]
     return by_kind[0], by_kind[1]

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.calibration.parameters import parameters_of
-from er3a.comparison.entries import Entry, shifted
+from er3a.comparison.entries import Entry, entry_twists, shifted
 from er3a.confirmation.pairs import ROUNDED, Pairs
 from er3a.finding import Finding
 from er3a.geometry.transforms import exp_rotation, log_rotation, posed, skew, transposed
@@ -30,7 +30,6 @@ from er3a.robots.robot import Robot
 Place = Literal["base", "tool"]
 Start = tuple[Reals, Reals, Reals]
 """Base and tool, (4, 4), and amounts of entries, from which a fit starts."""
-STEP = 1e-5  # m or rad, of central differences
 STEPS, HALVINGS = 16, 6
 DONE = 1e-9  # m or rad
 FLOOR = 5e-6
@@ -219,17 +218,12 @@ class Fitter:
         return found
 
     def twists(self, state: State, by: Sequence[Entry]) -> Reals:
-        """Twists (k, N, 6) of the controller's tool point (m) and rotation by k entries, in the controller's axes."""
-        steps = STEP * np.eye(len(by))
-        both = np.concatenate([steps, -steps, np.zeros((1, len(by)))])
-        moved = np.concatenate([np.broadcast_to(state.amounts, (len(both), len(state.amounts))), both], axis=1)
-        F = self.flanges([state.explanation.joints], (*state.entries, *by), moved)[:, 0]
-        plus, minus = F[: len(by)], F[len(by) : -1]
-        turn = (plus[..., :3, :3] @ transposed(minus[..., :3, :3]) - np.eye(3)) / (2 * STEP)
-        turn = (turn[..., [2, 0, 1], [1, 2, 0]] - turn[..., [1, 2, 0], [2, 0, 1]]) / 2
-        point = (plus - minus)[..., :3, 3] / (2 * STEP) + np.cross(turn, F[-1, :, :3, :3] @ state.X[:3, 3])
-        found: Reals = np.concatenate([point @ state.Y[:3, :3].T, turn @ state.Y[:3, :3].T], axis=-1)
-        return found
+        """Twists (N, 6, k) of the controller's tool point (m) and rotation by k entries, in the controller's axes."""
+        table = shifted(self.table, state.entries, state.amounts[None])
+        u = row_values(self.robot, state.explanation.joints.of(self.pairs.q))
+        points = (self.flanges_at(state) @ state.X)[:, :3, 3]
+        found = entry_twists(table, self.bare, u, by, points).reshape(len(u), 2, 3, len(by))
+        return np.asarray(state.Y[:3, :3] @ found).reshape(len(u), 6, len(by))
 
     def fit(self, explanation: Explanation, start: Start, weights: Reals | None = None) -> Solution:
         """The values that fit best.
@@ -291,6 +285,25 @@ class Fitter:
         count = len(self.pairs) * self.dimensions
         return self._jacobian(state, whiten)[:count], self._left(state, whiten)[:count]
 
+    def effects(self, state: State, more: Sequence[Entry]) -> tuple[Reals, Reals, Reals]:
+        """What k entries more do, to first order.
+
+        Parameters
+        ----------
+        state : at which; none of its entries is among them
+
+        Returns
+        -------
+        own, rest, left : (r, k), derivatives of the differences, (r, k), the part of these that nothing which is free
+            takes up, and (r,), the differences, all in standard deviations
+        """
+        entries, amounts = (*state.entries, *more), np.append(state.amounts, np.zeros(len(more)))
+        explanation = replace(state.explanation, entries=entries, small=False)
+        J, left = self.linear(State(explanation, entries, state.Y, state.X, amounts))
+        free, own = np.split(J, [J.shape[1] - len(more)], axis=1)
+        Q = np.linalg.qr(free)[0]
+        return own, own - Q @ (Q.T @ own), left
+
     def at(self, solution: Solution, rows: Flags | None = None) -> Solution:
         """A solution's differences at all of the pairs.
 
@@ -321,7 +334,7 @@ class Fitter:
         moving = [Entry("d" if slides else "offset", k + 1) for k, slides in enumerate(robot.sliding)]
         coupling = np.eye(robot.rows) if robot.coupling is None else robot.coupling
         by_joint = (robot.direction[:, None] * coupling) @ state.explanation.joints.factors
-        J = np.einsum("kni,kj->nij", self.twists(state, moving), by_joint)
+        J = self.twists(state, moving) @ by_joint
         J *= (pairs.q_digit * ROUNDED)[:, None]
         turned = np.repeat(pairs.turn_digit, 3, axis=1)
         own = np.concatenate([pairs.xyz_digit * abs(state.explanation.factor), turned], axis=1) * ROUNDED
@@ -361,7 +374,7 @@ class Fitter:
             tool[:, :3, :3], tool[:, 3:, 3:] = R, R @ X[:3, :3]
             parts.append(tool[..., :size])
         if state.entries:
-            parts.append(np.moveaxis(self.twists(state, state.entries), 0, -1))
+            parts.append(self.twists(state, state.entries))
         columns = np.concatenate(parts, axis=-1)
         J = np.einsum("nij,njk->nik", whiten, columns)[:, :size].reshape(len(F) * size, columns.shape[-1])
         prior = state.prior[:, None]

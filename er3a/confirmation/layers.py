@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, Start, State
+from er3a.confirmation.fit import Explanation, Fitter, Place, Solution, Start
 from er3a.confirmation.screen import Near, joined, nearest, plain, single_readings
 from er3a.geometry.transforms import inverted, nearest_rotations, posed
 from er3a.numerics.arrays import Reals
@@ -234,15 +234,9 @@ def _promising(fitter: Fitter, state: Solution) -> list[tuple[Entry, ...]]:
     """Entries, alone and in pairs, that reduce the squares most, to first order."""
     own = set(state.explanation.entries)
     every = [each for each in fitter.every if each not in own and each.column != "beta"]
-    explanation = replace(state.explanation, entries=(*state.explanation.entries, *every))
-    amounts = np.concatenate([state.amounts, np.zeros(len(every))])
-    J, left = fitter.linear(State(explanation, explanation.entries, state.Y, state.X, amounts))
-    first = J.shape[1] - len(every)
-    Q = np.linalg.qr(J[:, :first])[0] if first else np.zeros((len(J), 0))
-    own_size = np.linalg.norm(J[:, first:], axis=0)
-    E = J[:, first:] - Q @ (Q.T @ J[:, first:])
+    derivatives, E, left = fitter.effects(state, every)
     size = np.linalg.norm(E, axis=0)
-    seen = size > INDEPENDENT * np.maximum(own_size, 1e-12)
+    seen = size > INDEPENDENT * np.maximum(np.linalg.norm(derivatives, axis=0), 1e-12)
     E, numbers = E[:, seen] / size[seen], np.flatnonzero(seen)
     b, G = E.T @ left, E.T @ E
     singles = [(every[numbers[k]],) for k in np.argsort(-(b**2), kind="stable")[:SINGLES]]

@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from er3a.confirmation.fit import Fitter, JointReading
 from er3a.confirmation.pairs import Pairs
-from er3a.finding import fact
+from er3a.finding import Finding, fact
 from er3a.geometry.transforms import inverted, nearest_rotations, posed, transposed
 from er3a.numerics.arrays import Reals
 from er3a.robots.robot import Robot
@@ -77,30 +77,27 @@ def single_readings(robot: Robot) -> list[JointReading]:
     -------
     readings : senses, what is counted from the ground, swapped columns, quarter turns of zeros, units of angles
     """
-    n, turning = robot.joints, ~robot.slides
+    n, turning = robot.joints, np.flatnonzero(~robot.slides).tolist()
     found = []
-    for j in range(n):
+
+    def add(fault: Finding, entries: Iterable[tuple[int, int, float]] = (), shift: Reals | float = 0.0) -> None:
         S = np.eye(n)
-        S[j, j] = -1
-        found.append(JointReading(S, np.zeros(n), (fact("turns_other_way", joint=j + 1),)))
+        for i, j, value in entries:
+            S[i, j] = value
+        found.append(JointReading(S, np.zeros(n) + shift, (fault,)))
+
+    for j in range(n):
+        add(fact("turns_other_way", joint=j + 1), [(j, j, -1.0)])
     for low, sign, up in product(range(n - 1), (-1.0, 1.0), (True, False)):
         j, i = (low + 1, low) if up else (low, low + 1)
-        if turning[i] == turning[j]:
-            S = np.eye(n)
-            S[j, i] = sign
-            found.append(JointReading(S, np.zeros(n), (fact("counted_from", joint=j + 1, by=i + 1, factor=sign),)))
+        if (i in turning) == (j in turning):
+            add(fact("counted_from", joint=j + 1, by=i + 1, factor=sign), [(j, i, sign)])
     for i, j in combinations(range(n), 2):
-        S = np.eye(n)
-        S[[i, j]] = S[[j, i]]
-        found.append(JointReading(S, np.zeros(n), (fact("columns_swapped", first=i + 1, second=j + 1),)))
-    for j in np.flatnonzero(turning).tolist():
-        for deg in (180.0, 90.0, -90.0):
-            shift = np.zeros(n)
-            shift[j] = np.radians(deg)
-            found.append(JointReading(np.eye(n), shift, (fact("zero_elsewhere", joint=j + 1, deg=deg),)))
+        add(fact("columns_swapped", first=i + 1, second=j + 1), [(i, i, 0.0), (j, j, 0.0), (i, j, 1.0), (j, i, 1.0)])
+    for j, deg in product(turning, (180.0, 90.0, -90.0)):
+        add(fact("zero_elsewhere", joint=j + 1, deg=deg), shift=np.radians(deg) * np.eye(n)[j])
     for unit, size in (("rad", 180 / np.pi), ("deg", np.pi / 180)):
-        S = np.diag(np.where(turning, size, 1.0))
-        found.append(JointReading(S, np.zeros(n), (fact("joints_in", unit=unit),)))
+        add(fact("joints_in", unit=unit), [(j, j, size) for j in turning])
     return found
 
 

@@ -32,7 +32,7 @@ from er3a.comparison.mechanism import (
 from er3a.diagnosis.faults import SIDES, Fault, Faults, limit_stated, rounded, wrong_number
 from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.finding import fact
-from er3a.geometry.transforms import rot_x, rot_y, rot_z, translation
+from er3a.geometry.transforms import exp_rotation, posed, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward, frames
 from er3a.kinematics.table_batch import robot_of, tables_of
@@ -322,8 +322,7 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
 def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:
     """The arm with base (6), flange (6), and entries moved by x, m and rad."""
     base, flange = (
-        T @ translation(*x[k : k + 3]) @ rot_z(x[k + 3]) @ rot_y(x[k + 4]) @ rot_x(x[k + 5])
-        for T, k in ((robot.base, 0), (robot.flange, 6))
+        T @ posed(exp_rotation(own[3:]), own[:3]) for T, own in ((robot.base, x[:6]), (robot.flange, x[6:12]))
     )
     return robot_of(shifted(tables_of(robot), numbers, x[None, 12:]), 0, robot.replace(base=base, flange=flange))
 

@@ -94,76 +94,27 @@ class Hypothesis(ByValue, Displayed, conclusions.RankedHypothesis):
         return Sheet(f"Hypothesis: {shortly(self.faults)}; greatest difference {remains}")
 
 
-class Hypotheses(list[Hypothesis], Displayed):
-    """Hypotheses, best first; a list.
+class Diagnosis(list[Hypothesis], Displayed):
+    """What references say about a table: hypotheses, best first.
 
     Attributes
     ----------
+    conclusion : what they amount to
+    references : how many it rests on; tried : how many hypotheses were evaluated
     not_examined : entries of the table that could have any value without a reference being missed (``alpha6``), and
         joints that could be reversed (``direction5``); an empty list says nothing about them
     missed : references that no hypothesis rests on, and that the table misses: extremes over the limits, such as reach
     """
 
     def __init__(
-        self,
-        hypotheses: Sequence[Hypothesis] = (),
-        not_examined: tuple[str, ...] = (),
-        missed: tuple[Reference, ...] = (),
+        self, conclusion: conclusions.Conclusion, references: int, tried: int, hypotheses: Sequence[Hypothesis] = ()
     ):
         super().__init__(hypotheses)
-        self.not_examined, self.missed = not_examined, missed
+        self.conclusion, self.references, self.tried = conclusion, references, tried
+        self.not_examined: tuple[str, ...] = ()
+        self.missed: tuple[Reference, ...] = ()
 
     __repr__ = Displayed.__repr__
-
-    def sheet(self) -> Sheet:
-        """What the notebook shows: a row for each hypothesis, and what an empty list says nothing about.
-
-        Returns
-        -------
-        sheet : best first
-        """
-        heading = f"{len(self)} hypotheses" if self else "No hypothesis"
-        if self.missed:
-            heading += f"; reach that is missed: {len(self.missed)}"
-        if self.not_examined:
-            heading += f"; not examined: {', '.join(self.not_examined)}"
-        return sheet_of(self, heading)
-
-
-def sheet_of(hypotheses: Sequence[Hypothesis], heading: str) -> Sheet:
-    """Hypotheses as a table for the notebook.
-
-    Parameters
-    ----------
-    hypotheses : best first
-    heading : its first line
-
-    Returns
-    -------
-    sheet : their greatest differences before and after, in each one's unit
-    """
-    rows = (
-        (place + 1, each.faults, each.residual_before, each.residual_after, each.unit, each.explains)
-        for place, each in enumerate(hypotheses)
-    )
-    shown, left_out = first_rows(rows, len(hypotheses))
-    return Sheet(heading, ("place", "faults", "before", "after", "unit", "explains all"), shown, left_out)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(ByValue, Displayed):
-    """What references say about a table.
-
-    Attributes
-    ----------
-    references : how many it rests on; tried : how many hypotheses were evaluated
-    hypotheses : best first
-    """
-
-    conclusion: conclusions.Conclusion
-    references: int
-    tried: int
-    hypotheses: tuple[Hypothesis, ...]
 
     @property
     def names_fault(self) -> bool:
@@ -171,17 +122,29 @@ class Diagnosis(ByValue, Displayed):
         return is_one(self.conclusion, "named", "mostly")
 
     def sheet(self) -> Sheet:
-        """What the notebook shows: the conclusion, and a row for each hypothesis.
+        """What the notebook shows: the conclusion, a row for each hypothesis, and what an empty list leaves open.
 
         Returns
         -------
-        sheet : best first
+        sheet : best first, with greatest differences before and after, in each one's unit
         """
+        rows = (
+            (place + 1, each.faults, each.residual_before, each.residual_after, each.unit, each.explains)
+            for place, each in enumerate(self)
+        )
+        shown, left_out = first_rows(rows, len(self))
         heading = f"Diagnosis by {self.references} references, {self.tried} hypotheses tried"
-        return sheet_of(self.hypotheses, f"{heading}: {shortly(self.conclusion)}")
+        facts = {"reach that is missed": len(self.missed) or "", "not examined": ", ".join(self.not_examined)}
+        return Sheet(
+            f"{heading}: {shortly(self.conclusion)}",
+            ("place", "faults", "before", "after", "unit", "explains all"),
+            shown,
+            left_out,
+            tuple(f"{name}: {value}" for name, value in facts.items() if value),
+        )
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hypotheses:
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:
     """Hypotheses about what is wrong with a table, best first.
 
     Parameters
@@ -195,8 +158,10 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Hy
         than the table as it is. What it could not examine is in ``not_examined``, and extremes over the limits that
         the table misses in ``missed``
     """
-    unseen = unseen_of(case_of(robot, usable(references)))
-    return Hypotheses(diagnosis_of(robot, references).hypotheses, unseen, extremes_missed(robot, references))
+    found = diagnosis_of(robot, references)
+    found.not_examined = unseen_of(case_of(robot, usable(references)))
+    found.missed = extremes_missed(robot, references)
+    return found
 
 
 def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
@@ -239,11 +204,11 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     """
     stated = usable(references)
     if not stated:
-        return Diagnosis(fact("no_reference"), 0, 0, ())
+        return Diagnosis(fact("no_reference"), 0, 0)
     case = case_of(robot, stated)
     ranking = rank_case(case)
     if not ranking:
-        return Diagnosis(fact("met", references=len(stated)), len(stated), 0, ())
+        return Diagnosis(fact("met", references=len(stated)), len(stated), 0)
     hypotheses = tuple(_of_group(ranking, group, robot) for group in ranking.groups)
     tried = len(ranking.pool.faults)
     explained = bool(hypotheses) and hypotheses[0].explains

@@ -6,24 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
-from typing import Literal, cast
 
 import numpy as np
 
-from er3a.comparison.changes import Change, exchanged, in_order, other_convention, swapped, times
+from er3a.comparison.changes import SHAPE, Change, Slip, slips_of, times
 from er3a.comparison.entries import LENGTHS, Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import COLUMNS, Tables
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, LimitExcess, Side, value_at
 from er3a.references.reference import Reference, expected_of
-
-Misread = Literal["metres_as_millimetres", "millimetres_as_metres", "radians_as_degrees", "degrees_as_radians"]
-Entries = Literal["a", "d", "lengths", "alpha", "offset", "limits", "angles"]
-LimitFault = Literal["crossed", "signs_swapped", "lower_sign", "upper_sign"]
-LengthColumn = Literal["a", "d"]
-
 
 Fault = Finding
 Faults = tuple[Fault, ...]
@@ -57,9 +49,7 @@ def wrong_number(entry: Entry, given: float, fits: float) -> Fault:
     if entry.column == "scale":
         return fact("wrong_scale", factor=fits)
     if entry.column in LENGTHS:
-        return fact(
-            "wrong_length", joint=entry.joint, column=cast(LengthColumn, entry.column), given_mm=given, fits_mm=fits
-        )
+        return fact("wrong_length", joint=entry.joint, column=entry.column, given_mm=given, fits_mm=fits)
     return fact(
         "wrong_alpha" if entry.column == "alpha" else "wrong_offset", joint=entry.joint, given_deg=given, fits_deg=fits
     )
@@ -150,21 +140,12 @@ def repairs_of(given: Tables, references: Sequence[Reference] = ()) -> list[Repa
     -------
     repairs : each with the fault that it corrects
     """
-    joints, alphas = range(given.a.shape[-1]), np.degrees(given.alpha[0]).tolist()
+    joints = range(given.a.shape[-1])
     candidates = [
         *limit_repairs(given, references),
         *_units(),
-        *(
-            Repair(fact("wrong_alpha_sign", joint=j + 1, given_deg=alpha, fits_deg=-alpha), times(-1.0, ("alpha",), j))
-            for j, alpha in enumerate(alphas)
-        ),
-        *_swaps(joints),
+        *(Repair(fault, slip.undone) for slip in slips_of(len(joints)) if (fault := _fault_of(slip, given))),
         *_offsets(given, joints),
-        *(Repair(fact("reversed_direction", joint=j + 1), times(-1.0, ("direction",), j)) for j in joints),
-        Repair(
-            fact("wrong_convention", read_as="modified" if given.modified[0] else "standard"),
-            other_convention,
-        ),
         *_limits(joints),
     ]
     return [repair for repair in candidates if _differs(repair.apply(given), given)]
@@ -229,18 +210,18 @@ def _differs(left: Tables, right: Tables) -> bool:
     return any(np.abs(getattr(left, name) - getattr(right, name).astype(float)).max() > SAME for name in COLUMNS)
 
 
-_LENGTHS: tuple[tuple[Entries, tuple[str, ...]], ...] = (("a", ("a",)), ("d", ("d",)), ("lengths", ("a", "d")))
-_ANGLES: tuple[tuple[Entries, tuple[str, ...]], ...] = (
+_LENGTHS = (("a", ("a",)), ("d", ("d",)), ("lengths", ("a", "d")))
+_ANGLES = (
     ("alpha", ("alpha",)),
     ("offset", ("offset",)),
     ("limits", ("lower", "upper")),
     ("angles", ("alpha", "offset", "lower", "upper")),
 )
-_MISREAD_LENGTHS: tuple[tuple[float, Misread], ...] = (
+_MISREAD_LENGTHS = (
     (1000.0, "metres_as_millimetres"),
     (0.001, "millimetres_as_metres"),
 )
-_MISREAD_ANGLES: tuple[tuple[float, Misread], ...] = (
+_MISREAD_ANGLES = (
     (1 / RADIANS_PER_DEGREE, "radians_as_degrees"),
     (RADIANS_PER_DEGREE, "degrees_as_radians"),
 )
@@ -255,27 +236,29 @@ def _units() -> list[Repair]:
     ]
 
 
-_SHIFTS: tuple[tuple[Literal["rows", "a", "alpha", "d"], tuple[str, ...]], ...] = (
-    ("rows", ("a", "alpha", "d")),
-    ("a", ("a",)),
-    ("alpha", ("alpha",)),
-    ("d", ("d",)),
-)
+_SHIFTED = {SHAPE: "rows", ("a",): "a", ("alpha",): "alpha", ("d",): "d"}
 
 
-def _swaps(joints: range) -> list[Repair]:
-    rows = len(joints)
-    found = [Repair(fact("swapped_entries", joint=j + 1), swapped(j)) for j in joints]
-    found.append(Repair(fact("swapped_entries", joint=None), swapped()))
-    for i, j in combinations(joints, 2):
-        order, pair = exchanged(rows, i, j), {"first": i + 1, "second": j + 1}
-        found.append(Repair(fact("swapped_rows", **pair), in_order(order, ("a", "alpha", "d"))))
-        found.append(Repair(fact("swapped_limits", **pair), in_order(order, ("lower", "upper"))))
-    for entries, columns in _SHIFTS:
-        for toward, by in (("down", -1), ("up", 1)):
-            order = np.roll(joints, by).tolist()
-            found.append(Repair(fact("shifted_rows", entries=entries, toward=toward), in_order(order, columns)))
-    return found
+def _fault_of(slip: Slip, given: Tables) -> Fault | None:
+    """The fault that a slip of a pen is; None for those that are free numbers, or too many to be tried in pairs."""
+    joints = [row + 1 for row in slip.rows]
+    joint = joints[0] if len(joints) == 1 else None
+    if slip.code == "one_alpha_negated":
+        alpha = float(np.degrees(given.alpha[0, slip.rows[0]]))
+        return fact("wrong_alpha_sign", joint=joint, given_deg=alpha, fits_deg=-alpha)
+    if slip.code == "direction_reversed":
+        return fact("reversed_direction", joint=joint)
+    if slip.code == "other_convention":
+        return fact("wrong_convention", read_as="modified" if given.modified[0] else "standard")
+    if slip.code == "a_and_d_swapped":
+        return fact("swapped_entries", joint=joint)
+    if slip.code == "limits_exchanged":
+        return fact("swapped_limits", first=joints[0], second=joints[1])
+    if slip.code == "rows_exchanged" and slip.columns == SHAPE:
+        return fact("swapped_rows", first=joints[0], second=joints[1])
+    if slip.code == "rows_shifted" and slip.columns in _SHIFTED:
+        return fact("shifted_rows", entries=_SHIFTED[slip.columns], toward="up" if slip.amount > 0 else "down")
+    return None
 
 
 def _offsets(given: Tables, joints: range) -> list[Repair]:
@@ -298,7 +281,7 @@ def _offset_moved(joint: int, angle: float) -> Change:
     return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
 
 
-_LIMIT_FAULTS: tuple[tuple[LimitFault, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (
+_LIMIT_FAULTS: tuple[tuple[str, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (
     ("crossed", lambda low, high: (high, low)),
     ("signs_swapped", lambda low, high: (-high, -low)),
     ("lower_sign", lambda low, high: (-low, high)),

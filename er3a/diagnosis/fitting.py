@@ -3,13 +3,12 @@
 Residuals are in half-widths of the references. A scan over a grid finds the basins (predictions are trigonometric
 polynomials of low degree in an angle and, but for unsigned coordinates, linear in a length), damped least squares [1]_
 find the minima. If a minimum does not meet all references although its sum of squares does not exclude that another
-point does, the largest residual is minimised instead, by Lawson's weights [2]_, because a half-width is a bound, not a
-standard deviation.
+point does, only what lies outside of the half-widths is lowered, because a half-width is a bound, not a standard
+deviation.
 
 References
 ----------
 .. [1] D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", J. SIAM 11(2), 1963.
-.. [2] C. L. Lawson, *Contributions to the theory of linear least maximum approximations*, thesis, UCLA, 1961.
 """
 
 from __future__ import annotations
@@ -66,12 +65,11 @@ MEETS = 1.0 + 1e-6  # half-widths, with what rounding may add
 CURVED = 1.5
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-6, 1e-9, 1e4
 EASED, STIFFENED = 0.1, 10.0  # factors of the damping after a step that lowers residuals, and after another
-TINY = 1e-12
 STALLED = 1e-4  # of the squares, by which a step has to lower them
 QUIET = 0.03  # weight of what is met
 FLOOR = 1e-8  # of the largest slope squared: what hardly matters is hardly moved
-LAWSON_PASSES = 80
-ROUNDS = 3
+INNER = 1 - 1e-4  # half-widths, to within which residuals are led that miss a reference
+ROUNDS = 12
 
 Residual = Callable[[Tables], Reals]
 """Tables to residuals (H, n) in half-widths."""
@@ -225,7 +223,7 @@ def lowered(
             break
         slopes = slopes_of(model, amounts[rows], off[rows], rows) * np.where(left[rows] != 0, 1.0, QUIET)[..., None]
         slopes = slopes if held is None else np.where(held[rows][:, None], 0.0, slopes)
-        step = _solved(slopes, left[rows], np.ones_like(left[rows]), by[rows], floor)
+        step = _solved(slopes, left[rows], by[rows], floor)
         trial = np.clip(amounts[rows] - step, -widest, widest)
         ahead = model(trial, rows)
         new = within(ahead)
@@ -259,7 +257,7 @@ def descend(search: Search, fits: Fits, passes: int) -> Fits:
 
 
 def meet(search: Search, fits: Fits) -> Fits:
-    """Smallest greatest residual, by Lawson's weights [2]_.
+    """All residuals within the half-widths, or what misses least.
 
     Only where some reference is missed although the sum of squares leaves open that none is.
 
@@ -271,59 +269,31 @@ def meet(search: Search, fits: Fits) -> Fits:
     -------
     fits : no row's greatest residual is larger than before
     """
-    for _ in range(ROUNDS):
-        open_rows = np.flatnonzero((fits.greatest > MEETS) & (fits.squares <= CURVED * fits.left.shape[1]))
-        if not len(open_rows):
-            break
-        part = fits[open_rows]
-        step = minimise_max(slopes_of(search.of(part), part.amounts, part.left), part.left)
-        trial = search.at(part.start, part.which, part.amounts + step)
-        better = trial.greatest < part.greatest
-        if not better.any():
-            break
-        fits = fits.with_rows(open_rows[better], trial[better])
-    return fits
+    open_rows = np.flatnonzero((fits.greatest > MEETS) & (fits.squares <= CURVED * fits.left.shape[1]))
+    if not len(open_rows):
+        return fits
+    part = fits[open_rows]
+    amounts = lowered(search.of(part), part.amounts, within=_outside, passes=ROUNDS)[0]
+    trial = search.at(part.start, part.which, amounts)
+    better = trial.greatest < part.greatest
+    return fits.with_rows(open_rows[better], trial[better])
 
 
-def minimise_max(slopes: Reals, left: Reals, enough: float = 1.0) -> Reals:
-    """Steps that make the largest of ``|left + slopes @ step|`` least, or at most ``enough``, by Lawson's weights [2]_.
-
-    Parameters
-    ----------
-    slopes : (B, n, k); left : (B, n)
-    enough : in the unit of ``left``
-
-    Returns
-    -------
-    steps : (B, k); 0 where none lowers the largest
-    """
-    weights = np.full(left.shape, 1 / left.shape[1])
-    best, least = np.zeros((len(left), slopes.shape[2])), np.abs(left).max(axis=1)
-    none = np.full(len(left), MIN_DAMPING)
-    for _ in range(LAWSON_PASSES):
-        step = -_solved(slopes, left, weights, none)
-        after = np.abs(left + np.einsum("bnk,bk->bn", slopes, step))
-        greatest = after.max(axis=1)
-        better = greatest < least
-        best[better], least[better] = step[better], greatest[better]
-        if (least <= enough).all():
-            break
-        weights = weights * after
-        weights /= np.maximum(weights.sum(axis=1, keepdims=True), TINY)
-    return best
+def _outside(off: Reals) -> Reals:
+    """What of residuals is not just within the half-widths."""
+    return off - np.clip(off, -INNER, INNER)
 
 
-def _solved(slopes: Reals, left: Reals, weights: Reals, damping: Reals, floor: float = FLOOR) -> Reals:
-    """Weighted damped least-squares solution (B, k); 0 where nothing depends on a number."""
-    weighted = slopes * weights[:, :, None]
-    normal = np.einsum("bnk,bnl->bkl", weighted, slopes)
+def _solved(slopes: Reals, left: Reals, damping: Reals, floor: float) -> Reals:
+    """Damped least-squares solution (B, k); 0 where nothing depends on a number."""
+    normal = np.einsum("bnk,bnl->bkl", slopes, slopes)
     size = np.einsum("bkk->bk", normal).copy()
     size = np.maximum(size, floor * size.max(axis=1, keepdims=True))
     size = np.where(size > 0, size, 1.0)
     scale = np.sqrt(size)
     unit = normal / scale[:, :, None] / scale[:, None, :]
     unit += np.eye(slopes.shape[2]) * damping[:, None, None]
-    aim = np.einsum("bnk,bn->bk", weighted, left) / scale
+    aim = np.einsum("bnk,bn->bk", slopes, left) / scale
     solved: Reals = np.linalg.solve(unit, aim[:, :, None])[:, :, 0] / scale
     return solved
 

@@ -283,8 +283,8 @@ def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:
 
 
 def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: fitting.Fits) -> Pool:
-    """Hypotheses of fitted numbers that change something, none twice."""
-    fits = _distinct(case, starts, fits)
+    """Hypotheses of fitted numbers that change something."""
+    fits = _changing(case, starts, fits)
     tables = fitting.moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
     repaired, cost = _named(chosen)
     given = np.stack([number.of(starts) for number in case.numbers], axis=1)
@@ -300,24 +300,15 @@ def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fi
     return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
 
 
-def _distinct(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
-    """Fits with angles within half a turn, without those that change nothing or say the same as a better one."""
+def _changing(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
+    """Fits with angles within half a turn, without those that change nothing."""
     is_angle = np.array([number.column in fitting.ANGLES for number in case.numbers])[fits.which]
     values = np.stack([number.of(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
     amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
     changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
     is_scale = np.array([not number.joint for number in case.numbers])[fits.which]
     changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
-    fits = fitting.Fits(fits.start, fits.which, amounts, fits.left)
-    order = np.lexsort((fits.greatest, *fits.which.T[::-1], fits.start))
-    fits, is_angle, kept = fits[order], is_angle[order], changes[order]
-    tolerance = np.where(is_angle, SAME_ANGLE, SAME_LENGTH * fitting.arm_lengths(starts)[fits.start, None])
-    for back in range(1, fitting.DENSE.basins):
-        same = (fits.start[back:] == fits.start[:-back]) & (fits.which[back:] == fits.which[:-back]).all(axis=1)
-        apart = fits.amounts[back:] - fits.amounts[:-back]
-        apart = np.abs(np.where(is_angle[back:], wrap_to_pi(apart), apart))
-        kept[back:] &= ~(same & (apart < tolerance[back:]).all(axis=1))
-    return fits[kept]
+    return fitting.Fits(fits.start, fits.which, amounts, fits.left)[changes]
 
 
 SHOWN = 10  # groups of hypotheses
@@ -345,21 +336,6 @@ class Ranking:
     groups: tuple[tuple[int, ...], ...]
     before: Reals
     references: tuple[Reference, ...]
-
-
-def rank(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Ranking | None:
-    """Rank single and double faults of a table, by the score of the module's text.
-
-    Parameters
-    ----------
-    references : those that state no value are left out
-
-    Returns
-    -------
-    ranking : None if there is nothing to explain
-    """
-    stated = usable(references)
-    return rank_case(case_of(robot, stated)) if stated else None
 
 
 def rank_case(case: Case) -> Ranking | None:

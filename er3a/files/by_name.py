@@ -20,7 +20,7 @@ from er3a.calibration.outcomes import FixedName
 from er3a.calibration.parameters import all_parameters, corrected
 from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, starting_table, terms_of
 from er3a.diagnosis import diagnose as diagnosis
-from er3a.diagnosis.diagnose import Hypotheses
+from er3a.diagnosis.diagnose import Diagnosis
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import METRES, CsvColumn, columns_of, read_csv, read_header, refuse_unit
 from er3a.files.orientations import POSITION
@@ -174,7 +174,7 @@ def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
                 raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Hypotheses:
+def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Diagnosis:
     """Hypotheses about the faults of a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
 
     Parameters
@@ -226,7 +226,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
         documents |= own.documents.by_name
     if references is None:
         check_robot_origins(robot, documents)
-    best = diagnosis.diagnosis_of(robot, stated).hypotheses[:1]
+    best = diagnosis.diagnosis_of(robot, stated)[:1]
     right = [each.corrected for each in best if each.explains]
     return evidence_of(robot, stated, Documents(documents), tolerance, corrected=right)
 
@@ -281,10 +281,9 @@ def load_calibration(path: str | Path, robot: Robot) -> CorrectedModel:
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
         own = record["beyond"] or {"entries": record["entries"], "terms": record["ratios"]}
-        weighs = any(each["kind"] == "weight" for each in own["terms"])
         for name, value in starting_table(robot).items():
             then = record["start"][name]
-            if (name != "masses" or weighs) and then != value and not _are_near(then, value):
+            if then != value and not _are_near(then, value):
                 problem = f"the calibration did not start from {robot.name}'s {name}"
                 remedy = "Give the robot that was calibrated, not the corrected one"
                 raise InputError(path, f"start, {name}", problem, remedy)

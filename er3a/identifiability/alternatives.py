@@ -17,7 +17,7 @@ from itertools import combinations, islice
 import numpy as np
 
 from er3a.by_value import ByValue
-from er3a.comparison.changes import other_convention, times
+from er3a.comparison.changes import SIGNS, Slip, other_convention, slips_of, times
 from er3a.comparison.entries import Entry
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.feasible import MET
@@ -36,53 +36,6 @@ SOME_DEG = 1e-6
 FITTED_RAD = 1e-5  # to within which a fitted angle that is written as 0 is 0
 
 
-@dataclass(frozen=True)
-class Flip:
-    """One discrete change.
-
-    Attributes
-    ----------
-    entries : those that it changes; None for the convention
-    about_deg : of a direction that is reversed about another angle than 0, that angle
-    """
-
-    kind: str
-    entry: Entry | None
-    about_deg: float = 0.0
-
-    @property
-    def entries(self) -> tuple[str, ...]:
-        """Names of the entries that it changes."""
-        if self.entry is None:
-            return ("convention",)
-        if self.about_deg:
-            return self.entry.name, f"offset{self.entry.joint}"
-        return (self.entry.name,)
-
-    def apply(self, table: Tables) -> Tables:
-        """Tables with the change.
-
-        Parameters
-        ----------
-        table : H of them
-
-        Returns
-        -------
-        tables : H, rad
-        """
-        if self.entry is None:
-            return other_convention(table)
-        j = self.entry.joint - 1
-        own: Reals = getattr(table, self.entry.column)[:, [j]]
-        if self.kind == "half_turn":
-            return table.with_column(self.entry.column, [j], half_turn(own))
-        changed = times(-1.0, (self.entry.column,), j)(table)
-        if self.about_deg:
-            shift = 2 * own * np.radians(self.about_deg)
-            changed = changed.with_column("offset", [j], table.offset[:, [j]] + shift)
-        return changed
-
-
 def half_turn(angle: Reals) -> Reals:
     """Half a turn further, kept within (-pi, pi] as people write angles.
 
@@ -98,7 +51,34 @@ def half_turn(angle: Reals) -> Reals:
     return np.where(turned > np.pi + FITTED_RAD, turned - 2 * np.pi, turned)
 
 
-def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
+def _turned_round(column: str, row: int) -> Slip:
+    """An angle half a turn further."""
+    return Slip(
+        "half_turn", (column,), (row,), lambda H: H.with_column(column, [row], half_turn(getattr(H, column)[:, [row]]))
+    )
+
+
+def reversed_about(row: int, angle: float) -> Slip:
+    """A joint reversed about another angle than 0.
+
+    Parameters
+    ----------
+    row : of the joint, from 0
+    angle : deg, at which it is where it was
+
+    Returns
+    -------
+    slip : of its direction and offset
+    """
+
+    def change(tables: Tables) -> Tables:
+        shift = 2 * tables.direction[:, [row]] * np.radians(angle)
+        return times(-1.0, ("direction",), row)(tables).with_column("offset", [row], tables.offset[:, [row]] + shift)
+
+    return Slip("direction_reversed", ("direction", "offset"), (row,), change)
+
+
+def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Slip]:
     """The discrete changes of a robot's table, the likeliest to be mistaken first.
 
     Parameters
@@ -109,21 +89,21 @@ def flips_of(robot: Robot, quantities: Sequence[Quantity]) -> list[Flip]:
     -------
     flips : directions, half turns, signs, and last the convention
     """
-    joints = range(1, len(robot.a) + 1)
-    found = [Flip("reversed", Entry("direction", j)) for j in joints]
-    for j in joints:
-        angles = {round(value_at(quantity.arm_pose, j), 9) for quantity in quantities} - {0.0}
-        found += [Flip("reversed", Entry("direction", j), angle) for angle in sorted(angles)]
-    last_first = joints[::-1]  # what only turns the flange comes before what the flange and others compose
-    found += [Flip("half_turn", Entry("offset", j)) for j in last_first]
-    found += [Flip("half_turn", Entry("alpha", j)) for j in last_first]
+    rows = range(robot.rows)
+    signs = {slip.entries[0]: slip for slip in slips_of(robot.rows) if slip.code in SIGNS.values()}
+    found = [signs[f"direction{row + 1}"] for row in rows]
+    for row in rows:
+        angles = {round(value_at(quantity.arm_pose, row + 1), 9) for quantity in quantities} - {0.0}
+        found += [reversed_about(row, angle) for angle in sorted(angles)]
+    # What only turns the flange comes before what the flange and others compose.
+    found += [_turned_round(column, row) for column in ("offset", "alpha") for row in reversed(rows)]
     oblique = np.abs(np.sin(2 * robot.alpha)) > np.sin(np.radians(SOME_DEG))
-    found += [Flip("sign", Entry("alpha", j)) for j in joints if oblique[j - 1]]
-    found += [Flip("sign", Entry(column, j)) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]
-    return [*found, Flip("convention", None)]
+    numbers = {"alpha": oblique, "a": robot.a, "d": robot.d}
+    found += [signs[f"{column}{row + 1}"] for column, values in numbers.items() for row in np.flatnonzero(values)]
+    return [*found, Slip("other_convention", (), (), other_convention)]
 
 
-def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
+def sets_of(flips: Sequence[Slip]) -> Iterator[list[tuple[int, ...]]]:
     """Combinations of flips to try, by how many flips are in them.
 
     Parameters
@@ -135,8 +115,8 @@ def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
     combinations : places of flips, of one size; all up to four, of directions and half turns of offsets all of them for
         arms of up to six joints
     """
-    basic = [i for i, flip in enumerate(flips) if not flip.about_deg and flip.entry is not None]
-    turning = [i for i in basic if flips[i].entry.column in ("direction", "offset")]  # type: ignore[union-attr]
+    basic = [i for i, flip in enumerate(flips) if len(flip.columns) == 1]
+    turning = [i for i in basic if flips[i].columns[0] in ("direction", "offset")]
     most = len(turning) if len(turning) <= 2 * PATTERNS_UP_TO else MAX_TOGETHER
     for count in range(1, max(most, MAX_TOGETHER) + 1):
         if count <= 2:
@@ -148,13 +128,13 @@ def sets_of(flips: Sequence[Flip]) -> Iterator[list[tuple[int, ...]]]:
         yield [each for each in chosen if _apart(flips, each)]
 
 
-def _apart(flips: Sequence[Flip], chosen: tuple[int, ...]) -> bool:
+def _apart(flips: Sequence[Slip], chosen: tuple[int, ...]) -> bool:
     """Whether no entry is changed twice."""
     names = [name for i in chosen for name in flips[i].entries]
     return len(set(names)) == len(names)
 
 
-def changed(table: Tables, flips: Sequence[Flip], chosen: Sequence[tuple[int, ...]]) -> Tables:
+def changed(table: Tables, flips: Sequence[Slip], chosen: Sequence[tuple[int, ...]]) -> Tables:
     """Tables with each combination of flips.
 
     Parameters
@@ -170,7 +150,7 @@ def changed(table: Tables, flips: Sequence[Flip], chosen: Sequence[tuple[int, ..
     for i, flip in enumerate(flips):
         rows = np.array([i in each for each in chosen])
         if rows.any():
-            own = flip.apply(batch[rows])
+            own = flip.undone(batch[rows])
             batch = _placed(batch, rows, own)
     return batch
 
@@ -209,7 +189,7 @@ class Alternative(ByValue):
         return tuple(name for name, _ in self.entries)
 
 
-def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]:
+def gauge_flips(tool: ToolRange, flips: Sequence[Slip]) -> list[tuple[str, ...]]:
     """Minimal combinations of discrete changes that are the same robot.
 
     Parameters
@@ -223,7 +203,7 @@ def gauge_flips(tool: ToolRange, flips: Sequence[Flip]) -> list[tuple[str, ...]]
     """
     own = tool.signature(tool.table)[0]
     found: list[tuple[int, ...]] = []
-    basic = [i for i, flip in enumerate(flips) if not flip.about_deg]
+    basic = [i for i, flip in enumerate(flips) if len(flip.columns) < 2]
     for chosen in islice(sets_of(flips), MAX_FLIPS):
         sets = [each for each in chosen if set(each) <= set(basic) and not _holds(each, found)]
         if sets:
@@ -282,7 +262,7 @@ class _AlternativeSearch:
         an entry by itself bars: written in other entries they are barred as well; signatures : of their tools
     """
 
-    def __init__(self, table: Tables, asked: Asked, tool: ToolRange, flips: Sequence[Flip]):
+    def __init__(self, table: Tables, asked: Asked, tool: ToolRange, flips: Sequence[Slip]):
         self.table, self.asked, self.tool, self.flips = table, asked, tool, flips
         self.composed: list[tuple[int, ...]] = [()]
         self.signatures = tool.signature(table)
@@ -340,18 +320,15 @@ class _AlternativeSearch:
 
     def _described(self, chosen: tuple[int, ...], table: Tables, off: ToolOff) -> Alternative:
         entries: list[tuple[str, float]] = []
-        for i in chosen:
-            entry = self.flips[i].entry
-            if entry is None:
+        for flip in (self.flips[i] for i in chosen):
+            if not flip.rows:
                 entries.append(("convention", float(table.modified[0])))
-                continue
-            entries.append((entry.name, float(getattr(table, entry.column)[0, entry.joint - 1] * entry.in_unit)))
-            if self.flips[i].about_deg:
-                entries.append((f"offset{entry.joint}", float(np.degrees(table.offset[0, entry.joint - 1]))))
+            for entry in (Entry(column, row + 1) for row in flip.rows for column in flip.columns):
+                entries.append((entry.name, float(entry.of(table)[0] * entry.in_unit)))
         return Alternative(tuple(entries), off, table)
 
 
-def _signatures(tool: ToolRange, table: Tables, flips: Sequence[Flip], sets: Sequence[tuple[int, ...]]) -> Reals:
+def _signatures(tool: ToolRange, table: Tables, flips: Sequence[Slip], sets: Sequence[tuple[int, ...]]) -> Reals:
     parts = [tool.signature(changed(table, flips, sets[start : start + CHUNK])) for start in range(0, len(sets), CHUNK)]
     return np.concatenate(parts)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.entries import Entry, shifted
+from er3a.comparison.entries import Entry, entry_twists
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
@@ -92,7 +92,6 @@ def document_of(robot: Robot, entry: Entry) -> str:
 
 
 POSES = 32  # all over the joint range, at which the tool is looked at
-STEP = 1e-5  # of an entry's scale, of central differences
 NOTHING = 1e-7  # of the largest singular value, below which a combination moves no tool
 
 
@@ -135,16 +134,13 @@ def gauge_of(robot: Robot, entries: Sequence[Entry]) -> Gauge:
 
     Returns
     -------
-    gauge : from the null space of the derivatives of tool poses (m, and entries of rotations) all over the joint range
+    gauge : from the null space of the twists (m and rad) of tools all over the joint range
     """
-    k = len(entries)
-    scale = np.array([entry.scale for entry in entries])
+    k, table = len(entries), tables_of(robot)
     q = quasi_random_points(np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper), POSES)
-    steps = STEP * np.concatenate([np.eye(k), -np.eye(k)])
-    T = frames_of(shifted(tables_of(robot), entries, steps * scale), robot, q)[:, :, -1] @ robot.tool
-    rows = T[:, :, :3].reshape(2 * k, -1)
-    J = ((rows[:k] - rows[k:]) / (2 * STEP)).T
-    values, basis = np.linalg.svd(J, full_matrices=True)[1:]
+    points = (frames_of(table, robot, q)[0, :, -1] @ robot.tool)[:, :3, 3]
+    J = entry_twists(table, robot, q, entries, points) * [entry.scale for entry in entries]
+    values, basis = np.linalg.svd(J.reshape(-1, k), full_matrices=True)[1:]
     rank = int((values > NOTHING * values[0]).sum())
     directions = _few_entries(basis[rank:])
     own = (np.abs(directions) > NOTHING).any(axis=0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
 from er3a.comparison.entries import EntryUnit
@@ -15,9 +15,9 @@ from er3a.kinematics.table_batch import Tables
 from er3a.references.reference import Reference
 from er3a.robots.robot import Robot
 
-Status = Literal["settled", "settled_up_to_signs", "weak", "contradicted", "consistent", "open", "gauge", "given"]
-"""``settled_up_to_signs``: every arm that evidence allows can be written with this value; but one of them moves
-otherwise than the table's, and can be written with another sign or half turn here as well."""
+Status = Literal["contradicted", "open", "weak", "consistent", "gauge", "given", "settled_up_to_signs", "settled"]
+"""The gravest first. ``settled_up_to_signs``: every arm that evidence allows can be written with this value; but one of
+them moves otherwise than the table's, and can be written with another sign or half turn here as well."""
 TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 """How far a settled entry may leave the tool off: what an arm of this size is off without calibration. What matters
 less is the business of a calibration and says nothing about the table."""
@@ -132,33 +132,16 @@ class Evidence(ByValue, Displayed):
         sheet : with the tolerance in mm and deg
         """
         judged = (*self.entries, *self.combinations)
-        names = {status: [each.entry for each in judged if each.status == status] for status in _SHOWN}
+        names = {status: [each.entry for each in judged if each.status == status] for status in get_args(Status)}
         kept = {"other_table": self.other.code if self.other else None, "unmet": self.unmet or None}
         return Sheet(
             f"Evidence of {self.robot.name}: {len(judged)} entries, "
             f"tolerance {shortly(self.tolerance.mm)} mm, {shortly(self.tolerance.deg)} deg",
             ("status", "count", "entries"),
-            tuple((status, str(len(found)), _first_named(found)) for status, found in names.items() if found),
+            tuple((status, str(len(found)), shortly(found)) for status, found in names.items() if found),
             facts=(
                 f"table_meets: {shortly(self.table_meets)}; conflicts: {len(self.conflicts)}; "
                 f"readings: {len(self.readings)}, allowed: {len(self.allowed)}",
                 *(f"{key}: {shortly(value)}" for key, value in kept.items() if value),
             ),
         )
-
-
-NAMED = 6  # entries of a status in a line of a sheet
-_SHOWN: tuple[Status, ...] = (
-    "contradicted",
-    "open",
-    "weak",
-    "consistent",
-    "gauge",
-    "given",
-    "settled_up_to_signs",
-    "settled",
-)
-
-
-def _first_named(names: list[str]) -> str:
-    return " ".join(names[:NAMED]) + (" ..." if len(names) > NAMED else "")

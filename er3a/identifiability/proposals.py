@@ -7,7 +7,7 @@ open entries. A length or an angle is measured directly, as finely as its tolera
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
     if entry.column == "direction":
         return _look(evidence, entry)
     if entry.column in SIDES:
-        return fact("read_limit", entry=name, joint=j, side=cast(Any, entry.column), half_width_deg=LIMIT_DEG)
+        return fact("read_limit", entry=name, joint=j, side=entry.column, half_width_deg=LIMIT_DEG)
     if entry.column == "speed":
         return fact(
             "time_joint", entry=name, joint=j, half_width_deg_s=round(SPEED_SHARE * entry.value(evidence.robot), 3)
@@ -79,7 +79,7 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
         return fact(
             "measure_length",
             entry=name,
-            column=cast(Any, entry.column),
+            column=entry.column,
             joint=j,
             half_width_mm=min(LENGTH_MM, SHARE_OF_TOLERANCE * evidence.tolerance.mm),
         )
@@ -87,7 +87,7 @@ def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolR
         return fact(
             "measure_angle",
             entry=name,
-            column=cast(Any, entry.column),
+            column=entry.column,
             joint=j,
             half_width_deg=_fine_enough(evidence, entry, tool),
         )

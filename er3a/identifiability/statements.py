@@ -115,7 +115,7 @@ def inconsistent_with_own_text(robot: Robot, references: ReferenceSet) -> Findin
         missed=missed,
     )
     by_name = {entry.name: entry for entry in entries_of(robot)}
-    for each in diagnosis_of(robot, own).hypotheses:
+    for each in diagnosis_of(robot, own):
         entry = by_name.get(entry_of(each.faults[0]) or "") if len(each.faults) == 1 else None
         if entry and asked.missed_by(tables_of(each.corrected)) <= MET:
             given, needed = (entry.value(arm) for arm in (robot, each.corrected))

@@ -139,7 +139,6 @@ def test_held_and_estimated_entries_are_the_rank_of_the_jacobian(random):
     J = jacobian(robot, parameters, seen) / seen.deviation_mm[:, None]
     assert np.linalg.matrix_rank(J, tol=1e-6 * np.linalg.norm(J, 2)) == len(found.estimates)
     assert len(found.held) == len(parameters) - len(found.estimates)
-    assert (found.singular_values > 1e-6 * found.singular_values[0]).sum() == len(found.estimates)
 
 
 def test_a_measured_tool_sees_more_than_the_flange(random):

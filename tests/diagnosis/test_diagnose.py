@@ -10,7 +10,7 @@ import pytest
 import er3a
 from er3a.diagnosis.diagnose import Hypothesis
 from er3a.diagnosis.faults import Faults, rounded
-from er3a.diagnosis.ranking import rank, usable
+from er3a.diagnosis.ranking import usable
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
@@ -18,7 +18,7 @@ from er3a.finding import fact, is_one
 from er3a.references.reference import expected_of
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import to_modified
-from testing.known_faults import mutations_of, noisy, try_mutation
+from testing.known_faults import mutations_of, noisy, rank, try_mutation
 
 TRUSTED = ("er3a_c60", "er3_600")
 OFFSET_MISSING = fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0)

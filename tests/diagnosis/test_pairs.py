@@ -106,7 +106,7 @@ def test_the_pairs_in_the_verdict_are_all_that_explain(name, wrong):
     for entry, by in wrong.items():
         numbers[COLUMNS.index(entry[:-1]), int(entry[-1]) - 1] += by
     given = robot.replace(**dict(zip(COLUMNS, numbers)))
-    best = diagnosis_of(given, references_to(stated)).hypotheses[0]
+    best = diagnosis_of(given, references_to(stated))[0]
     assert best.explains
     sets = [[entry_of(fault) for fault in faults] for faults in (best.faults, *best.indistinguishable_from)]
     in_verdict = {tuple(sorted(own, key=ENTRIES.index)) for own in sets if set(own) <= set(ENTRIES)}

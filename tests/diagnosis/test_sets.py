@@ -241,7 +241,7 @@ def test_a_missed_reference_is_never_put_down_to_noise(name):
     stated[place] = replace(stated[place], expected=stated[place].expected + 3 * stated[place].uncertainty)
     found = diagnosis_of(robot, stated)
     assert not is_one(found.conclusion, "met")
-    assert all(h.half_widths <= 1 + 1e-6 for h in found.hypotheses if h.explains)
+    assert all(h.half_widths <= 1 + 1e-6 for h in found if h.explains)
 
 
 @pytest.mark.long
@@ -250,7 +250,7 @@ def test_few_references_leave_a_set_without_end_that_is_still_said_whole(arm):
     stated = stated_of(arm)[:2]
     faulty = changed(changed(arm, "offset3", 0.8), "d1", 0.1)
     found = diagnosis_of(faulty, [replace(each, expected=each.expected + 60 * i) for i, each in enumerate(stated)])
-    first = found.hypotheses[0]
+    first = found[0]
     assert first.explains
     assert is_one(found.conclusion, "named")
     members = [first.faults, *first.indistinguishable_from]

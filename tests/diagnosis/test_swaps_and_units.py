@@ -192,7 +192,7 @@ def test_the_pairs_in_the_verdict_are_all_that_explain(name, wrong, numbers):
     for each in wrong:
         given = mistakes()[each](given)
     changed = robot.replace(**dict(zip(COLUMNS, given[0])), convention="modified" if given[1] else "standard")
-    best = diagnosis_of(changed, references_to(stated)).hypotheses[0]
+    best = diagnosis_of(changed, references_to(stated))[0]
     assert best.explains
     assert len(best.faults) == 2
     sets = [{name_of(fault) for fault in faults} for faults in (best.faults, *best.indistinguishable_from)]

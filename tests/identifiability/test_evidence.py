@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 import er3a
-from er3a.comparison.entries import Entry
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.finding import is_one
-from er3a.identifiability.alternatives import Flip
+from er3a.identifiability.alternatives import reversed_about
 from er3a.identifiability.continuous import Extent
 from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
@@ -46,7 +45,7 @@ def about(robot: Robot, *only: str, extra: tuple[Reference, ...] = ()) -> Eviden
     documents = {name: document for each in sets for name, document in each.documents.by_name.items()}
     stated = [reference for each in sets for reference in each.references]
     every = [*stated, *extra]
-    corrected = [each.corrected for each in diagnosis_of(robot, every).hypotheses[:1] if each.explains]
+    corrected = [each.corrected for each in diagnosis_of(robot, every)[:1] if each.explains]
     return evidence_of(robot, every, Documents(documents), only=only, corrected=corrected)
 
 
@@ -80,8 +79,8 @@ def test_signs_that_no_document_fixes_are_open():
 @pytest.mark.parametrize("joint", [2, 3, 5])
 def test_a_joint_reversed_about_an_angle_stands_there_as_before_and_mirrored_beside_it(name, joint):
     robot, about, moved = load_robot(name), 30.0, 0.2
-    flip = Flip("reversed", Entry("direction", joint), about)
-    other = robot_of(flip.apply(tables_of(robot)), 0, robot)
+    flip = reversed_about(joint - 1, about)
+    other = robot_of(flip.undone(tables_of(robot)), 0, robot)
     q = np.tile(np.radians([10.0, 20.0, -15.0, 40.0, 25.0, 5.0]), (3, 1))
     q[:, joint - 1] = np.radians(about) + np.array([0.0, moved, -moved])
     np.testing.assert_allclose(er3a.forward(other, q), er3a.forward(robot, q[[0, 2, 1]]), atol=1e-12)

@@ -32,7 +32,6 @@ TERMS = words(
         "once": "once a turn",
         "twice": "twice a turn",
         "sag": "sag under a load",
-        "weight": "sag under its own weight",
         "ripple": "{turns} times a turn",
         "coupling": "coupled to J{by}",
     }

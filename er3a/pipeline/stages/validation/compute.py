@@ -54,8 +54,8 @@ def _set_diagnosis(robot: Robot, references: ReferenceSet, diagnosis: Diagnosis)
         from_table=tuple(title_of(name, references.documents) for name in own),
         references=diagnosis.references,
         hypotheses_tried=diagnosis.tried,
-        hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis.hypotheses),
-        corrected=stated(model.CorrectedTable, diagnosis.hypotheses[0].corrected) if diagnosis.names_fault else None,
+        hypotheses=tuple(stated(model.RankedHypothesis, each) for each in diagnosis),
+        corrected=stated(model.CorrectedTable, diagnosis[0].corrected) if diagnosis.names_fault else None,
     )
 
 
@@ -197,9 +197,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
     summaries = set_summaries(robot, sets, checks, poses, found)
     reaches = {"wrist_centre_reach": WRIST_REACH, "flange_reach": FLANGE_REACH}
     reach = {name: values[quantity] for name, quantity in reaches.items() if quantity in values}
-    found_right = [
-        each.hypotheses[0].corrected for each in diagnosed if each.hypotheses and each.hypotheses[0].explains
-    ]
+    found_right = [each[0].corrected for each in diagnosed if each and each[0].explains]
     evidence = evidence_of_table(robot, sets, found_right) if turning else None
     summary = model.ValidationSummary(
         verdict=verdict_of(checks, conflicts, summaries, found, evidence),
