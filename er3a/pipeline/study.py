@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, PrivateAttr, create_model, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, create_model, model_validator
 
 from er3a.collision.scene import Scene
 from er3a.errors import DoubtfulUnit, InputError
 from er3a.files.annotations import catalogues_beside, translations_in
 from er3a.files.kept_files import own_or_shipped, sha256, shown_path
-from er3a.files.robot_file import NAME_PATTERN, Name, Placement, RobotFile, Text, check_placement
+from er3a.files.robot_file import Name, Placement, RobotFile, Text, check_placement
 from er3a.files.robot_library import LoadFields, placement_transform, read_robot, robot_of, robot_path
 from er3a.files.scene_file import load_scene
 from er3a.files.units import JointsDeg, noted_doubts
@@ -25,7 +24,6 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import LANGUAGES, LanguageCode
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.registry import STAGES as REGISTRY
-from er3a.pipeline.sweeps import StageName, Sweep, Variant
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -33,6 +31,15 @@ STAGES = tuple(REGISTRY)
 ExpectedStatus = Literal["pass", "caution", "fail", "no_reference"]
 COMPARED = ("validation", "workspace")
 SettingsT = TypeVar("SettingsT", bound=StrictModel)
+
+
+def _known_stage(name: str) -> str:
+    if name not in REGISTRY:
+        raise ValueError(f"there is no stage '{name}' | Known: {', '.join(REGISTRY)}")
+    return name
+
+
+StageName = Annotated[Text, AfterValidator(_known_stage)]
 
 
 class RobotEntry(StrictModel):
@@ -113,7 +120,6 @@ class StudyBase(InputFile):
     kind: Literal["study"]
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)]
     robots: Annotated[dict[Name, RobotEntry], Field(min_length=1)]
-    sweeps: Annotated[dict[Name, Sweep], Field(max_length=100)] = {}
     article: ArticleTables | None = None
     report: ReportSettings = ReportSettings()
     _file: Path | None = PrivateAttr(default=None)
@@ -123,23 +129,6 @@ class StudyBase(InputFile):
     def file(self) -> Path | None:
         """The file that the study was read from; None if it was made in Python."""
         return self._file
-
-    @model_validator(mode="after")
-    def _check_variant_names(self):
-        taken = set(self.robots)
-        for name, sweep in self.sweeps.items():
-            if sweep.robot not in self.robots:
-                problem = f"sweeps.{name}.robot: the study has no robot '{sweep.robot}'"
-                raise ValueError(f"{problem} | Known: {', '.join(self.robots)}")
-            for variant in sweep.variants(name):
-                if variant.name in taken:
-                    problem = f"sweeps.{name}: '{variant.name}' is the name of another robot already"
-                    raise ValueError(f"{problem} | Give the sweep another name")
-                if not re.match(NAME_PATTERN, variant.name):
-                    problem = f"sweeps.{name}: '{variant.name}' is too long for a robot's name"
-                    raise ValueError(f"{problem} | Give the sweep a shorter name")
-                taken.add(variant.name)
-        return self
 
     @model_validator(mode="after")
     def _article_names_robots_of_the_study(self):
@@ -161,28 +150,22 @@ class StudyBase(InputFile):
         return self
 
     @property
-    def variants(self) -> dict[str, Variant]:
-        """The robots that the sweeps make, by name."""
-        return {variant.name: variant for name, sweep in self.sweeps.items() for variant in sweep.variants(name)}
-
-    @property
     def names(self) -> list[str]:
-        """All robots of the study, variants after those that are written in it."""
-        return [*self.robots, *self.variants]
+        """All robots of the study, as they are written in it."""
+        return [*self.robots]
 
     def stages(self, name: str) -> tuple[str, ...]:
         """The stages that a robot goes through, in their order.
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
         stages : those that its entry names, or all, as far as the study configures them for it
         """
-        variant = self.variants.get(name)
-        named = self.robots[name].stages if variant is None else self.sweeps[variant.sweep].stages
+        named = self.robots[name].stages
         asked = STAGES if named is None else tuple(named)
         return tuple(stage for stage in asked if REGISTRY[stage].is_configured(self, name))
 
@@ -191,60 +174,53 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
-        pages : those of its stages, and the teach panel of a robot that is no variant
+        pages : those of its stages, and the teach panel
         """
-        pages = tuple(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views)
-        return pages if name in self.variants else (*pages, "teach")
+        return (*(stage for stage in self.stages(name) if "report" in REGISTRY[stage].views), "teach")
 
     def entry(self, name: str) -> RobotEntry:
-        """The study's entry for a robot, for a variant that of its base.
+        """The study's entry for a robot.
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Raises
         ------
         InputError
             if the study has no such robot; it lists those that it has
         """
-        base = self._base(name)
-        if base not in self.robots:
+        if name not in self.robots:
             raise InputError(None, f"robots.{name}", "the study has no such robot", f"Known: {', '.join(self.robots)}")
-        return self.robots[base]
-
-    def _base(self, name: str) -> str:
-        variant = self.variants.get(name)
-        return variant.base if variant else name
+        return self.robots[name]
 
     def robot_file(self, name: str) -> Path:
-        """The file of a robot, or of a variant's base.
+        """The file of a robot.
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Raises
         ------
         InputError
             naming the study's entry, if there is no such file
         """
-        base = self._base(name)
         try:
-            return robot_path(self.entry(name).file or base)
+            return robot_path(self.entry(name).file or name)
         except InputError as error:
-            raise InputError(error.file, error.field or f"robots.{base}", error.problem, error.remedy) from None
+            raise InputError(error.file, error.field or f"robots.{name}", error.problem, error.remedy) from None
 
     def table(self, name: str) -> RobotFile:
-        """What the robot's file holds, with a variant's title and varied entry.
+        """What the robot's file holds.
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -253,18 +229,16 @@ class StudyBase(InputFile):
         Raises
         ------
         InputError
-            if the file can't be used, or the varied entry is not in it
+            if the file can't be used
         """
-        content = read_robot(self.robot_file(name))
-        variant = self.variants.get(name)
-        return variant.table(content) if variant else content
+        return read_robot(self.robot_file(name))
 
     def robot(self, name: str) -> Robot:
         """The robot with the study's base and tool, which take precedence over those of its file.
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -278,8 +252,6 @@ class StudyBase(InputFile):
         entry, content = self.entry(name), self.table(name)
         self._doubt(name, "base", "tool")
         base, tool = entry.base or content.base, entry.tool or content.tool
-        if variant := self.variants.get(name):
-            tool = variant.tool(tool)
         return robot_of(content).replace(name=name, base=placement_transform(base), tool=placement_transform(tool))
 
     def home(self, name: str) -> Reals | None:
@@ -287,7 +259,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -301,7 +273,7 @@ class StudyBase(InputFile):
         entry, robot = self.entry(name), self.robot(name)
         if entry.home_deg is None:
             return robot.home
-        field = f"robots.{self._base(name)}.home_deg"
+        field = f"robots.{name}.home_deg"
         if len(entry.home_deg) != robot.joints:
             raise InputError(None, field, f"{len(entry.home_deg)} joint values", f"The arm has {robot.joints}")
         q = meant(robot, np.array(entry.home_deg))
@@ -315,7 +287,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -327,7 +299,7 @@ class StudyBase(InputFile):
 
     def _doubt(self, name: str, *keys: str) -> None:
         """Tell again what is doubtful of a robot's entry, to those who rest on it."""
-        begins = tuple(f"robots.{self._base(name)}.{key}." for key in keys)
+        begins = tuple(f"robots.{name}.{key}." for key in keys)
         self._tell(each for each in self._doubts if each.key.startswith(begins))
 
     @staticmethod
@@ -340,7 +312,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant; the margin is the same for all
+        name : of a robot; the margin is the same for all
 
         Returns
         -------
@@ -354,7 +326,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -367,7 +339,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -381,7 +353,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
         stage : its name, or ``teach``
 
         Returns
@@ -398,7 +370,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -431,7 +403,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
 
         Returns
         -------
@@ -447,7 +419,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
         key : of settings, such as ``trajectory``; of a key without settings seed and robot alone
 
         Returns
@@ -457,8 +429,6 @@ class StudyBase(InputFile):
         not_counted = {"targets", "paths", "programs", "vision", "confirm", "file", "scene", "expect"}
         not_counted |= {"tool_load", "payload"}
         entry = self.entry(name).model_dump(exclude=not_counted, exclude_none=True)
-        if variant := self.variants.get(name):
-            entry["varied"] = {variant.vary: variant.value}
         own = getattr(self, key, None)
         settings = own.model_dump() if own else {}
         if "scene" in settings:
@@ -503,7 +473,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
         stage : or another key of the study with a scene
 
         Returns
@@ -518,7 +488,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
         stage : or another key of the study with a scene
 
         Returns
@@ -538,7 +508,7 @@ class StudyBase(InputFile):
 
         Parameters
         ----------
-        name : of a robot or a variant
+        name : of a robot
         stage : or another key of the study with a scene
 
         Returns

@@ -55,7 +55,7 @@ def views(
 ):
     """Write a robot's recordings (always in English) and pages from results.
 
-    The viewer also draws each recording as a picture for its page. For variants of a sweep the picture stays empty.
+    The viewer also draws each recording as a picture for its page.
     """
     from er3a.pipeline.stages import run
     from er3a.pipeline.viewing.figures import house_style
@@ -82,15 +82,12 @@ def views(
 def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
     """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview, write_empty
+    from er3a.pipeline.viewing.viewer import draw_preview
 
     recording = reports / robot / f"{stage}.rrd"
-    picture, problem = recording.with_suffix(".webp"), ""
+    picture = recording.with_suffix(".webp")
     moment = run.show("record", stage, study, robot, results / robot / stage, recording)
-    if robot in study.variants:
-        write_empty(picture)
-    else:
-        problem = draw_preview(recording, picture, moment) or ""
+    problem = draw_preview(recording, picture, moment) or ""
     write_checksum(recording)
     write_checksum(picture)
     return problem

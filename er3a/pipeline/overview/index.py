@@ -1,7 +1,4 @@
-"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and three tiles.
-
-Variants of a sweep are listed only in the section of their sweep.
-"""
+"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and three tiles."""
 
 from __future__ import annotations
 
@@ -14,14 +11,13 @@ from typing import Any
 from er3a.files.kept_files import write_text
 from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
-from er3a.pipeline.overview.sweep_sections import changed_text, sweep_sections
 from er3a.pipeline.overview.tiles import first_with, paths_tile, table_tile, tray_tile
-from er3a.pipeline.results import Provenance, Stored, is_computed, read_stage, result_records
+from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import LeftOpen, ValidationResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
@@ -33,6 +29,7 @@ from er3a.pipeline.viewing.page import SHORT_NAMES, Head, alternative_table, hea
 from er3a.pipeline.viewing.side_view import Kind, SeenArm, border_lines, seen_arm, side_view
 
 MOST_DRAWN = 2  # arms in the picture
+MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
 
@@ -82,10 +79,9 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     folder : of the reports
     """
     verdicts = read_verdicts(study, results)
-    outdated = {(each.robot, each.stage): each.outdated for each in verdicts if each.outdated}
     stored = {name: _computed(study, name, results / name) for name in study.robots}
     entries = [
-        _entry(study, name, stored[name], alternative_table(study, name, results), changed_text(outdated, {name}))
+        _entry(study, name, stored[name], alternative_table(study, name, results), _changed_text(verdicts, name))
         for name in study.robots
     ]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
@@ -103,12 +99,22 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         outdated=_by_text(entries),
         tiles=[*_tiles(study, entries, stored)],
         article=study.article is not None,
-        sweeps=sweep_sections(study, results, outdated),
         command=page.run_command(study, "index.html"),
         provenance=Provenance(inputs=result_records(results, study.names), code=code_digest(), seed=study.seed),
     )
     _write_marks(stored, folder / "marks.js")
     write_junit(verdicts, folder / "junit.xml")
+
+
+def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
+    """What has changed since any stage of a robot was computed; empty where nothing has."""
+    names = [*dict.fromkeys(name for each in verdicts if each.robot == robot for name in each.outdated)]
+    if not names:
+        return ""
+    named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
+    more = [sentence("more", count=len(names) - MAX_CHANGED)] if len(names) > MAX_CHANGED else []
+    text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
+    return tr(text, names=joined([*named, *more], ", "))
 
 
 def _by_text(entries: Sequence[RobotRow]) -> dict[str, list[str]]:

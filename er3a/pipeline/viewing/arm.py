@@ -186,12 +186,18 @@ def solid_parts(
         case "capsule":  # Rerun's begins at its origin
             drawn = rr.Capsules3D(**measures, translations=[[0, 0, -shape["length"] / 2]], **style)
         case _:
-            drawn = _mesh(np.array(shape["points"]), np.array(shape["faces"]), colour)
+            drawn = mesh(np.array(shape["points"]), np.array(shape["faces"]), colour)
     return [rr.Transform3D(translation=T[:3, 3], mat3x3=swollen * T[:3, :3]), drawn]
 
 
-def _mesh(points: Reals, faces: Integers, colour: tuple[int, ...]) -> rr.Mesh3D:
-    """Triangles, each lit as it lies."""
+def mesh(points: Reals, faces: Integers, colour: tuple[int, ...]) -> rr.Mesh3D:
+    """Triangles, each lit as it lies.
+
+    Parameters
+    ----------
+    points, faces : (N, 3), m, and (M, 3), counter-clockwise from outside
+    colour : red, green, blue and perhaps alpha, 0 to 255
+    """
     corners = points[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)

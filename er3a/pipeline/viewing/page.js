@@ -547,7 +547,7 @@ function fade(box) {
 }
 
 // Joints that a sentence names, as "(10, −20, 30, 0, 45, 0) deg" or "(10°, −20°, 300 mm, 0°)", lead to the arm in the
-// teach panel; a variant has none.
+// teach panel.
 function linkJoints(page) {
   const value = "[−-]?\\d+(?:\\.\\d+)?";
   const unit = "(?:°|\\s*mm)";

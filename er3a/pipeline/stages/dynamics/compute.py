@@ -128,7 +128,7 @@ def open_of_load(study: Study, name: str) -> tuple[model.Need, ...]:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------
@@ -503,7 +503,7 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------

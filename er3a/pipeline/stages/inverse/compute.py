@@ -376,7 +376,7 @@ def compute(study: Study, name: str) -> model.InverseResults:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------

@@ -41,7 +41,7 @@ def compute(study: Study, name: str) -> model.ProgramsResults:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Returns
     -------

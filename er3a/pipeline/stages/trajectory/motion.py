@@ -480,7 +480,7 @@ def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[L
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
     checks_per_sample : points between two samples at which motions are checked, at least
 
     Returns

@@ -162,7 +162,7 @@ def compute(study: Study, name: str) -> model.ValidationResults:
 
     Parameters
     ----------
-    name : of a robot or a variant; tool and base of the study do not count
+    name : of a robot; tool and base of the study do not count
 
     Returns
     -------

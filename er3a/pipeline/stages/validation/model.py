@@ -551,7 +551,7 @@ def model_of(study: Study, name: str) -> Robot:
 
     Parameters
     ----------
-    name : of a robot or a variant
+    name : of a robot
 
     Raises
     ------

@@ -26,7 +26,7 @@ from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
 
-LETTERS = 0.06  # of the reach, in the view from above
+LETTERS = 0.09  # of the reach, in the view from above: as large as others on a phone
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
