@@ -92,4 +92,4 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
     answer = tr("Centre {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
-    return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html#placement", name, drawing=drawing)
+    return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html", name, drawing=drawing)

@@ -295,8 +295,9 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
 
 def _home(study: Study, name: str) -> Reals | None:
     """Where the arm rests, (n,), rad or m: its home, or else where it waits for its camera; None where no file says."""
-    home, task = study.home(name), study.entry(name).vision
-    return meant(study.robot(name), np.array(load_vision(task).home_deg)) if home is None and task else home
+    robot, home, task = study.robot(name), study.home(name), study.entry(name).vision
+    waiting = load_vision(task).home_deg if home is None and task else ()
+    return meant(robot, np.array(waiting)) if len(waiting) == robot.joints else home
 
 
 def write_panel(
