@@ -91,5 +91,5 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     drawing = from_above(robot, results, study.scene(name, "capability"), [placing.tray], LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
-    answer = tr("Centre {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
+    answer = tr("At {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
     return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html", name, drawing=drawing)
