@@ -360,8 +360,9 @@ class StudyBase(InputFile):
         -------
         files : the robot's file first, then shapes that it names, then those of the stage; they may be missing
         """
-        more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else self.scenes(name, "trajectory")
-        robot = self.robot_file(name)
+        robot, vision = self.robot_file(name), self.entry(name).vision
+        of_panel = [*self.scenes(name, "trajectory"), *([Path(vision)] if vision else [])]
+        more = REGISTRY[stage].inputs(self, name) if stage in REGISTRY else of_panel
         return [robot, *shapes_named_in(robot), *more]
 
     def inputs_digest(self, name: str, stage: str) -> str:

@@ -108,7 +108,7 @@ def test_a_row_of_the_list_shows_its_own_part(browser, small_study, stage):
 
 
 def test_every_plot_with_axes_answers_the_pointer(browser, small_study):
-    for stage in ("workspace", "collision", "trajectory", "dynamics", "vision"):
+    for stage in ("workspace", "trajectory", "dynamics", "vision"):
         browser.get((small_study.folder / f"reports/er3a_c60/{stage}.html").as_uri())
         silent, axes = browser.execute_script(SILENT_AXES)
         assert axes, stage

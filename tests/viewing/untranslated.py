@@ -149,8 +149,8 @@ def _words_of(data: Any) -> list[str]:
     left out), or all if there are no further levels."""
     if not isinstance(data, dict):
         return []
-    if "groups" in data:
-        return [layer["name"] for group in data["groups"] for layer in group["layers"]]
+    if "layers" in data:
+        return [layer["name"] for layer in data["layers"]]
     if "words" in data:
         return [re.sub(r"\{\w+\}", " ", text) for text in _leaves(data["words"], keys=False)]
     texts = data.values() if all(isinstance(value, str) for value in data.values()) else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.dynamics.margins import Binding
 from er3a.finding import Finding
-from er3a.pipeline.language import own_title, tr, words
+from er3a.pipeline.language import own_title, tr, with_unit, words
 from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import WORDS, bracketed, joined, say_as, says, sentence, texts, word
 from er3a.pipeline.messages.scope import names_in_words
@@ -136,27 +137,53 @@ WORDS.update(
 )
 
 
+def _least(summary: Summary | None) -> tuple[str, list[str]] | None:
+    """The least payload that the paths allow, and what limits it; None where none has a bound."""
+    paths = summary.paths if isinstance(summary, model.DynamicsSummary) else ()
+    bounds = [
+        (path.payload.value, path.payload, path.name)
+        for path in paths
+        if path.counts and path.payload and path.payload.value is not None
+    ]
+    if not bounds:
+        return None
+    value, most, path = min(bounds, key=itemgetter(0))
+    by = word("dynamics.binding", BINDING, most.by) if most.by else ""
+    return at_least(value, "kg"), [*([bracketed(f"J{most.joint}", by)] if most.joint else []), path]
+
+
+def payload_key(summary: Summary | None, robot: Robot) -> tuple[str, str]:
+    """What the arm can carry at its flange, as a figure, and what it is.
+
+    Parameters
+    ----------
+    summary : the stage's; None where it was not computed
+
+    Returns
+    -------
+    value, meaning : in the page's language
+    """
+    if least := _least(summary):
+        return with_unit(least[0], "kg"), tr("payload at the flange, by {limits}", limits=joined(least[1], ", "))
+    wrist = robot.masses.wrist
+    if wrist is not None and np.isfinite(wrist.payload):
+        return with_unit(f"{wrist.payload:.3g}", "kg"), tr("rated payload at the flange")
+    return tr("unknown"), tr("payload: mount nothing yet")
+
+
 def payload_text(summary: Summary | None, robot: Robot) -> str:
     """What the arm can carry: the least of what its paths allow, what limits it and how much is not known, or that it
     is unknown, and what its maker rates it.
 
     ``summary`` is the stage's; None where it was not computed.
     """
-    paths = summary.paths if isinstance(summary, model.DynamicsSummary) else ()
-    bounds = [
-        (path.payload.value, path) for path in paths if path.counts and path.payload and path.payload.value is not None
-    ]
+    least = _least(summary)
     open_ = summary.assumed if isinstance(summary, model.DynamicsSummary) else ()
     missing = [each for each in open_ if each.reason in UNKNOWN and each.names != ("load_guess",)]
     official = _rated(robot, official=True)
-    parts: dict[str, Any] = {"kg": None, "by": (), "guesses": ()}
-    if bounds:
-        value, path = min(bounds, key=lambda bound: bound[0])
-        most = path.payload
-        by = word("dynamics.binding", BINDING, most.by) if most and most.by else ""
-        of_joint = [bracketed(f"J{most.joint}", by)] if most and most.joint else []
-        parts = {"kg": at_least(value, "kg"), "by": [*of_joint, path.name], "guesses": _guesses(summary)}
-    parts |= {"unknown": len(missing), "unexamined": not (bounds or missing), "none": not (bounds or official)}
+    kg, by = least or (None, ())
+    parts: dict[str, Any] = {"kg": kg, "by": by, "guesses": _guesses(summary) if least else ()}
+    parts |= {"unknown": len(missing), "unexamined": not (least or missing), "none": not (least or official)}
     return sentence("payload", rated=official or _rated(robot), **parts)
 
 

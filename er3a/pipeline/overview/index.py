@@ -189,10 +189,10 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
 
 
 def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
-    """The first arm that may be relied on over the first that may not, or the first two, with what they reach."""
+    """The first arm that may not be relied on over the first that may, or the first two, with what they reach."""
     wrong = [entry for entry in entries if entry.use == "never"][:1]
     right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
-    drawn = [_seen(study, entry, stored[entry.name], first=entry in right[:1]) for entry in (*wrong, *right[::-1])]
+    drawn = [_seen(study, entry, stored[entry.name], first=entry in right[:1]) for entry in (*right[::-1], *wrong)]
     floor = floor_of(study.scene(right[0].name, "trajectory")) if right else None
     return side_view(drawn, None if floor is None else 1000 * floor)
 

@@ -6,12 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from markupsafe import Markup
-
-from er3a.collision.scene import Scene
-from er3a.pipeline.language import own_title, tr
-from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.language import tr
+from er3a.pipeline.messages.dynamics import payload_key
 from er3a.pipeline.messages.workspace import millimetres
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.trajectory.model import TrajectoryResults
@@ -19,14 +15,13 @@ from er3a.pipeline.stages.trajectory.page.report import path_groups
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.validation.page.evidence_section import OTHER_COLUMNS, evidence_section
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
-from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
+from er3a.pipeline.stages.workspace.page.from_above import from_above
+from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Group
-from er3a.pipeline.viewing.drawn import outlines
-from er3a.robots.robot import Robot
 
 Results = Mapping[str, Stored[Any]]
-AROUND = 1.15  # of the reach, that the view from above shows
+LETTERS = 0.14  # of the reach, in the small view from above
 
 
 @dataclass(frozen=True)
@@ -93,47 +88,8 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     if placing is None:
         return None
     robot, results = study.robot(name), stored["workspace"].results
-    drawing = _from_above(robot, results, study.scene(name, "capability"), placing)
-    answer = tr("Centre {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html#placement", name, drawing=drawing)
-
-
-def _from_above(robot: Robot, results: WorkspaceResults, scene: Scene | None, placing: Placing) -> Markup:
-    """The reach of axis 1, what stands around the arm, and the tray, y to the left of x."""
-    reach = 1000 * results.summary.reach_m.furthest_from_axis
-    low, high = float(robot.lower[0]), float(robot.upper[0])
-    letters, size = 0.075 * reach, AROUND * reach
-    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, low, high))]
-    for solid in scene.solids if scene else ():
-        if not (seen := [1000 * corners for corners in outlines(solid, [0, 1])]):
-            continue
-        parts += [Markup('<polygon class="solid" points="{}"/>').format(_seen(corners)) for corners in seen]
-        parts.append(_word(np.concatenate(seen).mean(axis=0), letters, own_title(solid.name), ""))
-    bottom, top = (1000 * corner for corner in placing.tray.corners)
-    corners = np.array([[bottom[0], bottom[1]], [top[0], bottom[1]], [top[0], top[1]], [bottom[0], top[1]]])
-    parts.append(Markup('<polygon class="tray" points="{}"/>').format(_seen(corners)))
-    parts.append(_word(np.array([top[0] + letters, (bottom + top)[1] / 2]), letters, tr("tray"), "tray"))
-    parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(0.06 * reach))
-    box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
-    said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
-    return Markup('<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>').format(
-        box, said, Markup("").join(parts)
-    )
-
-
-def _sector(radius: float, low: float, high: float) -> str:
-    """What an arm that turns from ``low`` to ``high`` (rad) sweeps."""
-    turn = np.linspace(low, min(high, low + 2 * np.pi), 73)
-    arc = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    centre = "" if high - low >= 2 * np.pi - 1e-6 else "M0,0 L"
-    return f"{centre or 'M'}{_seen(arc)}Z"
-
-
-def _seen(points: Any) -> str:
-    return " ".join(f"{x:.0f},{-y:.0f}" for x, y in points)
-
-
-def _word(at: Any, letters: float, text: str, kind: str) -> Markup:
-    return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
-        kind, at[0], -at[1], letters, text
-    )
+    drawing = from_above(robot, results, study.scene(name, "capability"), [placing.tray], LETTERS)
+    known = stored["dynamics"].results.summary if "dynamics" in stored else None
+    carried, _ = payload_key(known, robot)
+    answer = tr("At {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
+    return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html", name, drawing=drawing)

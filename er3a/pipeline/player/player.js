@@ -53,7 +53,7 @@ function prepared(motion) {
 
 const start = () => motion.times[0];
 const end = () => motion.times.at(-1);
-const asked = new URLSearchParams(location.search);
+let asked = new URLSearchParams(location.search);
 /** Where playing ends: where the page's address says so, unless the reader is beyond that. */
 function playedUntil() {
   const until = motion.name === asked.get("play") ? Number(asked.get("until") ?? NaN) : NaN;
@@ -133,7 +133,7 @@ function draw() {
   for (const { from, to, text } of marks) {
     const css = touching.size ? page.touching : page.ink;
     if (String(from) === String(to)) space.dot(from, css, 5, true);
-    else space.line([from, to], data.colours.mark, text ? 3 : 1.5);
+    else space.line([from, to], ...(text ? [data.colours.mark, 3] : [data.colours.sight, 1.5, false]));
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
   if (motion.loads) tellLoads(poses[0]);
@@ -331,12 +331,25 @@ addEventListener("resize", refresh);
 const choose = (name) => motions.has(name) && goTo(name, motions.get(name).times[0]);
 addEventListener("chosen", ({ detail }) => choose(detail));
 choose(decodeURIComponent(location.hash.slice(1)));
-if (motions.has(asked.get("play")) && Number.isFinite(Number(asked.get("t")))) {
-  goTo(asked.get("play"), Number(asked.get("t")));
+/** Shows the moment that the query of an address asks for. */
+function answer(query) {
+  if (!motions.has(query.get("play")) || !Number.isFinite(Number(query.get("t")))) return false;
+  asked = query;
+  goTo(query.get("play"), Number(query.get("t")));
   dock();
   tell();
   listed();
-} else if (location.hash.length < 2) goTo(...data.opened);
+  return true;
+}
+
+document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
+  if (!answer(new URLSearchParams(event.currentTarget.search))) return;
+  event.preventDefault();
+  place.classList.remove("docked");
+  place.scrollIntoView({ block: "nearest" });
+  play(t < playedUntil());
+});
+if (!answer(asked) && location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
 refresh();
 performance.mark("player");

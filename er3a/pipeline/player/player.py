@@ -22,7 +22,7 @@ from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
 from er3a.pipeline.viewing.page import packed_text
-from er3a.pipeline.viewing.palette import DOUBTFUL, INK, TOUCHING
+from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -104,16 +104,18 @@ def player(
     data = _data(robot, shown, scene, words, beside, signs)
     for shape in added:
         data["carried" if shape["frame"] else "scene"].append(shape)
-    _widened(data, [shape["T"] for shape in added if not shape["frame"]])
     known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
     data["opened"] = known or _worst(robot, shown)
+    first = next(motion for motion in shown if motion.name == data["opened"][0])
+    places = [np.array(shape["T"])[:3, 3] for shape in added if not shape["frame"]]
+    _widened(data, [*places, *(np.array(mark.start) for mark in first.marks)])
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still((robot, *beside), next(m for m in shown if m.name == data["opened"][0]), data),
+            still=_still((robot, *beside), first, data),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -161,7 +163,7 @@ def _data(
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
         "length": SEEN * max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
         "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
-        "colours": {"mark": INK, "touching": TOUCHING, **COLOURS},
+        "colours": {"mark": INK, "sight": REFERENCE, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
         "turned": TURNED,
         "floor": floor_of(scene),
@@ -173,11 +175,11 @@ def _data(
     }
 
 
-def _widened(data: dict[str, Any], places: Sequence[Any]) -> None:
-    """Has the picture hold these places, (k, 4, 4), m, too."""
+def _widened(data: dict[str, Any], places: Sequence[Reals]) -> None:
+    """Has the picture hold these places, (3,) each, m, too."""
     if not places:
         return
-    points = np.array(places)[:, :3, 3]
+    points = np.array(places)
     far = points[np.linalg.norm(points - data["target"], axis=1).argmax()]
     reach = float(np.linalg.norm(far - data["target"]))
     if reach > data["length"]:
@@ -217,7 +219,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
             picture.dot(np.array(mark.start), "fail" if colours else "ink", 5.0, rings=True)
             picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
         elif mark.t0 <= t <= mark.t1:
-            picture.line(np.array([mark.start, mark.end]), INK, 1.5)
+            picture.line(np.array([mark.start, mark.end]), INK if mark.text else REFERENCE, 1.5)
     for shape in data["scene"]:
         if "pale" not in shape:
             picture.word(shape["name"], np.array(shape["T"])[:3, 3], "fail" if shape["name"] in colours else "ink")

@@ -1,6 +1,6 @@
 /**
- * A figure in space: layers of points, lines and surfaces in a box with ticks in mm, among solids. A reader turns it, cuts it
- * open, chooses the group of layers that is seen, and leaves layers out.
+ * A figure in space: layers of points and surfaces in a box with ticks in mm, among solids. A reader turns it, cuts it open,
+ * and leaves layers out.
  */
 
 import { add, scaled, subtract } from "er3a/algebra";
@@ -13,7 +13,7 @@ const THROUGH = { transparent: true, depthWrite: false, side: three.DoubleSide }
 
 const place = document.getElementById("turning");
 const data = JSON.parse(document.getElementById("turning-figure").textContent);
-const [canvas, chooser, key, knife] = ["canvas", ".group", ".key", ".cut"].map((name) => place.querySelector(name));
+const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.querySelector(name));
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
@@ -23,8 +23,7 @@ let awaited = false;
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
 const plane = new three.Plane(new three.Vector3(0, 1, 0));
 const solids = data.solids.map(({ name, shapes, poses, colour }) => ({ name, colour, poses, parts: space.add(shapes) }));
-const groups = new Map(data.groups.map(({ name, layers }) => [name, layers.map(made)]));
-chooser.value = data.first ?? chooser.value;
+const layers = data.layers.map(made);
 Object.assign(space, { azimuth: data.azimuth, elevation: data.elevation });
 
 function bytes(text) {
@@ -36,18 +35,18 @@ function refresh() {
   awaited = true;
 }
 
-/** A layer with its points (m) and what three.js draws of it; lines are drawn anew each time. */
+/** A layer with its points (m) and what three.js draws of it. */
 function made(layer) {
   const steps = new Uint16Array(bytes(layer.points).buffer);
   const points = [];
   for (let i = 0; i < steps.length; i += 3) points.push([0, 1, 2].map((k) => low[k] + (size[k] * steps[i + k]) / STEPS));
-  const parts = { points: cloud, surface: body, line: () => [] }[layer.kind](layer, points);
+  const parts = (layer.faces ? body : cloud)(layer, points);
   for (const part of parts) space.scene.add(part);
   return { ...layer, points, parts };
 }
 
 function cloud({ shades, colour, width, cut }, points) {
-  const shade = shades ? [...bytes(shades)].map((step) => data.palette[step]) : points.map(() => colour || space.page.ink);
+  const shade = shades ? [...bytes(shades)].map((step) => data.palette[step]) : points.map(() => colour);
   const geometry = new three.BufferGeometry();
   geometry.setAttribute("position", new three.Float32BufferAttribute(points.flat(), 3));
   geometry.setAttribute("color", new three.Float32BufferAttribute(shade.flatMap((css) => new three.Color(css).toArray()), 3));
@@ -82,15 +81,9 @@ function draw() {
   plane.constant = -at;
   space.begin();
   box();
-  for (const layers of groups.values()) {
-    for (const { name, kind, points, starts, parts, colour, width, cut } of layers) {
-      const shown = layers === groups.get(chooser.value) && !left.has(name);
-      for (const part of parts) part.visible = shown;
-      if (shown && kind === "surface" && !cut) space.word(name, scaled(points.reduce(add), 1 / points.length), space.page.ink, false);
-      if (!shown || kind !== "line") continue;
-      const ends = points.slice(1).map((_, i) => i + 1).filter((i) => !starts.includes(i));
-      space.segments(ends.flatMap((i) => [...points[i - 1], ...points[i]]), colour || space.page.ink, width);
-    }
+  for (const { name, points, faces, parts, cut } of layers) {
+    for (const part of parts) part.visible = !left.has(name);
+    if (faces && !cut && !left.has(name)) space.word(name, scaled(points.reduce(add), 1 / points.length), space.page.ink, false);
   }
   for (const { name, parts, poses } of solids) {
     const hiding = poses.length === 1 ? space.hiding(parts, solids[0].poses) : new Set();
@@ -98,7 +91,7 @@ function draw() {
     for (const part of parts) part.visible = !left.has(name);
   }
   space.end();
-  place.dataset.drawn = chooser.value;
+  place.toggleAttribute("data-drawn", true);
 }
 
 /** The three far sides of the box, with lines at round numbers of mm, and the numbers along three edges. */
@@ -134,33 +127,22 @@ function ticksOf(from, to) {
   return ticks;
 }
 
-/** The names of the layers and solids that are seen, each with its colour and a box to leave it out. */
-function list() {
-  const entries = [...groups.get(chooser.value), ...solids].map(({ name, shades, colour }) => {
-    const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
-    Object.assign(check, { type: "checkbox", checked: !left.has(name) });
-    check.addEventListener("change", () => {
-      if (check.checked) left.delete(name);
-      else left.add(name);
-      refresh();
-    });
-    swatch.style.background = (shades ? data.palette.at(-1) : colour) || "var(--ink)";
-    label.append(check, swatch, ` ${name}`);
-    return label;
+// The names of what is seen, each with its colour and a box to leave it out.
+for (const { name, shades, colour } of [...layers, ...solids]) {
+  const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
+  Object.assign(check, { type: "checkbox", checked: true });
+  check.addEventListener("change", () => {
+    if (check.checked) left.delete(name);
+    else left.add(name);
+    refresh();
   });
-  key.replaceChildren(...entries);
+  swatch.style.background = shades ? data.palette.at(-1) : colour;
+  label.append(check, swatch, ` ${name}`);
+  key.append(label);
 }
 
-const choose = (name) => {
-  if (!groups.has(name)) return;
-  chooser.value = name;
-  list();
-  refresh();
-};
 knife.addEventListener("input", refresh);
-chooser.addEventListener("change", () => choose(chooser.value));
-addEventListener("chosen", ({ detail }) => choose(detail));
 const colours = place.querySelector(".colours");
 if (colours) colours.style.background = `linear-gradient(to right, ${data.palette.join(", ")})`;
-choose(chooser.value);
+refresh();
 performance.mark("turning");

@@ -28,7 +28,7 @@ const rows = names.map((name) => byId(`joint-${name}`));
 const sliders = rows.map((row) => row.querySelector("input[type=range]"));
 const fields = rows.map((row) => row.querySelector("input[type=number]"));
 
-let q = startJoints();
+let q = data.home;
 let ghost = null;
 let listed = false;
 let lastListed = -Infinity;

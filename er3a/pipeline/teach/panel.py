@@ -14,11 +14,13 @@ from er3a.collision.pairs import names_of
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import shapes_assumed
 from er3a.collision.triangles import TriangleTree
+from er3a.files.vision_file import load_vision
 from er3a.finding import fact
 from er3a.kinematics.forward import frames
 from er3a.kinematics.singularity import TYPES, USUAL_NEAR, NearSingular, characteristic_length, wrist_and_forearm
 from er3a.kinematics.solutions import branch_labels
 from er3a.kinematics.wrist_partitioned import has_branches, wrist_partition_missing
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.kinematics import branch_word
@@ -36,7 +38,7 @@ from er3a.pipeline.viewing.page import FOUNDATION_WORDS, render, robots_with, ru
 from er3a.pipeline.viewing.palette import JOINTS, TOUCHING
 from er3a.pipeline.viewing.still import scene_still
 from er3a.programs.writing import ascii_text
-from er3a.robots.joint_limits import joint_names
+from er3a.robots.joint_limits import joint_names, meant
 from er3a.robots.robot import Robot
 
 WORDS: dict[str, Any] = {
@@ -281,6 +283,7 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         output,
         near=near,
         scene=study.scene(name, "trajectory"),
+        home=_home(study, name),
         robots=robots_with(study, "teach"),
         robot_pages=study.pages(name),
         first_caveat=first_caveat,
@@ -288,6 +291,13 @@ def write_teach_page(study: Study, name: str, results: Path, output: Path) -> No
         command=run_command(study, f"{name}/teach.html"),
         provenance=Provenance(inputs, code_digest(), config=study.settings(name, "trajectory")),
     )
+
+
+def _home(study: Study, name: str) -> Reals | None:
+    """Where the arm rests, (n,), rad or m: its home, or else where it waits for its camera; None where no file says."""
+    robot, home, task = study.robot(name), study.home(name), study.entry(name).vision
+    waiting = load_vision(task).home_deg if home is None and task else ()
+    return meant(robot, np.array(waiting)) if len(waiting) == robot.joints else home
 
 
 def write_panel(
@@ -298,6 +308,7 @@ def write_panel(
     provenance: Provenance,
     near: NearSingular = USUAL_NEAR,
     scene: Scene | None = None,
+    home: Reals | None = None,
     robots: Sequence[tuple[str, str, str]] = (),
     robot_pages: Sequence[str] = (),
     first_caveat: Caveat | None = None,
@@ -308,17 +319,21 @@ def write_panel(
     Parameters
     ----------
     near : where the panel warns of a singularity
+    home : (n,), rad or m, that the panel opens at; None for that of the robot's file, or else the zero pose
     robots, robot_pages : of the study: arms with a panel (name, title, address), and this arm's other pages
     first_caveat : what to know of its table, if anything
     head : what files that the panel exports say first; None where nothing is known of the table
     """
     own = panel_data(robot, near)
+    opened = next((q for q in (home, robot.home) if q is not None), np.zeros(robot.joints))
+    opened = np.clip(opened, robot.lower, robot.upper)
     panel = own | {
         "programs": own["programs"] and not (first_caveat and first_caveat.status == "fail"),
         "scene": drawn_scene(scene.solids if scene else (), robot),
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "floor": floor_of(scene),
         "clearance": clearance_data(robot, scene),
+        "home": opened.tolist(),
         "head": [ascii_text(line) for line in (program_head(None) if head is None else head)],
     }
     render(
@@ -335,9 +350,7 @@ def write_panel(
         first_caveat=first_caveat,
         panel=panel,
         drawing_head=drawing_head([*SPACE, *sorted(_HERE.glob("*.js"))]),
-        still=scene_still(
-            panel, [poses_at(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))], {}
-        ).markup(),
+        still=scene_still(panel, [poses_at(robot, opened)], {}).markup(),
         command=command,
         provenance=provenance,
     )

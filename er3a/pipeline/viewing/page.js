@@ -766,7 +766,7 @@ const mark = (shown) => {
   if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
   fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
-  lead.hidden = lead.hash === shown.hash; // nothing else is there to be shown
+  lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
 const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
 rows.forEach((row) => row.addEventListener("click", () => {

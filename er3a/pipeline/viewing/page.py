@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,13 +28,9 @@ from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import (
     at_least,
     at_most,
-    decimals_of,
-    decimals_of_bound,
     fixed,
     measured,
     number,
-    rounded_down,
-    rounded_up,
 )
 from er3a.pipeline.messages.pages import GRADE_NAMES, GROUP_NAMES, Caveat, caveat, glossary
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
@@ -45,11 +40,9 @@ from er3a.pipeline.results import (
     Provenance,
     Status,
     Stored,
-    read_stage,
     read_status,
 )
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer
@@ -202,16 +195,6 @@ class ShownFigure:
         if isinstance(self.value, float) and self.name.endswith(("_lower", "_upper")):
             return (at_least if self.name.endswith("_lower") else at_most)(self.value, self.measure)
         return measured(self.value, self.uncertainty, self.measure)
-
-    @property
-    def rounded(self) -> float | int | None:
-        """The number that the text shows."""
-        if not isinstance(self.value, float) or not isfinite(self.value) or not self.value:
-            return self.value
-        if self.name.endswith(("_lower", "_upper")):
-            decimals = decimals_of_bound(self.value, self.measure)
-            return (rounded_down if self.name.endswith("_lower") else rounded_up)(self.value, decimals)
-        return round(self.value, decimals_of(self.value, self.uncertainty, self.measure))
 
 
 NUMERICS = {  # key figures that answer no question of a verdict
@@ -693,21 +676,6 @@ def panel_link(q_deg: Iterable[float], text: str) -> str:
     """
     joints = ",".join(f"{round(float(angle), 9) + 0.0:.9g}" for angle in q_deg)
     return Markup('<a href="teach.html#q={}">{}</a>').format(joints, text)
-
-
-def stage_head(folder: Path, stage: Stage) -> Head:
-    """The verdict and key figures of a stage, in the page's language.
-
-    Parameters
-    ----------
-    folder : of the stage's results
-
-    Raises
-    ------
-    ResultError
-        if the results are damaged or of another version
-    """
-    return head_of(read_stage(folder, stage))
 
 
 def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> None:

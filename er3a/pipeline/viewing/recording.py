@@ -16,8 +16,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from er3a.collision.scene import Scene
-from er3a.collision.shapes import arm_bodies
+from er3a.collision.scene import Plane, Scene
 from er3a.files.kept_files import write_atomically
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Reals
@@ -25,7 +24,18 @@ from er3a.pipeline.messages.say import say, say_all
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
 from er3a.pipeline.results import AbsentResults, Stored
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import ARM, TIMELINE, arm_view, body_shape, log_arm, seconds, send_motion, solid_shapes
+from er3a.pipeline.viewing.arm import (
+    ARM,
+    SWOLLEN,
+    TIMELINE,
+    arm_view,
+    log_arm,
+    seconds,
+    send_motion,
+    solid_parts,
+    touching_parts,
+)
+from er3a.pipeline.viewing.drawn import drawn_scene
 from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
 from er3a.robots.joint_limits import joint_names, size_of
 from er3a.robots.joint_limits import shown as in_units
@@ -436,8 +446,8 @@ def _log_scene(stream: rr.RecordingStream, shown: Recorded) -> None:
         return
     groups = (shown.scene.solids, f"{shown.stage}/scene", MUTED), (shown.scene.carried, "arm/tool/carried", LINK)
     for solids, below, colour in groups:
-        for name, place, shape in solid_shapes(solids, shown.robot, (*rgb(colour), SCENE_ALPHA)):
-            stream.log(f"{below}/{name}", place, shape, static=True)
+        for shape in drawn_scene(solids, shown.robot):
+            stream.log(f"{below}/{shape['name']}", *solid_parts(shape, (*rgb(colour), SCENE_ALPHA)), static=True)
 
 
 def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float, before: set[str]) -> set[str]:
@@ -549,16 +559,18 @@ def _marks(marks: Sequence[Mark], size: float) -> Iterator[tuple[float, str, Log
 
 
 def _touching(shown: Recorded, events: Sequence[PlayedEvent]) -> Iterator[tuple[float, str, Logged]]:
-    """Red, from when they touch until they part: bodies of the arm and solids, as they were measured."""
+    """Red, from when they touch until they part: bodies of the arm and solids, as they were measured; no planes, of
+    which all would be red."""
     red = (*rgb(VERDICTS["fail"]), TOUCHING_ALPHA)
     shapes: dict[str, list[tuple[str, Logged]]] = {}
-    for number, body in enumerate(arm_bodies(shown.robot)):
-        entity = f"/arm/{body.name}/touching/{number}"
-        shapes.setdefault(body.name, []).append((entity, body_shape(body, red, solid=True)))
+    for name, entity, parts in touching_parts(shown.robot, red):
+        shapes.setdefault(name, []).append((entity, parts))
     if shown.scene is not None:
         for solids, below in ((shown.scene.solids, "scene"), (shown.scene.carried, "/arm/tool/carried")):
-            for name, _, shape in solid_shapes(solids, shown.robot, red, solid=True):
-                shapes.setdefault(name, []).append((f"{below}/{name}/touching", shape))
+            bounded = [solid for solid in solids if not isinstance(solid, Plane)]
+            for shape in drawn_scene(bounded, shown.robot):
+                parts = solid_parts(shape | {"T": np.eye(4)}, red, True, SWOLLEN)  # in its own place
+                shapes.setdefault(shape["name"], []).append((f"{below}/{shape['name']}/touching", parts))
     spans = [(each.t, max(each.until, each.t + BRIEFLY_S), set(each.bodies)) for each in events if each.bodies]
     before: set[str] = set()
     for t in sorted({t for t0, t1, _ in spans for t in (t0, t1)}):

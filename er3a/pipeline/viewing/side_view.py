@@ -20,7 +20,7 @@ MARGIN = 0.06  # of the larger side
 WIDE, UPRIGHT = 1.68, 0.82  # width of a drawing, of its height
 NAME, LABEL, SCALE = 0.06, 0.3, 0.05  # of the height: room for names above, labels at the right, the scale below
 GAP = 0.04  # of the height, between two labels
-BONE = 0.045  # an arm's thickness, of the height of what is drawn
+BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
 
@@ -49,7 +49,7 @@ class Label:
 
     text: str
     at: Reals
-    kind: Literal["wrong", "open", "hole", "tray", "right"]
+    kind: Literal["wrong", "open", "hole", "tray", "tray other", "right"]
     name: str = ""
 
 
@@ -98,9 +98,10 @@ def side_view(
                 low[0], -floor_mm, wide, max(0.0, floor_mm - low[1])
             )
         )
-    outline = Markup('<polygon class="tray" points="{}"/>')
-    parts += [outline.format(_line(corners)) for corners in trays]
-    parts += [_arm(arm, BONE * tall) for arm in arms]
+    outline = Markup('<polygon class="{}" points="{}"/>')
+    parts += [outline.format("tray other" if k else "tray", _line(corners)) for k, corners in enumerate(trays)]
+    over = [arm.kind == "wrong" and len(arms) > 1 for arm in arms]
+    parts += [_arm(arm, BONE * tall * (THINNER if thin else 1.0)) for arm, thin in zip(arms, over)]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)

@@ -7,19 +7,16 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from er3a.collision.shapes import arm_bodies
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision.model import CollisionResults, PathClearances
 from er3a.pipeline.stages.collision.page.played import events, nearest
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import body_shape
-from er3a.pipeline.viewing.palette import JOINTS, MODEL, MUTED, VERDICTS, rgb
+from er3a.pipeline.viewing.palette import JOINTS, MODEL, VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Curves, Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-BODY_ALPHA = 70
 NOTE = """# Where it is free of collisions
 **Look first** at the points: places that the tool can be brought to.
 
@@ -28,7 +25,7 @@ NOTE = """# Where it is free of collisions
 - green: with an arm free of collisions, joined to home by a motion that is free of them too
 - blue: with such an arm, not joined to home
 - red points: none was found, however often tried
-- grey capsules and pieces: the bodies that are measured; grey solids: the scene
+- the arm: the bodies that are measured (beside meshes they are hidden: `checked`); grey solids: the scene
 - red bodies: they overlap at that moment
 
 Press play: the arm runs along its paths; the magenta line joins the two points that are nearest at that time, and the
@@ -50,15 +47,9 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> floa
         scene=study.scene(name, stored.stage),
         home=meant(robot, np.array(results.summary.home_deg or np.zeros(robot.joints))),
         views={"Places and nearest pair": ["**"]},
-        shapes=_bodies(robot) | _places(results),
+        shapes=_places(results),
         now="This path",
     )
-
-
-def _bodies(robot: Robot) -> dict[str, Logged]:
-    """Each body as a child of its link, so that it moves with it."""
-    colour = (*rgb(MUTED), BODY_ALPHA)
-    return {f"/arm/{each.name}/bodies/{k}": body_shape(each, colour) for k, each in enumerate(arm_bodies(robot))}
 
 
 def _places(results: CollisionResults) -> dict[str, Logged]:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
+from markupsafe import Markup
 
 from er3a.collision.pairs import TRIED
+from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
@@ -19,17 +17,17 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.player import drawing_head, player
+from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark
-from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.page import Picture, render_stage
-from er3a.pipeline.viewing.palette import HIGHLIGHT, VERDICTS
+from er3a.pipeline.viewing.page import render_stage
+from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
 
-LOST, CLEAR, JOINED = 0, 1, 2
+PLACE_PX = 5.0
 
 
 def most_often(pairs: model.PairShares) -> str:
@@ -40,61 +38,34 @@ def most_often(pairs: model.PairShares) -> str:
     return tr("{pair} overlap most often, in {percent} % of it.", pair=worst[:1].upper() + worst[1:], percent=percent)
 
 
-def _two_views(height: float) -> tuple[Figure, list[tuple[Axes, list[int]]]]:
-    """A figure with a drawing from the side and one from above, each with the numbers of its coordinates."""
-    figure, axes = new_figure(1, 2, width=11.0, height=height)
-    for ax, up, title in zip(axes, (tr("z (mm)"), tr("y (mm)")), (tr("From the side"), tr("From above"))):
-        equal_scale(ax, tr("x (mm)"), up)
-        ax.set_title(title)
-    return figure, list(zip(axes, ([0, 2], [0, 1])))
-
-
-def workspace(results: model.CollisionResults) -> Picture:
-    """From the side and from above: what of the reached places is clear, joined to home, or lost."""
+def _places(robot: Robot, results: model.CollisionResults, scene: Scene | None) -> Markup:
+    """The middles of the cells that are reached, by what is left of them, in a figure that turns."""
     rows = results.places
-    state = np.where(rows.joined, JOINED, np.where(rows.clear, CLEAR, LOST))
-    figure, views = _two_views(5.2)
-    cell = results.summary.places.cell_m * 1000
-    for ax, plane in views:
-        mesh = _columns(ax, rows.middle_mm[:, plane], state, cell)
-    figure.colorbar(mesh, ax=figure.axes[:2], label=tr("reached cells lost to collisions (%)"), shrink=0.8)
-    found = results.summary.places
-    numbers = {
-        "cell": cell,
-        "reached": found.reached,
-        "clear": found.clear,
-        "joined": found.joined,
-        "tries": found.tries_in_lost,
-        "lost": fixed(found.lost_m3 * 1000, 0),
-    }
-    caption = tr(
-        "Each square is a column of {cell:.0f} mm cells: the redder, the more of its reached cells are lost. Of "
-        "{reached} cells reached, {clear} have a collision-free configuration, {joined} of these connected to home by "
-        "a motion that is. In the others none was found in {tries} tries in all, so their volume of {lost} L "
-        "overestimates the loss. Ringed: columns with collision-free cells that are not connected to home.",
-        **numbers,
+    groups = (
+        (tr("connected to home"), rows.joined, VERDICTS["pass"]),
+        (tr("clear, not connected"), rows.clear & ~rows.joined, MODEL),
+        (tr("lost"), ~rows.clear, VERDICTS["fail"]),
     )
-    return Picture(figure, tr("Two views of the cells reached. {conclusion}", conclusion=caption), caption)
+    layers = [Layer(name, rows.middle_mm[own], colour, PLACE_PX, cut=True) for name, own, colour in groups if own.any()]
+    return (
+        turning_figure(layers, solids=surroundings(robot, scene), cut_m=float(robot.base[1, 3])) if layers else Markup()
+    )
 
 
-def _columns(ax, at: np.ndarray, state: np.ndarray, cell: float) -> QuadMesh:
-    """One square for each column of cells: the share that is lost as its shade, a ring where some is not joined."""
-    low = at.min(axis=0)
-    index = np.round((at - low) / cell).astype(int)
-    size = index.max(axis=0) + 1
-    count, lost, apart = np.zeros((3, *size))
-    np.add.at(count, tuple(index.T), 1)
-    np.add.at(lost, tuple(index[state == LOST].T), 1)
-    np.add.at(apart, tuple(index[state == CLEAR].T), 1)
-    share = np.where(count > 0, lost / np.maximum(count, 1), np.nan)
-    edges = [low[k] + cell * (np.arange(size[k] + 1) - 0.5) for k in (0, 1)]
-    colours = LinearSegmentedColormap.from_list("lost", [VERDICTS["pass"], VERDICTS["fail"]], 21)
-    mesh = ax.pcolormesh(
-        *edges, 100 * share.T, cmap=colours, vmin=0, vmax=100, edgecolors="white", linewidth=0.3, rasterized=True
+def _left(summary: model.CollisionSummary) -> str:
+    """How much of the reached places is left."""
+    found = summary.places
+    return tr(
+        "Each point is a cell of {cell:.0f} mm. Of {reached} reached, {clear} have a collision-free configuration, "
+        "{joined} of these connected to home. In the others none was found in {tries} tries, so {lost} L overestimate "
+        "the loss.",
+        cell=1000 * found.cell_m,
+        reached=found.reached,
+        clear=found.clear,
+        joined=found.joined,
+        tries=found.tries_in_lost,
+        lost=fixed(1000 * found.lost_m3, 0),
     )
-    ringed = np.argwhere(apart > 0)
-    ax.plot(*(low + cell * ringed).T, "o", markerfacecolor="none", markeredgecolor=HIGHLIGHT, markersize=5)
-    return mesh
 
 
 NO_BREAK_SPACE = "\u00a0"
@@ -117,7 +88,8 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         never=int((results.matrix.state == "never").sum()),
         tried=TRIED,
         most_often=most_often(results.pairs),
-        workspace=workspace(results),
+        places=_places(robot, results, scene),
+        left=_left(summary),
         player=player(robot, [*motions(robot, results), *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",

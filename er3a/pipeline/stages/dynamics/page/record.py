@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from er3a.kinematics.chain import ALONG_Z, link_parts
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics.model import FORCE, TORQUE, DynamicsResults, TorqueRows, shared_unit
 from er3a.pipeline.stages.dynamics.page.played import motions
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.drawn import drawn_arm
 from er3a.pipeline.viewing.palette import JOINTS, rgb
 from er3a.pipeline.viewing.recording import Curves, Run, escaped, record_stage
 from er3a.robots.joint_limits import size_of
@@ -21,7 +21,6 @@ from er3a.robots.robot import Robot
 
 LONGEST = 0.35  # of the arm's size, the arrow of the maximum torque
 WIDTH = 0.012  # of the arm's size
-CLEAR = 0.037  # of the arm's size, from the middle of a joint's drum to outside it
 NOTE = """# {title}: torques
 **Look first** at the arrow that is longest while the arm runs: that joint's drive needs the most torque.
 
@@ -87,7 +86,8 @@ def _run(robot: Robot, motion: PlayedMotion, title: str, results: DynamicsResult
 def _arrows(robot: Robot, rows: TorqueRows, j: int, scale: Reals) -> rr.ComponentColumnList:
     vectors, count = np.zeros((len(rows), 3)), len(rows)
     vectors[:, 2] = robot.direction[j] * rows.torque[:, j] * scale[j]
-    origins = np.tile(link_parts(robot)[j + 1, ALONG_Z, :3, 3] / 2, (count, 1))
-    origins[:, 2] += CLEAR * size_of(robot) * np.sign(vectors[:, 2])
+    row = drawn_arm(robot)["rows"][j]
+    origins = np.tile(row["middle"], (count, 1))
+    origins[:, 2] += row["half"] * np.sign(vectors[:, 2])
     colours, radii = np.tile(rgb(JOINTS[j % len(JOINTS)]), (count, 1)), np.full(count, WIDTH * size_of(robot))
     return rr.Arrows3D.columns(origins=origins, vectors=vectors, radii=radii, colors=colours)

@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.pipeline.language import own_title, tr, with_unit
-from er3a.pipeline.messages.dynamics import BINDING, payload_text, quantity_word
+from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, quantity_word
 from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
 from er3a.pipeline.player.player import drawing_head, player
@@ -22,6 +22,7 @@ from er3a.pipeline.viewing.figures import axis_label, row_of_panels
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
 from er3a.pipeline.viewing.side_view import seen_arm, side_view
+from er3a.robots.robot import Robot
 
 DRAWN = 161
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
@@ -101,7 +102,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         study,
         stored,
         output,
-        _answer(results),
+        _answer(robot, results),
         arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
@@ -136,15 +137,16 @@ def _worst(motors: Sequence[model.MotorNeed]) -> model.MotorNeed:
     return max(motors, key=lambda motor: motor.peak if motor.unit == motors[0].unit else 0.0)
 
 
-def _answer(results: model.DynamicsResults) -> Answer:
+def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     """The greatest torque that is needed, and that of each joint against its limit."""
     summary = results.summary
+    payload = payload_key(summary, robot)
     if not summary.motors:
         held = model.hardest_held(summary.holding) if summary.holding else None
         if held is None:
-            return Answer(tr("Torques need the links' masses."), tr("None are given."))
+            return Answer(tr("Torques need the links' masses."), tr("None are given."), keys=[payload])
         size = with_unit(number(abs(held.torque), 2), held.unit)
-        return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size))
+        return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size), keys=[payload])
     worst = _worst(summary.motors)
     most = with_unit(number(worst.peak, 2), worst.unit)
     limited = all(motor.peak_limit is not None for motor in summary.motors)
@@ -156,9 +158,7 @@ def _answer(results: model.DynamicsResults) -> Answer:
         if limited
         else tr("Motor limits are unknown.")
     )
-    keys = [
-        (with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W"), tr("greatest power of a joint"))
-    ]
+    power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     rows = [_row(motor, worst.peak, _moment_of(results, motor)) for motor in order]
     still = [_held_row(motor, worst.holding) for motor in order if motor.holding >= LEAST]
@@ -167,7 +167,7 @@ def _answer(results: model.DynamicsResults) -> Answer:
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
         "",
         rest,
-        keys,
+        [payload, (power, tr("greatest power of a joint"))],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
     )
 

@@ -14,7 +14,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse.model import InverseResults, SolutionRows, TargetResult, shown_targets
 from er3a.pipeline.stages.inverse.page.played import refusal_in_short
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.arm import AXES, capsules
+from er3a.pipeline.viewing.arm import AXES
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, colour_of, rgb, shape_of
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant, size_of
@@ -27,7 +27,7 @@ time, or press play.
 {findings}
 
 - solid arm: the solution taken; where none is, the arm where it comes from
-- translucent arms: the other branches within the limits, coloured as on the page
+- thick lines: the other branches within the limits, coloured as on the page
 - thin grey lines: branches that leave a joint limit or collide
 - magenta ball with axes: the target's frame
 - grey solids: the scene
@@ -66,12 +66,9 @@ def _run(robot: Robot, target: TargetResult, branches: SolutionRows) -> Run:
     shapes: dict[str, Logged] = {f"{root}/frame": [frame, axes], f"{root}/point": ball}
     for k, branch in enumerate(branches.branch):
         points = skeleton(robot, meant(robot, branches.q_deg[k]))
-        colour = (*rgb(colour_of(shape_of(int(branch), branches.label[k]))), 150)
-        shapes[f"{root}/branch_{branch}"] = (
-            capsules(points[:-1], np.diff(points, axis=0), 0.014 * size, colour, solid=False)
-            if branches.rank[k]
-            else rr.LineStrips3D([points], radii=0.003 * size, colors=rgb(MUTED))
-        )
+        colour = colour_of(shape_of(int(branch), branches.label[k]))
+        width, colour = (0.014, colour) if branches.rank[k] else (0.003, MUTED)
+        shapes[f"{root}/branch_{branch}"] = rr.LineStrips3D([points], radii=width * size, colors=[rgb(colour)])
     return Run(
         name=target.name,
         text=_about(target, branches),

@@ -68,8 +68,12 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """The target with the most solutions, and the solution taken there."""
-    return max(shown, key=lambda each: each.solutions).name, 0.0
+    """A target that is not reached, or else the one that the fewest of its solutions serve; the best of these."""
+
+    def served(target: model.TargetResult) -> tuple[bool, float]:
+        return target.outcome == "reached", target.within_limits / max(target.solutions, 1)
+
+    return min(shown, key=served).name, 0.0
 
 
 def _answer(

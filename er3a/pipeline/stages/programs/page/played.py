@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from operator import itemgetter
 from pathlib import Path
@@ -31,18 +32,13 @@ WEIGHTS: dict[Level, Weight] = {"pass": "plain", "note": "plain", "caution": "ca
 def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
     """The programs as far as they were followed, the worst first, as the player shows them.
 
-    The motion of each line is an event with its text, its verdict and what touches; each finding is one from its
-    moment to the end of that motion, joints that are too fast together. ``q`` is (N, n), rad or m.
+    The motion of each line is an event; each finding is one from its moment to the end of that motion, joints that are
+    too fast together, bodies that touch each from its own. ``q`` is (N, n), rad or m.
     """
     motions = []
     for program in worst_first(results.summary.programs):
         rows = results.motion.take(results.motion.program == program.name)
-        text = results.lines.take(results.lines.program == program.name)
-        words = dict(zip(text.line.tolist(), text.text.tolist()))
-        events = []
-        for line, level, t0, t1 in stretches(rows):
-            shown = tr("line {line}: {text}", line=line, text=words.get(line, "").strip().rstrip(";"))
-            events.append(PlayedEvent(t0, t1, shown, WEIGHTS[level], touching(program, line)))
+        events = [PlayedEvent(t0, t1, tr("line {line}", line=line), "plain") for line, _, t0, t1 in stretches(rows)]
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
@@ -58,10 +54,18 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     if is_one(finding, "meets_singularity", "passes_singularity"):
         return [PlayedEvent(start, start, singular_cause(finding), weight)]
     end = min((t1 for _, _, t0, t1 in stretches(rows) if t0 - MOMENT <= start <= t1 + MOMENT), default=start)
+    end = max(start, end)
+    if is_one(finding, "motion_collides"):
+        begun = start - (found.motion_s or 0.0)  # of the line's motion
+        touches = [(begun + each.t_s, each.pair) for each in finding.touches]
+        return [
+            PlayedEvent(t, max(t, end), tr("collision: {pair}", pair=say(pair)), weight, names_of(pair))
+            for t, pair in touches
+        ]
     if not is_one(finding, "too_fast"):
         joint = getattr(finding, "joint", None)
         joints = ((joint, ""),) if joint and is_one(finding, "above_limit", "below_limit") else ()
-        return [PlayedEvent(start, max(start, end), say(finding), weight, joints=joints)]
+        return [PlayedEvent(start, end, in_few_words(say(finding)), weight, joints=joints)]
     paces = _paces(program, found)
     if (start, finding) != min(paces, key=itemgetter(0)):
         return []
@@ -69,7 +73,12 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
     for _, pace in paces:
         needed.setdefault(pace.joint, times_needed(rate_ratio(pace)))
     text = rates_text([pace for _, pace in paces])
-    return [PlayedEvent(start, max(start, end), text, weight, joints=tuple(needed.items()))]
+    return [PlayedEvent(start, end, text, weight, joints=tuple(needed.items()))]
+
+
+def in_few_words(text: str) -> str:
+    """What is wrong, up to where its details begin."""
+    return re.split(r"[:;(：；（]| while ", text)[0].strip()
 
 
 def _paces(program: ProgramSummary, found: FindingAt) -> list[tuple[float, Finding]]:
@@ -189,12 +198,6 @@ def moment_of(each: FindingAt) -> tuple[float, int]:
 def of_line(program: ProgramSummary, line: int) -> list[FindingAt]:
     """What was found in a line of the program's own file."""
     return [each for each in program.findings if (each.file, each.line) == (Path(program.file).name, line)]
-
-
-def touching(program: ProgramSummary, line: int) -> tuple[str, ...]:
-    """Names of the bodies that overlap on the motion of a line."""
-    collisions = [each.finding for each in of_line(program, line) if is_one(each.finding, "motion_collides")]
-    return tuple(dict.fromkeys(name for each in collisions for touch in each.touches for name in names_of(touch.pair)))
 
 
 def stretches(rows: ProgramMotion) -> list[tuple[int, Level, float, float]]:

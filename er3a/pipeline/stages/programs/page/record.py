@@ -12,17 +12,15 @@ import rerun as rr
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.programs import cycle_text, level_word
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.player.motions import PlayedEvent
+from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
-from er3a.pipeline.stages.programs.page.played import WEIGHTS, of_line, stretches, touching
+from er3a.pipeline.stages.programs.page.played import WEIGHTS, motions, of_line, stretches
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.palette import VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.languages import LANGUAGES
-from er3a.robots.joint_limits import meant
-from er3a.robots.robot import Robot
 
 AROUND = 4  # lines of the listing before and after the one that is carried out
 COLOURS: dict[str, str] = {**VERDICTS, "note": VERDICTS["pass"]}
@@ -33,20 +31,21 @@ the text beside it shows the line that it is at.
 {findings}
 
 - line: the tool's path, green where the motion passes, amber where it wants caution, red where it fails
-- red bodies: they overlap somewhere on that motion
+- red bodies: they overlap at that moment
 - grey solids: the scene
 """
 
 
 def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> float | None:
     """Write the recording of a robot's programs."""
-    results, robot = stored.results, study.robot(stored.robot)
+    results = stored.results
+    played = {motion.name: motion for motion in motions(study.robot(stored.robot), results)}
     return record_stage(
         study,
         stored,
         output,
         NOTE,
-        runs=[_run(robot, results, program) for program in results.summary.programs],
+        runs=[_run(results, program, played[program.name]) for program in results.summary.programs],
         scene=study.scene(stored.robot, "trajectory"),  # the stage whose scene counts here too
         views={"Arm and tool": ["**"]},
         points=[results.motion.xyz_mm / 1000],
@@ -54,26 +53,20 @@ def record(study: Study, stored: Stored[ProgramsResults], output: Path) -> float
     )
 
 
-def _run(robot: Robot, results: ProgramsResults, program: ProgramSummary) -> Run:
+def _run(results: ProgramsResults, program: ProgramSummary, motion: PlayedMotion) -> Run:
     rows = results.motion.take(results.motion.program == program.name)
     listing = results.lines.text[results.lines.program == program.name].tolist()
     outcome = "passes in the model" if program.outcome == "pass" else outcome_word(program.outcome)
-    texts, events, lines, seen = [], [], [], set()
-    for line, level, t0, t1 in stretches(rows):
-        found = of_line(program, line)
-        texts.append((t0, _document(program, line, listing, found, level)))
+    texts, lines = [], []
+    for line, level, t0, _ in stretches(rows):
+        texts.append((t0, _document(program, line, listing, of_line(program, line), level)))
         lines.append((t0, f"{program.name}:{line}", WEIGHTS[level]))
-        bodies = touching(program, line)
-        for each in [] if line in seen and not bodies else found:
-            text = f"{program.name}:{line}: {say(each.finding)}"
-            events.append(PlayedEvent(t0, t1, text, WEIGHTS[each.level], bodies))
-        seen.add(line)
     return Run(
         name=program.name,
         text=f"## {program.name}\n**{outcome}**: {escaped(program.title)}\n\n{cycle_text(program)}",
-        t=rows.t_s,
-        q=meant(robot, rows.q_deg),
-        events=events,
+        t=motion.t,
+        q=motion.q,
+        events=[each for each in motion.events if each.status != "plain"],
         outcome=f"{outcome} ({LANGUAGES[program.language].title})",
         status=WEIGHTS[program.outcome],
         shapes=[(0.0, "way", _way(rows))],

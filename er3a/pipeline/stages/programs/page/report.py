@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +23,7 @@ from er3a.pipeline.stages.programs import model
 from er3a.pipeline.stages.programs.page.played import (
     cause_first,
     faults,
+    in_few_words,
     line_id,
     motions,
     stretches,
@@ -71,8 +71,9 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     known = {each.name: each for each in summary.programs}
     ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}
     shares = dict(zip(ends, lengths(ends.values())))
+    notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
     bad = {
-        each.name: row_of(each, shown.get(each.name), ends[each.name], shares[each.name], _in_few_words(each))
+        each.name: row_of(each, shown.get(each.name), ends[each.name], shares[each.name], notes[each.name])
         for each in wrong
     }
     sound = [
@@ -86,11 +87,6 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))
-
-
-def _in_few_words(fault: Fault) -> str:
-    """What is wrong first, up to where its details begin."""
-    return re.split(r"[:;(：；（]| while ", fault.moments[0].what)[0].strip()
 
 
 def _passed(program: model.ProgramSummary) -> str:

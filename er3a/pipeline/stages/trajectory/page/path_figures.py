@@ -1,6 +1,6 @@
 """The figure of a path: curves and measures over one time.
 
-Layout is fixed, so that matplotlib draws each figure once.
+Layout is fixed: finding places takes longer than drawing.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label, svg_data_uri
+from er3a.pipeline.viewing.figures import axis_label
+from er3a.pipeline.viewing.page import Picture
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -28,78 +29,47 @@ WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves th
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
+ROWS = 3, 2  # of axes, on the left and on the right
 LEFT, BOTTOM, TOP = 0.07, 0.07, 0.925
 WIDTH, GAP = 0.41, 0.09  # of a column, and between the two
 FONT = 9.0
 
 
-class PathFigure:
-    """Joint curves on the left, measures on the right.
+def path_picture(
+    robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds, alt: str, caption: str
+) -> Picture:
+    """Joint curves of a path on the left, measures on the right, all over the time of its motion.
 
-    One figure serves all paths of a page: making axes and their ticks takes longer than drawing the curves.
+    Parameters
+    ----------
+    rows : of the path, as many as its curves need
+    near : from where on a pose counts as near a singular one
     """
-
-    def __init__(self) -> None:
-        self.figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-        self.joints = [self._axes(0, row) for row in range(3)]
-        self.measures = [self._axes(1, row) for row in range(2)]
-        for column in (self.joints, self.measures):
-            for ax in column:
-                ax.yaxis.set_label_coords(-0.1, 0.5)
-            for ax in column[:-1]:
-                ax.tick_params(labelbottom=False)
-            column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
-
-    def draw(
-        self,
-        robot: Robot,
-        path: model.PathSummary,
-        rows: model.PathChecks,
-        near: model.NearThresholds,
-    ) -> str:
-        """The figure of a path as the data address of an image."""
-        for ax in self.figure.axes:
-            _clear(ax)
-        _joint_curves(self.joints, robot, path, rows)
-        _distances(self.measures[0], rows, near)
-        _condition(self.measures[1], rows)
-        for ax in (*self.joints, *self.measures):
-            _mark(ax, path)
-            ax.set_xlim(rows.t_s[0], rows.t_s[-1])
-        handles = _legend(path)
-        legend = self.figure.legend(
-            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT
-        )
-        image = svg_data_uri(self.figure)
-        legend.remove()
-        return image
-
-    def panels(self) -> list[list[float]]:
-        """Where the curves over time stand, for the player's cursor: left, bottom, right, top in parts of the image,
-        and the times (s) at both sides."""
-        shown = ((ax.get_position().extents, ax.get_xlim()) for ax in (*self.joints, *self.measures))
-        return [[round(float(value), 5) for value in (*extents, *ends)] for extents, ends in shown]
-
-    def _axes(self, column: int, row: int) -> Axes:
-        rows = (3, 2)[column]
-        height = (TOP - BOTTOM) / rows
-        x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (rows - 1 - row) * height
-        ax = self.figure.add_axes((x, y, WIDTH, height - 0.03))
-        ax.tick_params(labelsize=FONT, length=2)
-        ax.xaxis.set_major_locator(MaxNLocator(5))
-        ax.yaxis.set_major_locator(MaxNLocator(4))
-        return ax
+    figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
+    joints, measures = ([_axes(figure, column, row) for row in range(count)] for column, count in enumerate(ROWS))
+    for column in (joints, measures):
+        for ax in column[:-1]:
+            ax.tick_params(labelbottom=False)
+        column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
+    _joint_curves(joints, robot, path, rows)
+    _distances(measures[0], rows, near)
+    _condition(measures[1], rows)
+    for ax in figure.axes:
+        _mark(ax, path)
+        ax.set_xlim(rows.t_s[0], rows.t_s[-1])
+    figure.legend(handles=_legend(path), loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT)
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in figure.axes])
 
 
-def _clear(ax: Axes) -> None:
-    """Take a path's curves out of axes, and leave their ticks."""
-    for artist in (*ax.lines, *ax.collections, *ax.patches, *ax.texts):
-        artist.remove()
-    if legend := ax.get_legend():
-        legend.remove()
-    ax.relim()
-    ax.margins(0.05)
-    ax.autoscale(True)
+def _axes(figure: Figure, column: int, row: int) -> Axes:
+    height = (TOP - BOTTOM) / ROWS[column]
+    x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (ROWS[column] - 1 - row) * height
+    ax = figure.add_axes((x, y, WIDTH, height - 0.03))
+    ax.tick_params(labelsize=FONT, length=2)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.yaxis.set_label_coords(-0.1, 0.5)
+    return ax
 
 
 def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows: model.PathChecks) -> None:

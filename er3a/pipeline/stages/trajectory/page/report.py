@@ -30,7 +30,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import PathFigure
+from er3a.pipeline.stages.trajectory.page.path_figures import path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     kinds,
@@ -45,8 +45,7 @@ from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
-from er3a.pipeline.viewing.figures import readings
-from er3a.pipeline.viewing.page import packed_text, render_stage, whole_sentence
+from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
 from er3a.programs.writing import with_head_lines
 from er3a.robots.robot import Robot
@@ -60,7 +59,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     robot, results = study.robot(stored.robot), stored.results
     summary, checks = results.summary, results.checks
     scene = study.scene(stored.robot, stored.stage)
-    figure, sections = PathFigure(), []
+    sections = []
     count = len(summary.paths) if len(summary.paths) <= MAX_DRAWN else DRAWN_OF_MORE
     paths, contradicted = worst_first(summary.paths), stored.rests_on.get("validation") == "fail"
     lines = program_head(stored.validated, summary.checked, summary.assumed)
@@ -71,7 +70,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
         links = _programs(path, files, lines, met or {})
-        drawn = _figure(figure, robot, path, rows, summary.near) if i < count else None
+        drawn = _figure(robot, path, rows, summary.near) if i < count else None
         sections.append(_section(path, drawn, links, summary))
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
@@ -205,7 +204,7 @@ def _in_head(meeting: Meeting | None) -> list[str]:
 
 def _section(
     path: model.PathSummary,
-    figure: dict[str, Any] | None,
+    figure: Picture | None,
     programs: list[dict[str, Any]],
     summary: model.TrajectorySummary,
 ) -> dict[str, Any]:
@@ -241,24 +240,15 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
     return bool(program["file"].rpartition(".")[0] == repair_name(path.name))
 
 
-def _figure(
-    figure: PathFigure,
-    robot: Robot,
-    path: model.PathSummary,
-    rows: model.PathChecks,
-    near: model.NearThresholds,
-) -> dict[str, Any]:
+def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
+    text = path_text(path)
     alt = tr(
         "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
         "condition number. {finding}.",
         path=path.name,
-        finding=path_text(path),
+        finding=text,
     )
-    uri = figure.draw(robot, path, _drawn(path, rows), near)
-    inches, caption = float(figure.figure.get_figwidth()), whole_sentence(path_text(path))
-    return dict(
-        uri=uri, alt=alt, caption=caption, inches=inches, panels=figure.panels(), readings=readings(figure.figure)
-    )
+    return path_picture(robot, path, _drawn(path, rows), near, alt, whole_sentence(text))
 
 
 def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:

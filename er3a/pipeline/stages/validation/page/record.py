@@ -19,19 +19,15 @@ from er3a.pipeline.stages.validation.page.diagnosis_section import corrected_rob
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Texts
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, rgb
-from er3a.pipeline.viewing.recording import BRIEFLY_S, GONE, Curves, Logged, Recorded, Run, escaped, write_recording
+from er3a.pipeline.viewing.recording import BRIEFLY_S, GONE, Curves, Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 HOLD_S, MOVE_S, STEPS = 2.0, 1.0, 30
 MIN_ARROW_MM = 0.1
-NOTE = """# Key poses of {title}
-
-{look}
-{text}
-"""
-LOOK = """**Look first** at the largest deviation of each pose, a curve below: go to the pose where it is highest. The
-arm stops {hold:g} s at each pose that a reference names; press play, or drag the time.
+HEAD, FINDINGS = "# Key poses of {title}\n\n", "\n{findings}\n"
+LOOK = f"""**Look first** at the largest deviation of each pose, a curve below: go to the pose where it is highest. The
+arm stops {HOLD_S:g} s at each pose that a reference names; press play, or drag the time.
 """
 POSES = """
 - blue ball: the model's flange or wrist centre
@@ -46,16 +42,15 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> flo
     axes, poses = results.axes, results.key_poses
     stations = _stations(robot, poses)
     corrected, fault = corrected_robot(robot, results.summary.diagnoses)
-    look = LOOK.format(hold=HOLD_S) if len(poses) else ""
-    note = NOTE.format(title=escaped(robot.title), look=look, text=say(results.summary.verdict.finding))
-    note += POSES if len(poses) else ""
-    note += f"- see-through arm: the same table, {fault}\n" if corrected is not None else ""
+    parts = [HEAD, LOOK if len(poses) else "", FINDINGS, POSES if len(poses) else ""]
+    parts.append(f"- see-through arm: the same table, {fault}\n" if corrected is not None else "")
     runs = [_run(robot, rows, following, results.checks) for rows, following in pairwise([*stations, None]) if rows]
-    shown = Recorded(
+    return record_stage(
+        study,
+        stored,
+        output,
+        "".join(parts),
         robot=robot,
-        name=stored.robot,
-        stage=stored.stage,
-        note=note,
         runs=[_with_axes(runs[0], axes, size_of(robot), last=len(runs) == 1), *runs[1:]],
         curves=[Curves("deviation", "Largest deviation (mm)", ["largest deviation"], [REFERENCE], whole=True)],
         home=np.zeros(robot.joints),
@@ -63,9 +58,7 @@ def record(study: Study, stored: Stored[ValidationResults], output: Path) -> flo
         points=[points / 1000 for points in (poses.point_mm, poses.model_point_mm, axes.point_mm)],
         ghost=corrected,
         now="This pose",
-        verdict=results.summary.verdict.status,
     )
-    return write_recording(shown, output)
 
 
 def _stations(robot: Robot, poses: KeyPoses) -> list[KeyPoses]:

@@ -164,7 +164,7 @@ def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -
     kind: Kind = "wrong" if differs else "right"
     arms = [seen_arm(robot, own_title(robot.title), tr("this table"), kind)]
     if other is not None and differs:
-        arms.append(seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
+        arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
     return side_view(arms, ratio=UPRIGHT, labels=_doubts(robot, evidence))
 
 

@@ -22,6 +22,7 @@ from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
 MAGNIFIED = 50.0
+LONGEST = 0.25  # of the arm's size: an arrow's part along each axis, at most
 IMAGE = 1280  # pixels, the width of the picture that the viewer shows through the camera
 STEP_S, SAMPLE_S = 0.1, 0.5
 NOTE = f"""# Camera, samples and grasps
@@ -97,9 +98,11 @@ def _samples(rows: SampleRows, size: float) -> dict[str, Logged]:
     for name, kept, colour in (("used", rows.used, MODEL), ("left_out", ~rows.used, HIGHLIGHT)):
         if kept.any():
             start, end = rows.predicted_mm[kept] / 1000, rows.seen_mm[kept] / 1000
-            vectors = np.clip(MAGNIFIED * (end - start), -size, size)
+            vectors = np.clip(MAGNIFIED * (end - start), -LONGEST * size, LONGEST * size)
             arrows = rr.Arrows3D(origins=start, vectors=vectors, radii=0.002 * size, colors=rgb(colour))
-            shapes[f"samples/{name}/boards"] = rr.Points3D(start, radii=0.006 * size, colors=rgb(colour))
+            labels = None if name == "used" else rows.sample[kept].tolist()
+            dots = rr.Points3D(start, radii=0.006 * size, colors=rgb(colour), labels=labels, show_labels=True)
+            shapes[f"samples/{name}/boards"] = dots
             shapes[f"samples/{name}/residuals"] = arrows
     return shapes
 

@@ -9,11 +9,11 @@ import numpy as np
 import rerun as rr
 from matplotlib import colormaps
 
-from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
+from er3a.pipeline.viewing.arm import mesh
 from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
 
@@ -97,22 +97,4 @@ def _voids(results: model.WorkspaceResults) -> Iterator[tuple[str, Logged]]:
         faces = triangles.corners[triangles.void == number]
         if len(faces):
             corners = vertices.point_m[vertices.void == number]
-            yield (
-                f"voids/{void.kind}_{number}",
-                rr.Mesh3D(
-                    vertex_positions=corners,
-                    triangle_indices=faces,
-                    albedo_factor=(*rgb(_COLOURS[void.kind]), 255),
-                    vertex_normals=_normals(corners, faces),
-                ),
-            )
-
-
-def _normals(corners: Reals, faces: Integers) -> Reals:
-    """Unit normals (V, 3): sums over the faces at each corner."""
-    a, b, c = (corners[faces[:, i]] for i in range(3))
-    across = np.cross(b - a, c - a)
-    normals = np.zeros_like(corners)
-    for i in range(3):
-        np.add.at(normals, faces[:, i], across)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+            yield f"voids/{void.kind}_{number}", mesh(corners, faces, rgb(_COLOURS[void.kind]))

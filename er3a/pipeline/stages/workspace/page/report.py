@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
-from er3a.pipeline.messages.dynamics import payload_text
+from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
 from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres
@@ -19,11 +19,14 @@ from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page import workspace_figures
 from er3a.pipeline.stages.workspace.page.capability_section import capability_context
+from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
 from er3a.robots.robot import Robot
+
+LETTERS = 0.09  # of the reach, in the view from above: as large as others on a phone
 
 
 def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -> None:
@@ -32,7 +35,11 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     summary, scene = results.summary, study.scene(stored.robot, "capability")
     contradicted = stored.rests_on.get("validation") == "fail"
     placing = placing_of(study, stored)
-    context = _context(robot, results, placing, _payload(study, stored) if placing else "")
+    folder = stored.folder.parent / "dynamics" if stored.folder else None
+    known = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
+    there = tr("What the arm can carry at the tray was not examined.")
+    payload = joined([payload_text(known, robot), there], " ") if placing else ""
+    context = _context(robot, results, placing, payload)
     if contradicted:
         context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
     bare = any(each.reason == "tool" for each in summary.assumed)
@@ -40,7 +47,9 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, placing, bare=bare),
+        _answer(summary, placing, payload_key(known, robot), bare=bare),
+        at_side=True,
+        plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, placing),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
@@ -63,8 +72,10 @@ def _labelled(
     return workspace_figures.labelled(robot, results, floor_mm, trays)
 
 
-def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: bool) -> Answer:
-    """How far the arm reaches, its holes, and where the tray goes; ``bare``: without a tool."""
+def _answer(
+    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], *, bare: bool
+) -> Answer:
+    """How far the arm reaches, its holes, where the tray goes, and the ``payload``; ``bare``: without a tool."""
     reach, volume = summary.reach_m, summary.volume_m3
     far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
     holes = summary.enclosed_voids
@@ -81,6 +92,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, *, bare: b
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
             tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
+        payload,
     ]
     groups = (
         Group(tr("Holes and pockets"), [_void_as_row(n, void) for n, void in enumerate(summary.voids, start=1)]),
@@ -110,25 +122,14 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     return rows
 
 
-def _payload(study: Study, stored: Stored[model.WorkspaceResults]) -> str:
-    """What is known of the payload at the tray, from the results of the stage dynamics beside these."""
-    folder = stored.folder.parent / "dynamics" if stored.folder else None
-    summary = read_stage(folder, STAGES["dynamics"]).results.summary if folder and is_computed(folder) else None
-    lead = payload_text(summary, study.robot(stored.robot))
-    there = tr("What the arm can carry at the tray was not examined.")
-    if summary is None:
-        return joined([lead, there], " ")
-    return joined([lead, there], " ")
-
-
 def _context(robot: Robot, results: model.WorkspaceResults, placing: Placing | None, payload: str) -> dict[str, Any]:
     summary = results.summary
     return capability_context(robot, results, placing, payload) | {
         "section": Picture(
             workspace_figures.sections(robot, results),
-            tr("Sections across the slide of joint 1: density of the samples, and proven cells")
+            tr("Section across the slide of joint 1: proven cells")
             if summary.proof.bars
-            else tr("Side sections about axis 1: density of the samples, and proven cells"),
+            else tr("Side section about axis 1: proven cells"),
             _section_caption(summary),
         ),
     }
@@ -155,8 +156,8 @@ def _litres(low: float, high: float) -> str:
 
 def _section_caption(summary: model.WorkspaceSummary) -> str:
     return tr(
-        "What is empty on the right is proven unreachable all around (along a slide: all along); blank cells on the "
-        "left were merely not sampled. Of {checked} recorded samples, {inside} lie in a cell proven unreachable.",
+        "What is empty is proven unreachable all around (along a slide: all along). Of {checked} recorded samples, "
+        "{inside} lie in a cell proven unreachable.",
         checked=number(summary.proof.points_checked),
         inside=summary.proof.points_in_empty_cells,
     )

@@ -9,12 +9,10 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection, QuadMesh
-from matplotlib.colors import LogNorm
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator
 
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
@@ -22,31 +20,16 @@ from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.player.turning import ColourScale, Layer, Solids, turning_figure
+from er3a.pipeline.player.turning import ColourScale, Layer, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
-from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import BODY, HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
 from er3a.pipeline.viewing.side_view import Label, SeenArm, border_lines, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
 from er3a.workspace.voids import mesh as surface_of
-
-DENSITY = "YlGnBu"
-
-
-def masked(values: Reals) -> np.ma.MaskedArray:
-    """The values, zeros left out."""
-    return np.ma.masked_equal(values, 0)
-
-
-def log_norm(values: Reals) -> LogNorm:
-    """Colours from the 1 % to the 99.9 % quantile of what is not zero."""
-    low, high = np.quantile(values[values > 0], [0.01, 0.999])
-    return LogNorm(low, max(high, low * 10), clip=True)
-
 
 PROOF = {
     N_("reachable"): "#9ecae1",
@@ -57,33 +40,25 @@ PROOF = {
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 RATIO = 1.2  # of the labelled drawing, width over height
 STAND_M = 0.005  # half the width of a drawn stand
-_CLOUD_CELLS = 80
-PANEL_IN, AROUND_PANELS_IN = 4.9, 2.4  # a panel's width; what stands above and below, in
+PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
 
 def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
-    """Side sections about axis 1, or across it where it slides: what the samples show, and what is proven."""
+    """What is proven, in a side section about axis 1, or across it where it slides."""
     border, bars = results.border, results.summary.proof.bars
-    figure, (left, right) = new_figure(1, 2, width=11.5, height=9.0, sharey=True, sharex=True)
+    figure, axes = new_figure(width=7.5, height=9.0)
+    at_zero = skeleton(robot, np.zeros(robot.joints))
     if bars:
-        counts = _draw_cloud(left, bars, results.cloud.point_m)
-        _colour_bar(figure, counts, tr("samples per cm²"))
-        arm, across, up = _across(bars, skeleton(robot, np.zeros(robot.joints))), *slide_names(bars.frame)
-        left.set_title(tr("Samples, all positions along the slide overlaid"))
+        arm, across, up = _across(bars, at_zero), *slide_names(bars.frame)
     else:
-        mesh = _draw_density(left, results.summary.section_cell_m, results.section)
-        _colour_bar(figure, mesh, tr("samples per litre"))
-        arm = _about(results.summary.axis, skeleton(robot, np.zeros(robot.joints)))
+        arm = _about(results.summary.axis, at_zero)
         across, up = tr("distance from axis 1 (mm)"), tr("height along axis 1 (mm)")
-        left.set_title(tr("Samples, all azimuths overlaid"))
-    _draw_proof(right, results.proof, bars)
-    for axes in (left, right):
-        _draw_border(axes, border)
-        axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
-        equal_scale(axes, across, up if axes is left else "", fill=False)
-        if not bars:
-            axes.set_xlim(0, None)
-    right.set_title(tr("Proof"))
+    _draw_proof(axes, results.proof, bars)
+    _draw_border(axes, border)
+    axes.plot(*arm.T * 1000, color=INK, linewidth=2.4, marker="o", markersize=4, solid_capstyle="round")
+    equal_scale(axes, across, up, fill=False)
+    if not bars:
+        axes.set_xlim(0, None)
     handles: list[Artist] = [
         Line2D([], [], color=INK, marker="o", markersize=4, linewidth=2.4, label=tr("arm, all joints 0"))
     ]
@@ -91,36 +66,10 @@ def sections(robot: Robot, results: model.WorkspaceResults) -> Figure:
         handles.append(Line2D([], [], color=INK, label=tr("outline of what may be reached")))
     states = [state for kind, state in enumerate(PROOF) if not (bars and kind == WEDGE)]
     handles += [Patch(facecolor=PROOF[state], edgecolor=MUTED, label=tr(state)) for state in states]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    ratio = max(axes.dataLim.height / max(axes.dataLim.width, 1e-9) for axes in (left, right))
-    figure.set_figheight(float(np.clip(PANEL_IN * ratio + AROUND_PANELS_IN, 4.5, 9.0)))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    ratio = axes.dataLim.height / max(axes.dataLim.width, 1e-9)
+    figure.set_figheight(float(np.clip(PANEL_IN * ratio + AROUND_PANEL_IN, 4.5, 9.0)))
     return figure
-
-
-def _colour_bar(figure: Figure, shown: QuadMesh, label: str) -> None:
-    """Above both panels, so that they stay level with each other; at 1 and 3 of each decade."""
-    bar = figure.colorbar(
-        shown,
-        ax=figure.axes,
-        label=label,
-        location="top",
-        shrink=0.4,
-        anchor=(0.0, 0.0),
-        ticks=LogLocator(subs=(1, 3)),
-        format="%g",
-    )
-    bar.ax.minorticks_off()
-
-
-def _draw_density(axes: Axes, cell: float, section: model.SectionCells) -> QuadMesh:
-    density = section.samples / (np.pi * cell**2 * 2 * section.rho_m * 1e3)
-    middles = np.stack([section.rho_m, section.z_m], axis=1)
-    low = middles.min(axis=0) - cell / 2
-    index = np.rint((middles - low) / cell - 0.5).astype(int)
-    shown = np.zeros(tuple(index.max(axis=0) + 1))
-    shown[tuple(index.T)] = density
-    x, z = ((low[i] + np.arange(shown.shape[i] + 1) * cell) * 1000 for i in (0, 1))
-    return axes.pcolormesh(x, z, masked(shown).T, cmap=DENSITY, norm=log_norm(shown), rasterized=True)
 
 
 def _across(bars: model.Bars, points: Reals) -> Reals:
@@ -140,13 +89,6 @@ def slide_names(frame: model.SectionFrame) -> tuple[str, str]:
         tr("across the slide, along ({axis}) of the base (mm)", axis=x),
         tr("across the slide, along ({axis}) of the base (mm)", axis=z),
     )
-
-
-def _draw_cloud(axes: Axes, bars: model.Bars, points: Reals) -> QuadMesh:
-    x, z = _across(bars, points).T * 1000
-    counts, *edges = np.histogram2d(x, z, bins=_CLOUD_CELLS)
-    counts *= 100 / (np.diff(edges[0])[0] * np.diff(edges[1])[0])
-    return axes.pcolormesh(*edges, masked(counts).T, cmap=DENSITY, norm=log_norm(counts), rasterized=True)
 
 
 def _draw_proof(axes: Axes, proof: model.ProofCells, bars: model.Bars | None) -> None:
@@ -216,8 +158,8 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None)
     points, shade = 1000 * cloud.point_m[:CLOUD_POINTS], value / most
     body, faces = _reached_body(robot, results)
     layers = [
-        Layer(tr("reachable"), "surface", 1000 * body, PROOF["reachable"], faces=faces, cut=True),
-        Layer(tr("cloud"), "points", points, width=1.6, shade=shade, cut=True),
+        Layer(tr("reachable"), 1000 * body, PROOF["reachable"], faces=faces, cut=True),
+        Layer(tr("cloud"), points, width=1.6, shade=shade, cut=True),
     ]
     drawn: Counter[str] = Counter()
     for i, void in enumerate(results.summary.voids, start=1):
@@ -226,14 +168,10 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None)
             name = tr(_NAMES[void.kind], number=i)
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
             colour = _COLOURS[void.kind][drawn[void.kind] % 2]
-            layers.append(Layer(name, "surface", corners, colour, faces=faces))
+            layers.append(Layer(name, corners, colour, faces=faces))
             drawn[void.kind] += 1
-    at_zero = poses_at(robot, np.zeros(robot.joints))
-    solids = [Solids(tr("arm at 0"), drawn_arm(robot)["looks"]["checked"], at_zero, BODY)]
-    if scene:
-        solids.append(Solids(own_title(scene.title), drawn_scene(scene.solids, robot), np.eye(4)[None], SCENE_COLOUR))
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
-    return turning_figure({"": layers}, scale, solids=solids, cut_m=results.summary.axis.point_m[1])
+    return turning_figure(layers, scale, solids=surroundings(robot, scene), cut_m=results.summary.axis.point_m[1])
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -279,7 +217,8 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
     labels = [_void_label(number_, void) for number_, void in enumerate(summary.voids, start=1)]
     outlines = [_tray_corners(tray) for tray in trays]
     labels += [
-        Label(tray.name, corners[1], "tray", f"tray-{k}") for k, (tray, corners) in enumerate(zip(trays, outlines), 1)
+        Label(tray.name, corners[1], "tray other" if k > 1 else "tray", f"tray-{k}")
+        for k, (tray, corners) in enumerate(zip(trays, outlines), 1)
     ]
     seen = SeenArm(own_title(robot.title), far, "right", arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)

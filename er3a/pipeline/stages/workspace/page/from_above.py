@@ -1,0 +1,74 @@
+"""What axis 1 sweeps, what is around the arm, and trays, seen from above."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from markupsafe import Markup
+
+from er3a.collision.scene import Scene
+from er3a.numerics.arrays import Reals
+from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.page.tray import Tray
+from er3a.pipeline.viewing.drawn import outlines
+from er3a.robots.robot import Robot
+
+AROUND = 1.15  # of the reach, that is shown to each side
+BASE = 0.06  # of the reach: radius of the dot at axis 1
+
+
+def from_above(
+    robot: Robot, results: WorkspaceResults, scene: Scene | None, trays: Sequence[Tray], letters: float
+) -> Markup:
+    """The drawing as SVG, y to the left of x.
+
+    Parameters
+    ----------
+    trays : the first is the one that is proposed, others are outlines
+    letters : height of words, in parts of the reach
+
+    Returns
+    -------
+    drawing : colours come from the page's style sheet
+    """
+    reach = 1000 * results.summary.reach_m.furthest_from_axis
+    size, height = AROUND * reach, letters * reach
+    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, robot.lower[0], robot.upper[0]))]
+    words = []
+    for solid in scene.solids if scene else ():
+        if seen := [1000 * corners for corners in outlines(solid, [0, 1])]:
+            parts += [Markup('<polygon class="solid" points="{}"/>').format(_line(corners)) for corners in seen]
+            words.append(_word(np.concatenate(seen).mean(axis=0), height, own_title(solid.name), ""))
+    for number, tray in enumerate(trays):
+        (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
+        kind = "tray other" if number else "tray"
+        corners = np.array([[left, below], [right, below], [right, above], [left, above]])
+        parts.append(Markup('<polygon class="{}" points="{}"/>').format(kind, _line(corners)))
+        name = tray.name if len(trays) > 1 else tr("tray")
+        words.append(_word(np.array([(left + right) / 2, below - height]), height, name, kind))
+    parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
+    box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
+    said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
+    drawing = '<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>'
+    return Markup(drawing).format(box, said, Markup("").join([*parts, *words]))
+
+
+def _sector(radius: float, low: float, high: float) -> str:
+    """What an arm that turns from ``low`` to ``high`` (rad) sweeps."""
+    turn = np.linspace(low, min(high, low + 2 * np.pi), 73)
+    arc = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    centre = "" if high - low >= 2 * np.pi - 1e-6 else "M0,0 L"
+    return f"{centre or 'M'}{_line(arc)}Z"
+
+
+def _line(points: Reals) -> str:
+    return " ".join(f"{x:.0f},{-y:.0f}" for x, y in points)
+
+
+def _word(at: Reals, letters: float, text: str, kind: str) -> Markup:
+    return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
+        kind, at[0], -at[1], letters, text
+    )
