@@ -321,11 +321,12 @@ def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
     found : (N,), gets the distances, m; 0 inside
     """
     w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
+    first, second = int(0), int(1)  # noqa: RUF046, UP018  (see inner_kernel)
     for i in range(len(hull)):
         copy_values(hull[i], w[1 + i])
     for n in range(len(points)):
         copy_values(points[n], w[0])
-        found[n] = cores_distance(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)
+        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near)
 
 
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it

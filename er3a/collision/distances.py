@@ -132,8 +132,8 @@ def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Re
     start, radius, disc = layout.start, layout.radius, layout.disc
     for r in range(3):
         room[AXIS, r] = axis[r]
-    support(w, start[a], start[a + 1], disc[a], room, -1.0, 0)
-    support(w, start[b], start[b + 1], disc[b], room, 1.0, 1)
+    support(w, start[a], start[a + 1], disc[a], room, -1.0, int(0))  # noqa: RUF046, UP018  (see inner_kernel)
+    support(w, start[b], start[b + 1], disc[b], room, 1.0, int(1))  # noqa: RUF046, UP018
     gap = -radius[a] - radius[b]
     for r in range(3):
         gap += axis[r] * (room[0, r] - room[1, r])

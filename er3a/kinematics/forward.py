@@ -398,7 +398,7 @@ def _fill_start(rows: Reals, link: Reals) -> Axes:
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
-    return 1, 2, 1.0, 1.0
+    return int(1), int(2), 1.0, 1.0  # noqa: RUF046, UP018  (see inner_kernel)
 
 
 @inner_kernel

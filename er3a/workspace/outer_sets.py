@@ -311,7 +311,8 @@ def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> Non
                 rings.low + j * rings.size[1],
                 rings.low + (j + 1) * rings.size[1],
             )
-            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], 1, flags)
+            count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
+            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, flags)
 
 
 @kernel
