@@ -405,7 +405,7 @@ def _fill_start(rows: Reals, link: Reals) -> Axes:
 def _keep_axis(rows: Reals, axes: Axes, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
-        zs = rows[(4 * r + axes[1]) * BLOCK : (4 * r + axes[1] + 1) * BLOCK]
+        zs = rows[(4 * r + axes[1]) * BLOCK :]
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
             column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign

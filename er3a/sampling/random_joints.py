@@ -272,17 +272,8 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int,
     for i in range(CHUNK):
         sample = first + np.uint64(i)
         a, b, c, d = sample & _LOW, sample >> _32, block, np.uint64(draw)
-        # Written out: a call that stays a call keeps the loop from becoming vector instructions.
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(0))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(1))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(2))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(3))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(4))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(5))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(6))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(7))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(8))
-        a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(9))
+        for r in range(ROUNDS):  # unrolled by the compiler, so that the loop around it becomes vector instructions
+            a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(r))
         rows[i] = _unit(a >> _11)
         rows[CHUNK + i] = _unit(b >> _11)
         rows[2 * CHUNK + i] = _unit(c >> _11)
