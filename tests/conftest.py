@@ -29,6 +29,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
 from testing import chromium
+from testing.made_once import SHARED
 from testing.processes import run
 from testing.small_study import STUDY, fresh
 
@@ -156,6 +157,15 @@ def _ask_nobody() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _shared_by_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Name the folder that all processes of this test run share."""
+    own = tmp_path_factory.getbasetemp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(SHARED, str(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own))
+        yield
+
+
 @pytest.fixture(params=["er3_600", "er3a_c60_article"])
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Two of the project's robots in turn: one with offsets of links 1 and 3, one without."""
@@ -263,10 +273,9 @@ def copy_of_project(source_folder: Path, folder: Path) -> StudyRun:
 
 
 @pytest.fixture(scope="session")
-def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shared_folder() -> Path:
     """A folder that all processes of this test run share, with the project as it stood when the first one asked."""
-    own = tmp_path_factory.getbasetemp()
-    shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    shared = Path(os.environ[SHARED])
     with once(shared / "snapshot") as wanted:
         if wanted:
             copy_of_project(ROOT, shared / "snapshot")

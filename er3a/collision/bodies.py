@@ -156,8 +156,7 @@ class Bodies:
         distances : (k,), m, negative by the depth of overlap
         points : (k, 2, 3), m, world frame, where the bodies' cores are nearest
         """
-        found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
-        some_distances(self.layout, np.ascontiguousarray(q, float), np.asarray(pairs, np.int64), found, deep, near)
+        found, deep, near = some_distances(self.layout, np.ascontiguousarray(q, float), np.asarray(pairs, np.int64))
         for row in np.flatnonzero(deep):
             found[row] -= self._depth(q, int(pairs[row]))
         return found, near

@@ -311,21 +311,26 @@ def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: 
 
 
 @kernel
-def distances_from_hull(points: Reals, hull: Reals, found: Reals) -> None:
+def distances_from_hull(points: Reals, hull: Reals) -> Reals:
     """Distances of points from the hull of others.
 
     Parameters
     ----------
     points : (N, 3), m
     hull : (m, 3), m
-    found : (N,), gets the distances, m; 0 inside
+
+    Returns
+    -------
+    distances : (N,), m; 0 inside
     """
-    w, room, near = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3))
+    w, room, near, found = np.empty((len(hull) + 1, 3)), np.empty((ROOM, 3)), np.empty((2, 3)), np.empty(len(points))
+    first, second = int(0), int(1)  # noqa: RUF046, UP018  (see inner_kernel)
     for i in range(len(hull)):
         copy_values(hull[i], w[1 + i])
     for n in range(len(points)):
         copy_values(points[n], w[0])
-        found[n] = cores_distance(w, (0, 1, 1, len(w)), 0.0, 0.0, room, near)
+        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near)
+    return found
 
 
 RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it

@@ -132,8 +132,8 @@ def _apart_along(layout: Layout, w: Reals, a: int, b: int, room: Reals, axis: Re
     start, radius, disc = layout.start, layout.radius, layout.disc
     for r in range(3):
         room[AXIS, r] = axis[r]
-    support(w, start[a], start[a + 1], disc[a], room, -1.0, 0)
-    support(w, start[b], start[b + 1], disc[b], room, 1.0, 1)
+    support(w, start[a], start[a + 1], disc[a], room, -1.0, int(0))  # noqa: RUF046, UP018  (see inner_kernel)
+    support(w, start[b], start[b + 1], disc[b], room, 1.0, int(1))  # noqa: RUF046, UP018
     gap = -radius[a] - radius[b]
     for r in range(3):
         gap += axis[r] * (room[0, r] - room[1, r])
@@ -239,22 +239,27 @@ def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
 
 
 @kernel
-def some_distances(layout: Layout, q: Reals, pairs: Integers, found: Reals, deep: Flags, near: Reals) -> None:
+def some_distances(layout: Layout, q: Reals, pairs: Integers) -> tuple[Reals, Flags, Reals]:
     """Distances of some pairs of bodies in one arm pose.
 
     Parameters
     ----------
     q : (n,), rad or m
     pairs : (k,), numbers of pairs
-    found : (k,), gets the distances, m, as of :func:`pair_distance`
-    deep : (k,) bool, gets whether the cores overlap, so that a depth has to be added
-    near : (k, 2, 3), gets the closest points of the cores, m
+
+    Returns
+    -------
+    found : (k,), the distances, m, as of :func:`pair_distance`
+    deep : (k,) bool, whether the cores overlap, so that a depth has to be added
+    near : (k, 2, 3), the closest points of the cores, m
     """
     room, (T, w, middle) = np.empty((ROOM, 3)), unplaced(layout)
+    found, deep, near = np.empty(len(pairs)), np.empty(len(pairs), np.bool_), np.empty((len(pairs), 2, 3))
     place(layout, q, T, w, middle)
     for row in range(len(pairs)):
         a, b = layout.first[pairs[row]], layout.second[pairs[row]]
         found[row], deep[row] = pair_distance(layout, T, w, a, b, room, near[row], np.inf)
+    return found, deep, near
 
 
 @kernel

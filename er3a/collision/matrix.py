@@ -270,9 +270,7 @@ def _measured(
 ) -> tuple[Reals, Flags, Reals]:
     """Distances (k,), m, of pairs of bodies at joint values (n,), whether their cores overlap, and the nearest points
     (k, 2, 3) of these."""
-    found, deep, near = np.empty(len(pairs)), np.zeros(len(pairs), bool), np.empty((len(pairs), 2, 3))
-    some_distances(layout_of(robot, bodies, pairs), q, np.arange(len(pairs)), found, deep, near)
-    return found, deep, near
+    return some_distances(layout_of(robot, bodies, pairs), q, np.arange(len(pairs)))
 
 
 def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, float, int]:

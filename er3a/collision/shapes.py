@@ -235,9 +235,7 @@ def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: s
     points = placed(points, link)
     outside = np.full(len(points), np.inf)
     for k, corners, radius in _hulls(shapes, beside):
-        distance = np.empty(len(points))
-        distances_from_hull(points, placed(corners, k), distance)
-        outside = np.minimum(outside, distance - radius)
+        outside = np.minimum(outside, distances_from_hull(points, placed(corners, k)) - radius)
     return outside
 
 

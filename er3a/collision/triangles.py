@@ -403,6 +403,7 @@ def surface_distance(  # noqa: C901, PLR0912
     else:
         _turned(T, S, R, t)
     axis, close = np.empty((2, 3)), np.empty((2, 3))
+    start, other = int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
     for k in range(2):
         for r in range(3):
             close[k, r] = T[0, r] * near[k, 0] + T[1, r] * near[k, 1] + T[2, r] * near[k, 2]
@@ -428,7 +429,7 @@ def surface_distance(  # noqa: C901, PLR0912
                     points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
         if _apart_along(points, count, axis) - disc >= best or _beyond_plane(points, count, disc + best):
             continue
-        distance = cores_distance(points, (0, 3, 3, 3 + count), 0.0, disc, room, close)
+        distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close)
         if distance < best:
             best = distance
             _keep_axis(close, R, axis)

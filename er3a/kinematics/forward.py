@@ -398,14 +398,14 @@ def _fill_start(rows: Reals, link: Reals) -> Axes:
     for r in range(3):
         for c in range(4):
             rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
-    return 1, 2, 1.0, 1.0
+    return int(1), int(2), 1.0, 1.0  # noqa: RUF046, UP018  (see inner_kernel)
 
 
 @inner_kernel
 def _keep_axis(rows: Reals, axes: Axes, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
-        zs = rows[(4 * r + axes[1]) * BLOCK : (4 * r + axes[1] + 1) * BLOCK]
+        zs = rows[(4 * r + axes[1]) * BLOCK :]
         for i in range(BLOCK):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
             column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign

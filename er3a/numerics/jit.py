@@ -112,7 +112,8 @@ def inner_kernel(function: Function) -> Function:
 
     Notes
     -----
-    Leaving the entry out spares a sixth of the compiling.
+    Leaving the entry out spares a sixth of the compiling. A literal as an argument, alone or in a tuple, compiles the
+    function once more for that number; ``int(0)`` does not.
     """
     if not is_compiled():
         return function

@@ -217,9 +217,11 @@ class Draw:
 
 
 @inner_kernel
-def _round(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: int) -> Counter:
+def _round(
+    c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: np.uint64, k1: np.uint64, r: np.uint64
+) -> Counter:
     """One round of Philox4x32."""
-    k0, k1 = (k0 + np.uint64(r) * _W0) & _LOW, (k1 + np.uint64(r) * _W1) & _LOW
+    k0, k1 = (k0 + r * _W0) & _LOW, (k1 + r * _W1) & _LOW
     p0, p1 = _M0 * c0, _M1 * c2
     return (p1 >> _32) ^ c1 ^ k0, p1 & _LOW, (p0 >> _32) ^ c3 ^ k1, p0 & _LOW
 
@@ -238,7 +240,7 @@ def philox4x32(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: n
     words : four numbers of 32 bits, held in uint64
     """
     for r in range(ROUNDS):
-        c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1, r)
+        c0, c1, c2, c3 = _round(c0, c1, c2, c3, k0, k1, np.uint64(r))
     return c0, c1, c2, c3
 
 
@@ -270,17 +272,8 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int,
     for i in range(CHUNK):
         sample = first + np.uint64(i)
         a, b, c, d = sample & _LOW, sample >> _32, block, np.uint64(draw)
-        # Written out: a call that stays a call keeps the loop from becoming vector instructions.
-        a, b, c, d = _round(a, b, c, d, k0, k1, 0)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 1)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 2)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 3)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 4)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 5)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 6)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 7)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 8)
-        a, b, c, d = _round(a, b, c, d, k0, k1, 9)
+        for r in range(ROUNDS):  # unrolled by the compiler, so that the loop around it becomes vector instructions
+            a, b, c, d = _round(a, b, c, d, k0, k1, np.uint64(r))
         rows[i] = _unit(a >> _11)
         rows[CHUNK + i] = _unit(b >> _11)
         rows[2 * CHUNK + i] = _unit(c >> _11)

@@ -112,10 +112,11 @@ def _carried(arm: GeneralArm, k: int, rings: Rings, outer: Rings) -> Rings:
 @kernel
 def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, rings: Rings) -> None:
     """Mark the rings that the tool point is in as the last joint moves, for the azimuths that it turns through."""
-    z_0 = arm.tip[2] + (arm.lower[k] if arm.sliding[k] else 0.0)
-    z_1 = arm.tip[2] + (arm.upper[k] if arm.sliding[k] else 0.0)
-    a = azimuth + (0.0 if arm.sliding[k] else arm.lower[k]) - 1e-6
-    b = azimuth + (0.0 if arm.sliding[k] else arm.upper[k]) + 1e-6
+    a, b, z_0, z_1 = azimuth, azimuth, arm.tip[2], arm.tip[2]
+    if arm.sliding[k]:
+        z_0, z_1 = z_0 + arm.lower[k], z_1 + arm.upper[k]
+    else:
+        a, b = a + arm.lower[k], b + arm.upper[k]
     spread = max(0.0, rho - 1e-9), rho + 1e-9, z_0 - 1e-9, z_1 + 1e-9, 0.0, 0.0
     i_0, i_1, j_0, j_1 = _range_of(spread, rings)
     for i in range(i_0, i_1 + 1):
@@ -123,7 +124,7 @@ def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, 
             if alone:
                 rings.counts[i, j] = 0
             else:
-                rings.counts[i, j] = remove(rings.empty[i, j], rings.counts[i, j], a, b, True)
+                rings.counts[i, j] = remove(rings.empty[i, j], rings.counts[i, j], a - 1e-6, b + 1e-6, True)
 
 
 @inner_kernel
@@ -311,7 +312,8 @@ def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> Non
                 rings.low + j * rings.size[1],
                 rings.low + (j + 1) * rings.size[1],
             )
-            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], 1, flags)
+            count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
+            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, flags)
 
 
 @kernel

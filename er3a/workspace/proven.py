@@ -288,11 +288,6 @@ class Proven:
     R: Reals
     origin: Reals
 
-    @property
-    def settles(self) -> bool:
-        """Whether so little is left undecided that the voids found are those there are."""
-        return self.proof.width <= SETTLED
-
     def in_base(self, points: Reals) -> Reals:
         """Points from the frame about axis 1 to the base frame.
 

@@ -27,6 +27,7 @@ from er3a.references.quantities import PointCoordinate, QuantityAtPose
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import Robot
+from testing.made_once import made_once
 from testing.proposed_measurements import measured
 
 TRACKER = ("tracker", "measured", "tracker")
@@ -36,7 +37,7 @@ LENGTHS = ("a1", "a2", "a3", "d1", "d4", "d6")
 
 @cache
 def evidence(name: str) -> Evidence:
-    return er3a.evidence(load_robot(name))
+    return made_once(f"evidence_{name}", lambda: er3a.evidence(load_robot(name)))
 
 
 def about(robot: Robot, *only: str, extra: tuple[Reference, ...] = ()) -> Evidence:

@@ -15,6 +15,7 @@ from er3a.errors import InputError
 from er3a.files.hand_eye_file import grey_image
 from er3a.pipeline.working_folder import CODE_OF_LIBRARIES
 from testing.processes import run
+from testing.small_study import on_least_budgets
 from tests.conftest import ROOT
 
 LIBRARIES = """babel coal collada IPython jinja2 llvmlite matplotlib networkx numba numpy ompl open3d pandas PIL
@@ -23,7 +24,7 @@ snakemake_executor_plugin_b toppra trimesh typer xacro xacrodoc yaml yappi conft
 gettext random string decimal select code"""
 BEFORE_ER3A = ("re", "usercustomize")  # what Python itself loads, from where PYTHONPATH says
 PROGRAMS = ("git", "bash", "sh", "python", "python3", "rerun", "latex", "dvipng", "gs", "timeout", "snakemake", "gcc")
-SMALL = (ROOT / "config/small.yaml").read_text(encoding="utf-8")
+SMALL = on_least_budgets((ROOT / "config/small.yaml").read_text(encoding="utf-8"))
 ENTRY = """robots:
   er3_600: {targets: data/targets/er3_600.yaml, paths: data/paths/er3_600.yaml, stages: [validation, workspace]}
 

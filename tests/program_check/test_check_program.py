@@ -257,7 +257,7 @@ def test_a_start_of_another_length_is_refused(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("suffix", "count"), [(".src", 4000), (".pgm", 20_000)])
+@pytest.mark.parametrize(("suffix", "count"), [(".src", 4000), (".pgm", 5000)])
 def test_a_long_program_has_a_verdict_for_each_line(suffix, count, tmp_path):
     angle = np.linspace(0, 60 * np.pi, count)
     x, y = 400 + 30 * np.cos(angle), 30 * np.sin(angle)

