@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from er3a.finding import Finding, fact
+from er3a.finding import fact
 from er3a.numerics.arrays import Integers, Reals
 from er3a.pipeline.messages.say import texts
 from er3a.pipeline.results import Figure, Results, Summary, Verdict, write_results
@@ -27,7 +27,6 @@ TEXTS = texts({"made.hollow": "A hollow (空洞) of {volume_m3:.2f} m³.", "made
 class MadeSummary(Summary):
     """With a key of its own."""
 
-    verdict: Verdict[Finding]
     reach_m: tuple[float, ...]
 
 

@@ -516,12 +516,12 @@ def _stored_finding(verdict: Mapping[str, Any]) -> dict[str, Any]:
 def _parsed(path: Path, stored: dict[str, Any], kind: type[Results]) -> tuple[Any, Provenance]:
     own = {key: value for key, value in stored.items() if key not in ("format_version", "robot", "stage", "provenance")}
     verdict = own.get("verdict")
+    of_stage: Any = get_type_hints(kind)["summary"]
     try:
         if isinstance(verdict, dict):
             finding = _stored_finding(verdict)
             more = {key: verdict[key] for key in BESIDE if key in verdict}
             own["verdict"] = {"status": verdict["status"], "finding": finding, **more}
-        of_stage: Any = get_type_hints(kind)["summary"]
         return adapter(of_stage).validate_python(own), adapter(Provenance).validate_python(stored.get("provenance"))
     except ValidationError as error:
         first = error.errors()[0]
