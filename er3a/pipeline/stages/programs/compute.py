@@ -149,6 +149,8 @@ def _summary(entry: ProgramEntry, check: ProgramCheck, starts: Mapping[int, floa
         language=check.execution.program.language,
         outcome=OUTCOMES[check.level],
         expect=entry.expect,
+        complete=check.execution.complete,
+        ways=sum(each.entry == check.execution.program.entry for each in check.execution.endings),
         motions=len(levels),
         passed=levels.count("pass"),
         caution=levels.count("caution"),

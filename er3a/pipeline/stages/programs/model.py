@@ -72,6 +72,8 @@ class ProgramSummary:
     ----------
     file : as the study names it
     outcome : of what was checked; expect : the outcome that its file expects
+    complete : whether every way through it was followed to its end, or until it repeats
+    ways : through the program, by the sides of its branches
     motions : instructions of the text; passed, caution, failed : of these
     not_examined : lines of motions that were not followed each time, and of instructions that were not
     """
@@ -82,6 +84,8 @@ class ProgramSummary:
     language: LanguageName
     outcome: ProgramOutcome
     expect: ProgramOutcome | None
+    complete: bool
+    ways: int
     motions: int
     passed: int
     caution: int
