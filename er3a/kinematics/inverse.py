@@ -115,22 +115,28 @@ def _at_once(robot: Robot, T: Reals, q_ref: Reals | None) -> solutions.Solutions
     Nothing is checked before: what is no rigid transform has no row that solves it to rounding.
     """
     plain = _closed_form(robot)
-    if plain is None or not isinstance(T, np.ndarray) or T.dtype != float or T.shape != (4, 4):
+    if plain is None or not _is_array(T, (4, 4)):
         return None
-    q_ref = np.zeros(6) if q_ref is None else np.ascontiguousarray(q_ref, dtype=float)
-    if q_ref.shape != (6,):
-        return None
-    solver, arm, method = plain
-    x, marked, empty = solver.branches(np.ascontiguousarray(T[None]))
+    if q_ref is None:
+        q_ref = np.zeros(6)
+    elif not _is_array(q_ref, (6,)):
+        q_ref = checked_reference(robot, q_ref)
+    (solver, arm, method), pose = plain, T.copy()  # what kernels take: contiguous, writeable
+    x, marked, empty = solver.branches(pose[None])
     if marked[0]:
         return None
     rows, of, inside = np.empty((MOST_AT_ONCE, 6)), np.empty(MOST_AT_ONCE, np.int64), np.empty(MOST_AT_ONCE, bool)
-    count = regular_turns(arm, T, x[0], q_ref, (rows, of, inside))
+    count = regular_turns(arm, pose, x[0], q_ref.copy(), (rows, of, inside))
     if count <= 0:
         return None
     q, branch, fits = rows[:count].copy(), of[:count].copy(), inside[:count].copy()
     unsolved = () if empty is None else _unsolved(robot, empty[0][0], empty[1][0])
     return solutions.Solutions(robot, q, np.ones(count, bool), fits, branch, method, unsolved)
+
+
+def _is_array(values: Reals, shape: tuple[int, ...]) -> bool:
+    """Whether values need no conversion."""
+    return isinstance(values, np.ndarray) and values.dtype == np.float64 and values.shape == shape
 
 
 class _Found(NamedTuple):
