@@ -389,6 +389,12 @@ class _Table:
                 self.columns[name] = [cells[k] for _, cells in self.rows]
             elif own is None and name:
                 unused.append(name)
+                if {cells[k].strip() for _, cells in self.rows} == {"0", "1"} and "type" not in {
+                    *self.column,
+                    *self.header,
+                }:
+                    remedy = "Say so by --column: type, or - if it is not read"
+                    self._refuse(None, k, "0 and 1 may be types of joints", remedy)
         signs = [self._variable(row)[1] for row in range(len(self.rows))]
         if min(signs) < 0:
             if "direction" in self.header:

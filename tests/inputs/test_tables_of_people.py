@@ -208,6 +208,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "separators|--column",
         ),  # of no row
         ("a,alpha,d\n15,90,20\n30,0,0\n", "--length-unit"),
+        ("i,a (m),α (deg),d (m),t\n1,0,90,0.27,1\n2,0,0,0.2,0\n", "type"),
         ("i,α,d,θ,r\n1,90,270,θ1,300\n2,0,200,θ2,0\n", "--column"),  # Khalil's d is a
         ("i,a,alpha,d,theta\n1,a1,90,300,q1\n2,270,0,0,q2\n", "a1 = "),
         ("L(1) = Link([0.5 0.3 0 pi/2]);\nL(2) = Link([0 0 0.3 0]);", "offsets"),
