@@ -458,7 +458,7 @@ def _pieces(parts: Many[Segment | _Leg], sizes: Reals, blends: Reals) -> tuple[l
     """
     starts, ends = np.append(0.0, blends) / sizes, 1 - np.append(blends, 0.0) / sizes
     pieces: list[_Piece] = []
-    off, runs_on = [0.0 * _beside(parts[0], 0.0, 1.0, 0.0)[0]], []
+    off, runs_on = [0.0 * _near_corner(parts[0], 0.0, 1.0, 0.0)[0]], []
     for k, part in enumerate(parts):
         u = np.array([starts[k], ends[k]])
         if u[1] - u[0] > RUNS_ON:
@@ -468,15 +468,15 @@ def _pieces(parts: Many[Segment | _Leg], sizes: Reals, blends: Reals) -> tuple[l
             break
         onward, span = parts[k + 1], 2 * blends[k]
         if span > 0:
-            before = _beside(part, ends[k], sizes[k], -1 + ends[k])
-            after = _beside(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
+            before = _near_corner(part, ends[k], sizes[k], -1 + ends[k])
+            after = _near_corner(onward, starts[k + 1], sizes[k + 1], starts[k + 1])
             pieces.append(_Piece(k + 1, span, joining(before, after, span)))
             middle = 0.5 ** np.arange(POWERS) @ pieces[-1].coefficients
-            off.append(middle - _beside(onward, 0.0, 1.0, 0.0)[0])
+            off.append(middle - _near_corner(onward, 0.0, 1.0, 0.0)[0])
             runs_on.append(False)
         else:
-            ending = _beside(part, 1.0, sizes[k], 0.0)[1]
-            beginning = _beside(onward, 0.0, sizes[k + 1], 0.0)[1]
+            ending = _near_corner(part, 1.0, sizes[k], 0.0)[1]
+            beginning = _near_corner(onward, 0.0, sizes[k + 1], 0.0)[1]
             runs_on.append(np.linalg.norm(ending - beginning) < RUNS_ON * np.linalg.norm(ending))
     return pieces, np.array(off), np.array(runs_on, bool)
 
@@ -560,8 +560,8 @@ def _check(sizes: Reals, blends: Reals, unit: float, name: str) -> None:
             raise PathError(k + 1, problem + f"{most * unit:.4g} {name}")
 
 
-def _beside(part: Segment | _Leg, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
-    """Position and rotation vector of a part beside a corner, with derivatives by its path length."""
+def _near_corner(part: Segment | _Leg, share: float, size: float, turn: float) -> tuple[Reals, Reals, Reals]:
+    """Position and rotation vector of a part near a corner, with derivatives by its path length."""
     first, second = part.twists(np.array(share))
     value = np.concatenate([part.points(np.array(share)), turn * part.rotation])
     return value, first / size, second / size**2
