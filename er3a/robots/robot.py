@@ -24,7 +24,7 @@ from er3a.geometry.transforms import rot_x, rot_y, rpy_of, translation
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
 from er3a.robots.masses import Masses
 
-MAX_JOINTS = 10  # sampling has direction numbers of Sobol' for ten dimensions
+MAX_JOINTS = 10  # a sample has twelve random numbers (er3a/sampling/random_joints.py)
 Convention = Literal["standard", "modified"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 Grade = Literal["official", "measured", "cad", "export", "claim", "inferred"]

@@ -1,123 +1,26 @@
-"""Joint vectors that can be drawn again one by one: Philox4x32-10, a counter-based generator [1]_, or Sobol' points.
+"""Joint vectors that can be drawn again one by one: Philox4x32-10, a counter-based generator [1]_.
 
-*uniform*: the counter is (sample within the block, block, draw), the key is the seed, and the four words of one draw
+The counter is (sample within the block, block, draw), the key is the seed, and the four words of one draw
 give six numbers of 21 bits (steps below 0.0002 deg for a full turn); arms with more than six joints take a second draw.
 So the joint vector of sample n of block b depends on nothing else: not on what was drawn before it, nor on which
 process draws which block.
 
-*sobol*: the samples of all blocks, numbered through, are points of one Sobol' sequence in up to ten dimensions: evenly
-spread, each one computed from its number alone. Direction numbers are those of Joe and Kuo [2]_; a random digital
-shift, keyed by the seed, keeps every point uniformly distributed and the estimates unbiased (Owen [3]_).
-
 References
 ----------
 .. [1] J. K. Salmon, M. A. Moraes, R. O. Dror, D. E. Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11, 2011.
-.. [2] S. Joe, F. Y. Kuo, "Constructing Sobol sequences with better two-dimensional projections", SIAM J. Sci. Comput.
-   30, 2008 (file new-joe-kuo-6.21201).
-.. [3] A. B. Owen, "Quasi-Monte Carlo sampling", SIGGRAPH course, 2003.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from er3a.numerics.arrays import Integers, Reals, Singles, Words
+from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
-
-BITS = 40
-"""Of the number of a point: more than the study allows samples. Of a coordinate, the first 21 are used."""
-# Degree, coefficients and first numbers of dimensions 2 to 10.
-_JOE_KUO = (
-    (1, 0, (1,)),
-    (2, 1, (1, 3)),
-    (3, 1, (1, 3, 1)),
-    (3, 2, (1, 1, 1)),
-    (4, 1, (1, 1, 3, 3)),
-    (4, 4, (1, 3, 5, 13)),
-    (5, 2, (1, 1, 5, 5, 17)),
-    (5, 4, (1, 1, 5, 5, 5)),
-    (5, 7, (1, 1, 7, 11, 19)),
-)
-_CUT = np.uint64(BITS - 21)
-_ONE = np.uint64(1)
-
-
-def direction_numbers(dimensions: int) -> Words:
-    """Direction numbers of the Sobol' sequence by Joe and Kuo [2]_.
-
-    Parameters
-    ----------
-    dimensions : 1 to 10
-
-    Returns
-    -------
-    numbers : (dimensions, BITS), uint64, binary fractions of BITS digits; that of bit 0 of a point's number first
-    """
-    out = [[1 << (BITS - 1 - bit) for bit in range(BITS)]]
-    for degree, coefficients, start in _JOE_KUO[: dimensions - 1]:
-        row = [m << (BITS - 1 - bit) for bit, m in enumerate(start)]
-        for bit in range(degree, BITS):
-            value = row[bit - degree] ^ (row[bit - degree] >> degree)
-            for k in range(1, degree):
-                if coefficients >> (degree - 1 - k) & 1:
-                    value ^= row[bit - k]
-            row.append(value)
-        out.append(row)
-    return np.array(out, dtype=np.uint64)
-
-
-def shifted_directions(seed: int, dimensions: int) -> Words:
-    """Direction numbers of a Sobol' sequence with a random digital shift [3]_.
-
-    Parameters
-    ----------
-    seed : key of the generator of the shift, which is drawn by NumPy's Philox
-    dimensions : 1 to 10
-
-    Returns
-    -------
-    directions : (dimensions, BITS + 1), uint64, the shift as last column
-    """
-    random = np.random.Generator(np.random.Philox(key=seed))
-    shift = random.integers(0, 1 << BITS, size=(dimensions, 1), dtype=np.uint64)
-    return np.concatenate([direction_numbers(dimensions), shift], axis=1)
-
-
-@inner_kernel
-def fill_sobol(directions: Words, first: int, count: int, chunk: int, rows: Singles) -> None:
-    """Fill in the coordinates of successive Sobol' points. Kernel.
-
-    Parameters
-    ----------
-    directions : (dimensions, BITS + 1), of :func:`shifted_directions`
-    first : number of the first point within the sequence
-    count : how many points, ``chunk`` at most
-    chunk : place for each dimension in ``rows``
-    rows : one stretch of ``chunk`` numbers for each dimension, filled with numbers in (0, 1)
-    """
-    for k in range(directions.shape[0]):
-        # Neighbours in number differ by the directions of the trailing ones (Gray code): one step, one exclusive or.
-        value, number = directions[k, BITS], np.uint64(first)
-        gray = number ^ (number >> _ONE)
-        for bit in range(BITS):
-            if (gray >> np.uint64(bit)) & _ONE:
-                value ^= directions[k, bit]
-        for i in range(count):
-            rows[k * chunk + i] = (np.float32(np.int32(value >> _CUT)) + _HALF) * _STEP
-            bit = 0
-            number += _ONE
-            while bit < BITS - 1 and not (number >> np.uint64(bit)) & _ONE:
-                bit += 1
-            value ^= directions[k, bit]
-
-
-Sampling = Literal["uniform", "sobol"]
 
 Counter = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
@@ -149,38 +52,11 @@ class Draw:
     seed: int
     samples: int
     blocks: int
-    sampling: Sampling = "uniform"
 
     @property
     def sizes(self) -> Integers:
         """Samples (blocks,) of each block: as even as possible, the first ones one larger."""
         return self.samples // self.blocks + (np.arange(self.blocks) < self.samples % self.blocks)
-
-    def first(self, blocks: Integers) -> Integers:
-        """Numbers within the run of the first sample of blocks.
-
-        Parameters
-        ----------
-        blocks : (B,), blocks from 0
-
-        Returns
-        -------
-        numbers : (B,), from 0
-        """
-        return blocks * (self.samples // self.blocks) + np.minimum(blocks, self.samples % self.blocks)
-
-    def directions(self, joints: int) -> Words:
-        """What the Sobol' sequence of this run is computed from.
-
-        Parameters
-        ----------
-        joints : how many dimensions, n
-
-        Returns
-        -------
-        directions : (n, BITS + 1), see :func:`shifted_directions`; (0, 0) for uniform samples
-        """
-        return shifted_directions(self.seed, joints) if self.sampling == "sobol" else np.empty((0, 0), dtype=np.uint64)
 
     def opening_joints(self, robot: Robot, count: int) -> Reals:
         """Draw the first samples of each block again, about as many of each.
@@ -211,8 +87,8 @@ class Draw:
         q : (N, n), rad or m, within each joint's limits; a joint of zero range stays where it is
         """
         blocks, samples = np.asarray(blocks, dtype=np.int64), np.asarray(samples, dtype=np.int64)
-        out, first = np.empty((len(blocks), robot.joints)), self.first(blocks)
-        _again(np.uint64(self.seed), blocks, samples, first, self.directions(robot.joints), out)
+        out = np.empty((len(blocks), robot.joints))
+        _again(np.uint64(self.seed), blocks, samples, out)
         return robot.lower + out * (robot.upper - robot.lower)
 
 
@@ -283,18 +159,10 @@ def fill_uniform(seed: np.uint64, block: np.uint64, first: np.uint64, draw: int,
 
 
 @kernel
-def _again(
-    seed: np.uint64, blocks: Integers, samples: Integers, first: Integers, directions: Words, out: Reals
-) -> None:
+def _again(seed: np.uint64, blocks: Integers, samples: Integers, out: Reals) -> None:
     """Fill ``out`` (N, n) with the random numbers of single samples, in (0, 1)."""
     joints = out.shape[1]
-    rows = np.empty(UNIT_ROWS * CHUNK, dtype=np.float32)
     for n in range(blocks.shape[0]):
-        if directions.shape[0] > 0:
-            fill_sobol(directions, first[n] + samples[n], 1, CHUNK, rows)
-            for k in range(joints):
-                out[n, k] = rows[k * CHUNK]
-            continue
         sample = np.uint64(samples[n])
         key = seed & _LOW, seed >> _32
         for draw in range(2):

@@ -14,15 +14,15 @@ import scipy
 from numpy.typing import NDArray
 
 from er3a.kinematics.forward import forward, jacobian
-from er3a.numerics.arrays import Integers, Reals, Singles, Words
+from er3a.numerics.arrays import Integers, Reals, Singles
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import within
 from er3a.robots.robot import Robot
 from er3a.sampling.grid import Grid
 from er3a.sampling.point_chain import ROWS, PointChain, X, point_chain, points_about_axis_1, within_sums
-from er3a.sampling.random_joints import CHUNK, OF_A_DRAW, Draw, fill_sobol, fill_uniform
+from er3a.sampling.random_joints import CHUNK, OF_A_DRAW, Draw, fill_uniform
 
-_Block = tuple[np.uint64, int, int, int, Words]
+_Block = tuple[np.uint64, int, int]
 _Section = tuple[np.float32, np.float32, np.int32, Integers]
 
 PORTION = 1 << 22
@@ -47,9 +47,9 @@ def tally_blocks(robot: Robot, grid: Grid, draw: Draw, blocks: Iterable[int]) ->
     counts = np.zeros(grid.section_shape, dtype=np.int64)
     lowest, per_length = np.float32(grid.section_origin[1]), np.float32(1 / grid.section_cell)
     section = (lowest, per_length, np.int32(grid.section_shape[1]), counts.ravel())
-    chain, sobol = point_chain(robot), draw.directions(robot.joints)
-    for block, size, first in zip(chosen, draw.sizes[chosen], draw.first(chosen)):
-        drawn = (np.uint64(draw.seed), block, first, robot.joints, sobol)
+    chain = point_chain(robot)
+    for block, size in zip(chosen, draw.sizes[chosen]):
+        drawn = (np.uint64(draw.seed), block, robot.joints)
         for start in range(0, size, PORTION):
             _sample(drawn, start, min(size, start + PORTION), chain, section)
     return counts
@@ -69,16 +69,13 @@ def _section_cells(
 @kernel
 def _sample(draw: _Block, start: int, stop: int, chain: PointChain, section: _Section) -> None:
     """Draw samples ``start`` to ``stop`` of a block, and count them in the section."""
-    seed, block, first, joints, sobol = draw
+    seed, block, joints = draw
     lowest, per_length, n_z, counts = section
     rows, cells = np.empty(ROWS, dtype=np.float32), np.empty(CHUNK, dtype=np.int32)
     inside, limited = np.ones(CHUNK, dtype=np.bool_), chain.sums.shape[0] > 0
     for begin in range(start, stop, CHUNK):
-        if sobol.shape[0] > 0:
-            fill_sobol(sobol, first + begin, CHUNK, CHUNK, rows)
-        else:
-            for part in range((joints - 1) // OF_A_DRAW + 1):
-                fill_uniform(seed, np.uint64(block), np.uint64(begin), part, rows[part * OF_A_DRAW * CHUNK :])
+        for part in range((joints - 1) // OF_A_DRAW + 1):
+            fill_uniform(seed, np.uint64(block), np.uint64(begin), part, rows[part * OF_A_DRAW * CHUNK :])
         if limited:
             within_sums(chain.sums, rows, inside)
         points_about_axis_1(chain, rows)

@@ -85,10 +85,9 @@ def test_no_sample_leaves_the_bound_and_single_precision_follows_double(robot):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("sampling", ["uniform", "sobol"])
-def test_samples_keep_limits_of_sums(sampling):
+def test_samples_keep_limits_of_sums():
     arm = make_arm(coupling=FANUC, combined=(CombinedLimit((0, 1, 1, 0, 0, 0), -0.5, 0.7),))
-    draw = Draw(3, 40_000, 4, sampling)
+    draw = Draw(3, 40_000, 4)
     q = draw.opening_joints(arm, 40_000)
     assert within(arm, q).all()
     free = arm.replace(combined=())

@@ -163,7 +163,7 @@ def test_an_arm_without_a_spherical_wrist_gets_the_general_proof(tmp_path):
 # --- bad input ---
 
 
-@pytest.mark.parametrize(("field", "value"), [("samples", 0), ("cells_across", 4000), ("sampling", "dense")])
+@pytest.mark.parametrize(("field", "value"), [("samples", 0), ("cells_across", 4000)])
 def test_settings_that_make_no_sense_are_named(tmp_path, field, value):
     content = yaml.safe_load(Path("config/small.yaml").read_text(encoding="utf-8"))
     content["workspace"][field] = value

@@ -77,6 +77,6 @@ def two_link_arm(lower: list[float], upper: list[float]) -> Robot:
     )
 
 
-def tally_of(robot: Robot, samples: int, blocks: int, across: int, sampling: str = "uniform"):
-    grid, draw = make_grid(robot, across), Draw(SEED, samples, blocks, sampling)
+def tally_of(robot: Robot, samples: int, blocks: int, across: int):
+    grid, draw = make_grid(robot, across), Draw(SEED, samples, blocks)
     return grid, draw, tally_blocks(robot, grid, draw, range(blocks))

@@ -133,7 +133,6 @@ def _summary(
         verdict=judged.with_assumed_shapes(assumed if examined else None),
         figures=_figures(reach, voids, volume, settings.samples),
         samples=settings.samples,
-        sampling=settings.sampling,
         volume_m3=volume,
         proof=model.ProofSummary(
             len(proven.proof.cells),

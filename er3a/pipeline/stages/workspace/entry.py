@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -18,9 +18,8 @@ from er3a.pipeline.stages.stage import Stage, StudyFiles
 class WorkspaceSettings(StrictModel):
     """Monte Carlo budget and grid.
 
-    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints or (``sampling: sobol``) more evenly than
-    chance as points of a Sobol' sequence; ``cells_across`` cells span the bounding box's longest side,
-    the recording shows ``cloud_points``.
+    ``samples`` are drawn in ``blocks`` seeded blocks, uniform in the joints; ``cells_across`` cells span the bounding
+    box's longest side, the recording shows ``cloud_points``.
     The proof looks at four cells of the section for each of ``proof_cells``.
     """
 
@@ -29,7 +28,6 @@ class WorkspaceSettings(StrictModel):
     cells_across: Annotated[int, Field(ge=8, le=1024)]
     cloud_points: Annotated[int, Field(ge=1, le=300_000)]
     proof_cells: Annotated[int, Field(ge=1, le=10_000_000)] = 8000
-    sampling: Literal["uniform", "sobol"] = "uniform"
 
     @model_validator(mode="after")
     def _a_sample_per_block(self):

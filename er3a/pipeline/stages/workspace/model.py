@@ -17,7 +17,6 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, lists, vector
 from er3a.robots.robot import Robot
-from er3a.sampling.random_joints import Sampling
 from er3a.sampling.tally import ReachExtremes
 from er3a.workspace.capability import Capability, Overall
 from er3a.workspace.causes import VoidCause
@@ -359,7 +358,6 @@ class WorkspaceSummary(Summary):
     needs = ("reach", "limits", "self_collision")
 
     samples: int
-    sampling: Sampling
     volume_m3: Bounds
     proof: ProofSummary
     reach_m: ReachExtremes

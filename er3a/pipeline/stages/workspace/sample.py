@@ -17,10 +17,10 @@ def draw_of(study: Study) -> Draw:
 
     Returns
     -------
-    draw : seed, number of samples, blocks, and the rule; samples do not depend on how blocks are grouped into jobs
+    draw : seed, number of samples, and blocks; samples do not depend on how blocks are grouped into jobs
     """
     settings = study.section(WorkspaceSettings)
-    return Draw(study.seed, settings.samples, settings.blocks, settings.sampling)
+    return Draw(study.seed, settings.samples, settings.blocks)
 
 
 def sampled(study: Study, robot: Robot, grid: Grid, blocks: range) -> Integers:
