@@ -1,6 +1,4 @@
-"""The page of ``er3a calibrate``: errors before and after over the workspace, each joint's share, entries, terms, the
-corrected file beside the table before.
-"""
+"""The page of ``er3a calibrate``: errors before and after over the workspace, entries, terms, the corrected file."""
 
 from __future__ import annotations
 
@@ -15,7 +13,6 @@ from matplotlib.ticker import MaxNLocator
 from er3a.calibration.calibrate import Calibration, TermEstimate
 from er3a.calibration.cross_validation import HeldOutErrors, TriedTerm
 from er3a.calibration.observations import Measurement, PointObservations, observed
-from er3a.comparison.compare import compare
 from er3a.files.kept_files import sha256
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.numerics.arrays import Reals
@@ -31,14 +28,12 @@ from er3a.pipeline.messages.calibration import (
     term_kind,
     warning_texts,
 )
-from er3a.pipeline.messages.comparison import headline, layer_rows
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
 from er3a.pipeline.viewing.page import Picture, ShownFigure
-from er3a.pipeline.viewing.palette import JOINTS, MUTED
 from er3a.robots.robot import Robot
 
 BINS = 12
@@ -53,15 +48,12 @@ class MeasuredErrors:
 
     Attributes
     ----------
-    q : (P, n), deg or mm; xyz_mm : (P, 3), where the corrected table puts the points
+    xyz_mm : (P, 3), where the corrected table puts the points
     differences_mm : by ``before``, ``table`` and, if there are terms, ``model``: (P, 3), model minus measurement
-    lines : (P,), of the file
     """
 
-    q: Reals
     xyz_mm: Reals
     differences_mm: dict[str, Reals]
-    lines: Sequence[int]
 
     def distances_mm(self, model: str) -> Reals:
         """How far a model is off at each measured position.
@@ -94,7 +86,7 @@ def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Ca
 
     Returns
     -------
-    errors : mm, by the table before, the corrected one, and the model with terms if there are any; joints in deg or mm
+    errors : mm, by the table before, the corrected one, and the model with terms if there are any
     """
     seen = observed(measurements, robot)
     assert isinstance(seen, PointObservations)
@@ -105,8 +97,7 @@ def measured_errors(robot: Robot, measurements: Sequence[Measurement], found: Ca
     }
     if found.beyond:
         by_model["model"] = found.beyond.differences_mm(measurements)
-    poses = np.array([each.pose for each in measurements], dtype=float)
-    return MeasuredErrors(poses, 1000 * seen.positions(found.robot), by_model, [each.row for each in measurements])
+    return MeasuredErrors(1000 * seen.positions(found.robot), by_model)
 
 
 def write_calibration(
@@ -132,7 +123,6 @@ def write_calibration(
     """
     errors = measured_errors(robot, measurements, found)
     text = robot_text(robot_file(corrected))
-    comparison = compare(robot, found.robot, tolerance_mm=1e-3, tolerance_deg=1e-3)
     beside = held_back_warning(found, measurements, held_back)
     table = str(files[0]) if len(files) > 1 else robot.name
     with house_style():
@@ -152,16 +142,12 @@ def write_calibration(
             held=[say(why) for why in found.held],
             outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
             tried=_tried(found.tried, found.beyond.terms if found.beyond else found.ratios),
-            tried_for_file=_tried(found.tried_for_file, found.ratios),
-            layers=layer_rows(comparison),
-            headline=headline(comparison),
             compare_command=shlex.join(["er3a", "compare", table, f"{corrected.name}.yaml", "--html", "compared.html"]),
             corrected=text,
             without_terms=file_text(found),
             corrected_name=f"{corrected.name}.yaml",
             corrected_address=page.text_address(text),
             maps=_maps(errors),
-            by_joint=_by_joint(robot, errors),
         )
 
 
@@ -272,39 +258,3 @@ def _maps(errors: MeasuredErrors) -> Picture:
     caption = tr("Error over the workspace: above from above, below in the section through the base's axis; each "
                  "column has its own scale.")  # fmt: skip
     return Picture(figure, tr("Points of the workspace, coloured by their error before and after"), caption)
-
-
-def _by_joint(robot: Robot, errors: MeasuredErrors) -> Picture:
-    """Means of what remains along each joint's value, with two standard errors."""
-    columns = min(4, robot.joints)
-    rows = -(-robot.joints // columns)
-    figure, axes = new_figure(rows, columns, width=11, height=2.6 * rows, squeeze=False, sharey=True)
-    left = errors.differences_mm[errors.after]
-    for joint, ax in enumerate(axes.flat):
-        if joint >= robot.joints:
-            ax.set_axis_off()
-            continue
-        _binned(ax, errors.q[:, joint], left)
-        unit = "mm" if robot.slides[joint] else "deg"
-        ax.set_xlabel(bracketed(f"J{joint + 1}", tr(unit)))
-    for ax in axes[:, 0]:
-        ax.set_ylabel(bracketed(tr("model minus measured"), "mm"))
-    if axes[0, 0].get_legend_handles_labels()[0]:
-        axes[0, 0].legend()
-    caption = tr("What remains along each joint's value: means in bands with two standard errors; noise stays at 0.")
-    return Picture(figure, tr("Mean differences in x, y and z along the value of each joint"), caption)
-
-
-def _binned(ax, values: Reals, left: Reals) -> None:
-    ends = np.unique(np.quantile(values, np.linspace(0, 1, max(1, min(BINS, len(values) // MIN_IN_BIN)) + 1)))
-    band = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, max(len(ends) - 2, 0))
-    ax.axhline(0, color=MUTED, linewidth=0.8)
-    for c, name in enumerate(AXES):
-        own = [(values[band == k], left[band == k, c]) for k in range(max(len(ends) - 1, 1))]
-        kept = [(at.mean(), d[np.isfinite(d)]) for at, d in own if np.isfinite(d).sum() >= MIN_IN_BIN]
-        if kept:
-            at = np.array([middle for middle, _ in kept])
-            mean = np.array([d.mean() for _, d in kept])
-            error = np.array([2 * d.std(ddof=1) / np.sqrt(len(d)) for _, d in kept])
-            ax.plot(at, mean, color=JOINTS[c], label=name)
-            ax.fill_between(at, mean - error, mean + error, color=JOINTS[c], alpha=0.2, linewidth=0)
