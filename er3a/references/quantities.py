@@ -722,22 +722,6 @@ def section_of(T: Reals) -> Reals:
     return np.stack(parts, axis=-1) * MM
 
 
-def nearest_on_axis(T: Reals, joint: int, point_mm: Reals) -> Reals:
-    """Point of a joint's axis nearest to a given point.
-
-    Parameters
-    ----------
-    T : (..., m + 1, 4, 4), base frame, m
-    joint : from 1
-    point_mm : (3,), mm, base frame
-
-    Returns
-    -------
-    nearest : (..., 3), mm, base frame
-    """
-    return nearest_on_line(T[..., joint - 1, :3, 2], T[..., joint - 1, :3, 3] * MM, point_mm)
-
-
 def nearest_on_line(direction: Reals, on_line: Reals, point: Reals) -> Reals:
     """Points of lines nearest to a given point.
 

@@ -36,8 +36,6 @@ from er3a.pipeline.viewing.figures import equal_scale, house_style, new_figure
 from er3a.pipeline.viewing.page import Picture, ShownFigure
 from er3a.robots.robot import Robot
 
-BINS = 12
-MIN_IN_BIN = 3
 AXES = ("x", "y", "z")
 MODELS = {"before": N_("before"), "table": N_("robot file"), "model": N_("with terms")}
 
@@ -138,7 +136,7 @@ def write_calibration(
             figures=_figures(found, errors),
             errors=_errors(found, errors, held_back),
             entries=(entries := _entries(found)),
-            brief=[[name, correction, half, unit] for name, _, correction, half, _, unit, _ in entries],
+            brief=[[name, correction, half, unit] for name, _, correction, half, _, unit in entries],
             held=[say(why) for why in found.held],
             outliers=[(str(each.row), number(each.distance_mm, 3)) for each in found.outliers],
             tried=_tried(found.tried, found.beyond.terms if found.beyond else found.ratios),
@@ -211,7 +209,6 @@ def _entries(found: Calibration) -> list[list[str]]:
             fixed(each.half_width, 4),
             fixed(each.nominal + each.correction, 4),
             tr(each.unit),
-            tr("yes") if abs(each.correction) <= each.half_width else tr("no"),
         ]
         for each in found.estimates
     ]

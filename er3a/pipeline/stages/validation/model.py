@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, Self, get_args
+from typing import Literal, Self
 
 from er3a.diagnosis.conclusions import Conclusion, RankedHypothesis
 from er3a.files.robot_library import robot_of
@@ -53,7 +53,6 @@ CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
 
 
 Note = Finding | ClosedFormMissing
-MODEL_GROUPS: tuple[ModelGroup, ...] = get_args(ModelGroup)
 
 
 @dataclass(frozen=True)
