@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Literal, TypeVar, dataclass_transform, get_type_hints
@@ -362,8 +362,18 @@ def read_foundation(folder: Path) -> Foundation:
     """
     record = _record(folder)
     parts = [part["params"] for part in record["verdict"].get("params", {}).get("parts", ())]
-    unsettled = parts and not any(part["settled"] or part["up_to_signs"] for part in parts)
-    status: Status = record["verdict"]["status"]
+    return foundation_of(record["verdict"]["status"], parts)
+
+
+def foundation_of(status: Status, parts: Sequence[Mapping[str, Any]]) -> Foundation:
+    """What the validation stage's verdict is for those who rest on it: see :func:`read_foundation`.
+
+    Parameters
+    ----------
+    status : of the verdict
+    parts : what documents settle of each part of the table, as the verdict's finding has it
+    """
+    unsettled = bool(parts) and not any(part["settled"] or part["up_to_signs"] for part in parts)
     return "unsettled" if status == "caution" and unsettled else status
 
 

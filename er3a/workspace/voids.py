@@ -191,8 +191,10 @@ def is_flat(points: Reals) -> bool:
     -------
     flat : True also of fewer than four points
     """
+    if len(points) < 4:
+        return True
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return len(points) < 4 or bool(spread[2] <= _FLAT * spread[0])
+    return bool(spread[2] <= _FLAT * spread[0])
 
 
 def inside_hull(corners: Reals, points: Reals) -> Flags:

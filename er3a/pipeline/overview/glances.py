@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import singledispatch
 
 from er3a.pipeline.language import tr, with_unit
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import at_least, fixed, number
 from er3a.pipeline.stages.collision.model import CollisionResults
 from er3a.pipeline.stages.dynamics.model import DynamicsResults
 from er3a.pipeline.stages.inverse.model import InverseResults
@@ -53,7 +53,7 @@ def _(results: ValidationResults) -> Glance:
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
     holes = summary.enclosed_voids
-    litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
     return far, tr("hole {size}", size=litres) if holes else tr("no hole")
 

@@ -96,7 +96,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, entries, stored),
         keys=_keys(chosen, entries, stored),
-        steps=_steps(chosen, stored[chosen.name]),
+        steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
         outdated=_by_text(entries),
         tiles=[*_tiles(study, entries, stored)],
         article=study.article is not None,
@@ -228,8 +228,8 @@ def _figures(stored: Results) -> list[tuple[str, str]]:
     return shown
 
 
-def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
-    """What to confirm before the real arm moves, each with the page that says how."""
+def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, str]]:
+    """What to confirm before the real arm moves, each with the page that says how; jogging starts with joints at 0."""
     results = stored["validation"].results if "validation" in stored else None
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
@@ -238,7 +238,7 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     unsettled = evidence.unconfirmed if evidence else []
     steps = []
     if not evidence or any(column_of(entry) == "direction" for entry in unsettled):
-        panel = f"{chosen.name}/teach.html"
+        panel = f"{chosen.name}/teach.html#q={','.join(['0'] * joints)}"
         steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), panel))
     left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
     if left or not evidence:

@@ -40,6 +40,7 @@ from er3a.pipeline.results import (
     Provenance,
     Status,
     Stored,
+    foundation_of,
     read_status,
 )
 from er3a.pipeline.stages.registry import STAGES
@@ -92,7 +93,7 @@ SCRIPT_WORDS = {
     "enlarge": N_("enlarge"),
     "close": N_("close"),
     "filter": N_("Filter rows by"),
-    "find": N_("Find on this page"),
+    "find": N_("Find"),
     "findAnywhere": N_("Find on all pages"),
     "found": N_("{count} places"),
     "elsewhere": N_("{count} of them on other pages"),
@@ -248,7 +249,10 @@ class Head:
     def foundation(self) -> str:
         """What is known of the table that all rests on, in two words."""
         first = self.caveats.get("validation")
-        own = self.status if self.stage == "validation" else "pass"
+        own: str = "pass"
+        if self.stage == "validation":
+            parts = [part.params for part in self.finding.params.get("parts", ())]
+            own = foundation_of(self.status, parts)
         return tr(FOUNDATION_WORDS.get(first.status if first else own, FOUNDATION_WORDS["pass"]))
 
     @property

@@ -20,6 +20,7 @@ MARGIN = 0.06  # of the larger side
 WIDE, UPRIGHT = 1.68, 0.82  # width of a drawing, of its height
 NAME, LABEL, SCALE = 0.06, 0.3, 0.05  # of the height: room for names above, labels at the right, the scale below
 GAP = 0.04  # of the height, between two labels
+ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
@@ -147,15 +148,22 @@ def border_lines(arc: Integers, rho_m: Reals, z_m: Reals) -> list[Reals]:
 
     Parameters
     ----------
-    arc : (k,) number of the closed line that each point is of
+    arc : (k,) number of the line that each point is of, which is closed or goes from axis 1 to axis 1
     rho_m, z_m : (k,) its distance from the axis, and its height, m
 
     Returns
     -------
     rings : (m, 2) each, mm
     """
-    rings = [1000 * np.stack([rho_m[arc == each], z_m[arc == each]], axis=1) for each in np.unique(arc)]
-    return [ring * [side, 1] for ring in rings for side in (1, -1)]
+    rings: list[Reals] = []
+    for each in np.unique(arc):
+        ring = 1000 * np.stack([rho_m[arc == each], z_m[arc == each]], axis=1)
+        mirrored = ring * [-1, 1]
+        if ring[[0, -1], 0].max() < ON_AXIS_MM:
+            rings.append(np.concatenate([ring, mirrored[::-1]]))
+        else:
+            rings += [ring, mirrored]
+    return rings
 
 
 def _arm(arm: SeenArm, thick: float) -> Markup:

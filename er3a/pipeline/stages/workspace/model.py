@@ -62,7 +62,7 @@ class Border(Table):
 
     rho_m: Reals = column("distance from axis 1")
     z_m: Reals = column("height along axis 1")
-    arc: Integers = column("number of the closed line")
+    arc: Integers = column("number of the line")
 
 
 class VoidVertices(Table):
@@ -490,7 +490,7 @@ def border(proven: Proven) -> Border:
 
     Returns
     -------
-    border : closed lines in the section, m, numbered from 1; none for bars
+    border : lines in the section, m, numbered from 1, closed or from axis 1 to axis 1; none for bars
     """
     import contourpy
 
@@ -500,6 +500,10 @@ def border(proven: Proven) -> Border:
         rho, z = (np.linspace(low, end, OUTLINED) for low, end in zip(found.low, high))
         at_rho, at_z = np.meshgrid(rho, z)
         reached = ~proven.nowhere(at_rho.ravel(), at_z.ravel()).reshape(at_rho.shape)
+        # nothing around it is reached, so that lines end on axis 1 alone
+        rho = np.append(rho, 2 * rho[-1] - rho[-2])
+        z = np.concatenate([[2 * z[0] - z[1]], z, [2 * z[-1] - z[-2]]])
+        reached = np.pad(reached, ((1, 1), (0, 1)))
         lines += contourpy.contour_generator(rho, z, reached.astype(float)).lines(0.5)
     return Border.stacked(
         Border.of(rho_m=line[:, 0], z_m=line[:, 1], arc=number) for number, line in enumerate(lines, start=1)

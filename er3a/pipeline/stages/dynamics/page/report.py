@@ -160,8 +160,9 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     )
     power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
-    rows = [_row(motor, worst.peak, _moment_of(results, motor)) for motor in order]
-    still = [_held_row(motor, worst.holding) for motor in order if motor.holding >= LEAST]
+    longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
+    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order]
+    still = [_held_row(motor, longest) for motor in order if motor.holding >= LEAST]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),

@@ -79,7 +79,7 @@ def _answer(
     reach, volume = summary.reach_m, summary.volume_m3
     far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
     holes = summary.enclosed_voids
-    litres = with_unit(fixed(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
     rest = (
         tr("One hole, at least {size}.", size=litres)
         if len(holes) == 1

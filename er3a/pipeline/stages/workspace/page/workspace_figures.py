@@ -19,7 +19,7 @@ from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import at_least, fixed, number
 from er3a.pipeline.player.turning import ColourScale, Layer, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
@@ -225,9 +225,9 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
 
 
 def _void_label(number_: int, void: model.VoidSummary) -> Label:
-    name = tr("hole, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
+    name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
     if void.kind != "enclosed":
-        name = tr("pocket, {size} L", size=fixed(1000 * void.volume_m3.lower, 1))
+        name = tr("pocket, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
