@@ -23,6 +23,9 @@ TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 less is the business of a calibration and says nothing about the table."""
 
 
+NAMED = 10  # entries of a status in a line of a sheet
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """How far the tool may be off for an entry that counts as settled, anywhere in the joint ranges."""
@@ -138,7 +141,7 @@ class Evidence(ByValue, Displayed):
             f"Evidence of {self.robot.name}: {len(judged)} entries, "
             f"tolerance {shortly(self.tolerance.mm)} mm, {shortly(self.tolerance.deg)} deg",
             ("status", "count", "entries"),
-            tuple((status, str(len(found)), shortly(found)) for status, found in names.items() if found),
+            tuple((status, str(len(found)), shortly(found[:NAMED])) for status, found in names.items() if found),
             facts=(
                 f"table_meets: {shortly(self.table_meets)}; conflicts: {len(self.conflicts)}; "
                 f"readings: {len(self.readings)}, allowed: {len(self.allowed)}",

@@ -16,7 +16,7 @@ from er3a.files.path_file import load_paths
 from er3a.finding import Finding
 from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.scope import Open
-from er3a.pipeline.stages.trajectory.judgement import Judge, min_clearance
+from er3a.pipeline.stages.trajectory.judgement import MotionJudge, min_clearance
 from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PathVerdict
@@ -60,7 +60,7 @@ def programs_of(
     if reason := not_written(language, robot):
         raise InputError(None, None, reason, WITHOUT_JOINTS)
     bodies, limits = Bodies(robot, scene), assumed_limits(robot, CheckOptions())
-    judge = Judge(robot, bodies, PENETRATION_TOLERANCE, USUAL_NEAR, limits)
+    judge = MotionJudge(robot, bodies, PENETRATION_TOLERANCE, USUAL_NEAR, limits)
     task = PlanningTask(robot, bodies, PENETRATION_TOLERANCE, limits, SEED)
     listed = load_paths(file).paths
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)

@@ -130,7 +130,7 @@ def test_bad_envelopes_are_refused(tmp_path, change, field):
 
 
 def test_capsules_that_look_like_metres_are_a_warning(tmp_path):
-    with pytest.warns(InputWarning, match=r"envelopes.capsules\[0\].to_mm: .* mm may be metres"):
+    with pytest.warns(InputWarning, match=r"envelopes.capsules\[0\].to_mm: .* may be metres"):
         with_capsule(tmp_path, {"to_mm": [0, 0, 0.3]})
 
 

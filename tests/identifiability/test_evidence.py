@@ -242,7 +242,7 @@ def test_all_that_is_proposed_entered_in_files_settles_every_entry(tmp_path):
 def test_parts_say_how_far_the_tool_could_be_off():
     parts = {part.part: part for part in parts_found(evidence("er3_600"))}
     assert parts["zero_and_directions"].status == "open"
-    assert parts["zero_and_directions"].off.mm > 1300  # with joint 1 reversed, at 90 deg, stretched out
+    assert parts["zero_and_directions"].off_mm > 1300  # with joint 1 reversed, at 90 deg, stretched out
     assert {parts["limits"].status, parts["speeds"].status} <= {"weak", "consistent"}
     assert "speeds" not in {part.part for part in parts_found(evidence("er3a_c60"))}
 

@@ -405,9 +405,9 @@ def test_without_xacrodoc_the_extra_is_named(xacro, monkeypatch):
 @pytest.mark.parametrize(
     ("mesh", "told"),
     [
-        ("gone.stl", r"gone\.stl was not found; the link has no shape of it"),
-        ("torn.stl", r"torn\.stl: .*; the link has no shape of it"),
-        ("box.dae", r"box\.dae: can't be read without pycollada\. Install it: pip install 'er3a\[meshes\]'; the link"),
+        ("gone.stl", r"shape that is left out \(package:\S*gone\.stl is no file of a mesh"),
+        ("torn.stl", r"shape that is left out \(.*torn\.stl: holds no triangles"),
+        ("box.dae", r"box\.dae: can't be read without pycollada\. Install it: pip install 'er3a\[meshes\]'"),
     ],
 )
 def test_a_mesh_that_can_t_be_read_is_a_note(xacro, monkeypatch, mesh, told):

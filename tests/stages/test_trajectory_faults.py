@@ -35,7 +35,7 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.judgement import Judge, advised_end, in_order
+from er3a.pipeline.stages.trajectory.judgement import MotionJudge, advised_end, in_order
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
 from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
 from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
@@ -279,7 +279,7 @@ def test_too_fast_beside_what_is_expected_is_another_outcome_unless_it_follows_f
     study, robot = study_of(tmp_path, name, **changes), load_robot("er3_600")
     trajectory = study.section(TrajectorySettings)
     bodies = Bodies(robot, study.scene("er3_600", "trajectory"))
-    judge = Judge(robot, bodies, 0.001, near_singular(trajectory), limits_in(robot, trajectory))
+    judge = MotionJudge(robot, bodies, 0.001, near_singular(trajectory), limits_in(robot, trajectory))
     (each,) = study_motions(study, "er3_600", trajectory.checks_per_sample)
     assert judge.judged(each.motion).outcomes == came_to  # the stage of dynamics says the same
 

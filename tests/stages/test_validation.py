@@ -139,7 +139,7 @@ def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries)
     assert {"direction1", "direction4", "direction5", "direction6"} <= set(directions.open)
     assert found.off_mm > 100
     independent, consistency = found.counts
-    assert (independent.passed, independent.total) == (10, 10)
+    assert (independent.passed, independent.total) == (10, 11)  # one pair of sources disagrees
     assert consistency.total > independent.total
     assert found.next_measurement.entry in directions.open
     kinds = {(check.subject, check.source): check.kind for check in summaries["er3_600"].checks if check.source}

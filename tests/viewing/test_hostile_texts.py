@@ -85,7 +85,7 @@ def _with_hostile(value):
 
 
 def _with_hostile_columns(rows):
-    names = [name for name, spec in rows.columns().items() if name in FROM_FILES and not spec.kind]
+    names = [name for name, spec in rows.columns().items() if name in FROM_FILES and not spec.coded]
     columns = {name: [text and text + HOSTILE for text in getattr(rows, name)] for name in names}
     return replace(rows, **{name: np.array(texts, object) for name, texts in columns.items()})
 

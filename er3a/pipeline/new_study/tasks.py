@@ -30,7 +30,7 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import written_title
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.judgement import Judge
+from er3a.pipeline.stages.trajectory.judgement import MotionJudge
 from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, near_singular
 from er3a.planning.commands import CommandSource
 from er3a.robots.joint_limits import limit_margin, shown, within
@@ -321,7 +321,7 @@ class TaskSearch:
         except Er3aError:
             return False
         tolerance = self.settings.penetration_tolerance_mm / 1000
-        found = Judge(self.robot, self.bodies, tolerance, self.near, self.limits).judged(motion)
+        found = MotionJudge(self.robot, self.bodies, tolerance, self.near, self.limits).judged(motion)
         at, distance = found.along.closest, found.along.distance
         return found.verdict == "safe" and not found.events and bool(at < 0 or distance[at] >= self.margin)
 

@@ -23,7 +23,7 @@ from er3a.pipeline.scope import GAPS, OF_MOTIONS, Check, Coverage, Open, by_reas
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.trajectory.judgement import Judge, Judgement
+from er3a.pipeline.stages.trajectory.judgement import Judgement, MotionJudge
 from er3a.pipeline.stages.trajectory.motion import (
     Motion,
     PartOfProgram,
@@ -602,7 +602,7 @@ def _paths(
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
     bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
     tolerance = trajectory.penetration_tolerance_mm / 1000
-    judge = Judge(bodies.robot, bodies, tolerance, near_singular(trajectory), arm.limits)
+    judge = MotionJudge(bodies.robot, bodies, tolerance, near_singular(trajectory), arm.limits)
     found, skipped, rest = [], [], list[Open]()
     for each in study_motions(study, name, trajectory.checks_per_sample):
         rest += each.open if each.meant_safe else ()

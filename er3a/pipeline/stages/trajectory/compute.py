@@ -80,7 +80,7 @@ class AvoidanceTask:
     only : the strategy that the study asks for; None to compare all
     """
 
-    judge: judgement.Judge
+    judge: judgement.MotionJudge
     only: StrategyName | None
     planning: PlanningTask
     margin: float
@@ -439,7 +439,7 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     near, limits = near_singular(settings), limits_of(robot, settings)
     scene, assumed_margin = study.scene(name, "trajectory"), study.assumed_margin(name)
     tolerance = settings.penetration_tolerance_mm / 1000
-    judge = judgement.Judge(robot, Bodies(robot, scene), tolerance, near, limits)
+    judge = judgement.MotionJudge(robot, Bodies(robot, scene), tolerance, near, limits)
     only = None if settings.avoidance == "compare" else settings.avoidance
     planning = planning_of(robot, settings, judge.bodies, study.seed)
     margin = (assumed_margin if arm_shapes(robot).assumed else tolerance) + ROUNDED

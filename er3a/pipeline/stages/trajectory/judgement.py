@@ -78,7 +78,7 @@ class Judgement:
 
 
 @dataclass(frozen=True, eq=False)
-class Judge:
+class MotionJudge:
     """What motions of an arm are judged by, for all stages and programs.
 
     Attributes
@@ -253,7 +253,7 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-def last_safe_stop(judge: Judge, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
+def last_safe_stop(judge: MotionJudge, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
     """The last point from which a motion still stops with a margin (m) kept; None if it meets nothing, or keeps it
     nowhere.
 
@@ -306,7 +306,7 @@ def last_safe_stop(judge: Judge, motion: Motion, found: Judgement, margin: float
 
 
 def _margin_end(
-    judge: Judge, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
+    judge: MotionJudge, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
 ) -> float | None:
     """Up to when (s, ``last`` at most) a motion keeps a margin (m), proven; None if nowhere.
 
