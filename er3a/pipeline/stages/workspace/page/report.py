@@ -24,6 +24,7 @@ from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
 from er3a.pipeline.viewing.page import Picture, render_stage
+from er3a.pipeline.viewing.side_view import Kind
 from er3a.robots.robot import Robot
 
 LETTERS = 0.09  # of the reach, in the view from above: as large as others on a phone
@@ -50,7 +51,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         _answer(summary, placing, payload_key(known, robot), bare=bare),
         at_side=True,
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
-        labelled=_labelled(robot, results, scene, placing),
+        labelled=_labelled(robot, results, scene, placing, "wrong" if contradicted else "right"),
         pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
@@ -61,7 +62,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
 
 
 def _labelled(
-    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None
+    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None, kind: Kind
 ) -> Markup | None:
     """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
     if results.summary.proof.bars or results.summary.is_flat:
@@ -69,7 +70,7 @@ def _labelled(
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
     trays = [each.tray for each in placing.tried] if placing else []
-    return workspace_figures.labelled(robot, results, floor_mm, trays)
+    return workspace_figures.labelled(robot, results, floor_mm, trays, kind)
 
 
 def _answer(

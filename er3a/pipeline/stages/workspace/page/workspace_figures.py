@@ -25,7 +25,7 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
-from er3a.pipeline.viewing.side_view import Label, SeenArm, border_lines, side_view
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -197,13 +197,16 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
     return points
 
 
-def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, trays: Sequence[Tray]) -> Markup:
+def labelled(
+    robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, trays: Sequence[Tray], kind: Kind
+) -> Markup:
     """The arm in what it reaches, seen across axis 1, with names: reach, voids, floor, trays.
 
     Parameters
     ----------
     floor_mm : height of the floor in the base's frame; None where there is none
     trays : where they are placed, turned into view
+    kind : of the arm: in red where its table is wrong
 
     Returns
     -------
@@ -220,7 +223,7 @@ def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | No
         Label(tray.name, corners[1], "tray other" if k > 1 else "tray", f"tray-{k}")
         for k, (tray, corners) in enumerate(zip(trays, outlines), 1)
     ]
-    seen = SeenArm(own_title(robot.title), far, "right", arm, lines)
+    seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
