@@ -8,7 +8,7 @@ from er3a import forward, load_robot
 from er3a.collision.along import clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.matrix import collision_matrix
-from er3a.collision.pairs import LinkPair, Pair
+from er3a.collision.pairs import Pair
 from er3a.collision.scene import Cylinder, Scene, Sphere
 from er3a.geometry.transforms import transform
 from er3a.planning.moves import JointMove
@@ -50,7 +50,7 @@ def dense_distances(apart: Contacts, move: JointMove) -> tuple[np.ndarray, np.nd
 
 def links_of(pair: Pair) -> tuple[str, str] | None:
     """Names of two links of the arm that meet, as in the collision matrix."""
-    if not isinstance(pair, LinkPair):
+    if pair.code != "link_pair":
         return None
     first, second = ("base" if link == 0 else f"link_{link}" for link in (pair.first, pair.second))
     return first, second

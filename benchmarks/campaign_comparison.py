@@ -13,7 +13,7 @@ import numpy as np
 
 import er3a
 from er3a.comparison.compare import Comparison
-from er3a.files.arm_file import read_arm
+from er3a.files.robot_library import read_arm
 from er3a.formats.urdf_tree import read_chain
 from er3a.pipeline.messages.comparison import layer_rows
 from testing.arm_pairs import (
