@@ -280,10 +280,9 @@ def link_shapes(
             try:
                 made.append(urdf_tree.collision_shape(path, name, collision, place))
             except Er3aError as error:
-                of_urdf = isinstance(error, InputError) and error.file == str(
-                    path
-                )  # of xacro a file that is gone by now
-                said = f"{error.problem}. {error.remedy}" if of_urdf else error
+                said = str(error)
+                if isinstance(error, InputError) and error.file == str(path):  # of xacro a file that is gone by now
+                    said = f"{error.problem}. {error.remedy}"
                 notes.append(f"link {name} has a shape that is left out ({said})")
                 lost += [] if name in lost else [name]
         shapes += urdf_tree.with_capsules(made)

@@ -23,7 +23,7 @@ TOLERANCE_MM, TOLERANCE_DEG = 5.0, 0.5
 less is the business of a calibration and says nothing about the table."""
 
 
-NAMED = 10  # entries of a status in a line of a sheet
+NAMED = 6  # entries of a status in a line of a sheet
 
 
 @dataclass(frozen=True)
