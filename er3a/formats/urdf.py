@@ -282,7 +282,7 @@ def link_shapes(
             except Er3aError as error:
                 said = str(error)
                 if isinstance(error, InputError) and error.file == str(path):  # of xacro a file that is gone by now
-                    said = f"{error.problem}. {error.remedy}"
+                    said = f"{error.field}: {error.problem}. {error.remedy}"
                 notes.append(f"link {name} has a shape that is left out ({said})")
                 lost += [] if name in lost else [name]
         shapes += urdf_tree.with_capsules(made)
