@@ -31,6 +31,8 @@ from er3a.sampling.tally import ReachExtremes, search_reach, section_cells
 from er3a.workspace.proven import SETTLED, Proven, prove_robot
 from er3a.workspace.voids import Void, is_flat, pocket_block, proven_voids
 
+LOOKED_AT = 2000  # samples at least: a smaller cloud says neither how far the arm reaches nor whether it is flat
+
 
 def judge(voids: Sequence[Void], undecided: float, *, flat: bool = False) -> Verdict:
     """The stage's verdict.
@@ -65,11 +67,13 @@ def _size_and_place(void: Void) -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """The samples of a study: counts in the section's cells, and joints (n, 6), rad, of those that are kept."""
+    """The samples of a study: counts in the section's cells; joints (n, 6), rad, of the cloud, and of those that are
+    looked at one by one."""
 
     grid: Grid
     counts: Integers
     q_cloud: Reals
+    q_looked_at: Reals
 
 
 def compute(study: Study, name: str) -> model.WorkspaceResults:
@@ -109,7 +113,8 @@ def _samples(study: Study, robot: Robot) -> _Samples:
     settings = study.section(WorkspaceSettings)
     grid, draw = make_grid(robot, settings.cells_across), draw_of(study)
     counts = sampled(study, robot, grid, range(settings.blocks))
-    return _Samples(grid, counts, draw.opening_joints(robot, settings.cloud_points))
+    looked_at = max(settings.cloud_points, LOOKED_AT)
+    return _Samples(grid, counts, *(draw.opening_joints(robot, count) for count in (settings.cloud_points, looked_at)))
 
 
 def _summary(
@@ -124,11 +129,11 @@ def _summary(
     assumed: Finding | None,
 ) -> model.WorkspaceSummary:
     settings, grid = study.section(WorkspaceSettings), samples.grid
-    points = forward(robot, samples.q_cloud)[:, :3, 3]
+    points = forward(robot, samples.q_looked_at)[:, :3, 3]
     judged = judge(voids, proven.proof.width, flat=is_flat(points))
     examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
-    reach = search_reach(robot, grid, samples.q_cloud)
+    reach = search_reach(robot, grid, samples.q_looked_at)
     return model.WorkspaceSummary(
         verdict=judged.with_assumed_shapes(assumed if examined else None),
         figures=_figures(reach, voids, volume, settings.samples),
