@@ -15,7 +15,6 @@ const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const WORLD = translation(0, 0, 0);
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
-const NOTHING = 0.01; // of the greatest load: a bar that is left out where there is no room
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
 const place = document.getElementById("player");
@@ -132,7 +131,7 @@ function draw() {
   space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
     const css = touching.size ? page.touching : page.ink;
-    if (String(from) === String(to)) space.dot(from, css, 5, true);
+    if (String(from) === String(to) || (text && touching.size)) space.dot(scaled(add(from, to), 0.5), page.ink, 5, true);
     else space.line([from, to], ...(text ? [data.colours.mark, 3] : [data.colours.sight, 1.5, false]));
     if (text) space.word(text, scaled(add(from, to), 0.5), css);
   }
@@ -159,7 +158,7 @@ function tellLoads(poses) {
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
     const text = `J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`;
-    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > NOTHING * most, Math.abs(load) / most);
+    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, true, Math.abs(load) / most);
   });
 }
 
@@ -186,15 +185,18 @@ function tell() {
   clock.textContent = words.clock.replace("{t}", fixed(t, 3)).replace("{end}", fixed(end(), 3));
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
-  const text = now.map((event) => event.text).join(words.between) || motion.text;
+  const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
+  const text = now.map((event) => event.text).join(words.between) || ends;
   show(nowShown, text);
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
+  const was = stretches.find(({ classList }) => classList.contains("now"));
   for (const { dataset, classList } of stretches) {
     const [from, to] = [Number(dataset.from), Number(dataset.t)];
     classList.toggle("now", dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9);
   }
+  if (!was?.classList.contains("now")) listed();
 }
 
 /** The joints that fail at this moment, each with how gravely and what it would need; of several causes the gravest. */

@@ -23,7 +23,7 @@ from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
 from er3a.pipeline.viewing.page import packed_text
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, TOUCHING
-from er3a.pipeline.viewing.still import scene_still
+from er3a.pipeline.viewing.still import AZIMUTH, DISTANCE, ELEVATION, FIELD, WIDE, axes_of, scene_still, triangles_of
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -32,8 +32,8 @@ TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape
 TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
-SEEN = 0.64  # of the arm's size: what the picture is filled by
-WIDENED = 0.7  # of how far away a place is, that the picture then shows
+FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
+MARGIN = 1.08  # of the picture, of what is to be seen in it
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -59,6 +59,7 @@ WORDS = {
     "speed": N_("speed ×"),
     "time": N_("time of the motion"),
     "clock": N_("{t} of {end} s"),
+    "ends": N_("It may run up to here: {t} s."),
     "joints": N_(
         "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
         "then, with what they would need."
@@ -107,8 +108,7 @@ def player(
     known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
     data["opened"] = known or _worst(robot, shown)
     first = next(motion for motion in shown if motion.name == data["opened"][0])
-    places = [np.array(shape["T"])[:3, 3] for shape in added if not shape["frame"]]
-    _widened(data, [*places, *(np.array(mark.start) for mark in first.marks)])
+    _frame(data, (robot, *beside), shown)
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,
@@ -161,8 +161,6 @@ def _data(
         **drawn_arm(robot),
         "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in beside],
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
-        "length": SEEN * max(size, 0.7 * (size + float(np.ptp(bases, axis=0).max()))),
-        "target": (np.mean(bases, axis=0) + robot.base[:3, 2] * 0.35 * size).tolist(),
         "colours": {"mark": INK, "sight": REFERENCE, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
         "turned": TURNED,
@@ -175,16 +173,25 @@ def _data(
     }
 
 
-def _widened(data: dict[str, Any], places: Sequence[Reals]) -> None:
-    """Has the picture hold these places, (3,) each, m, too."""
-    if not places:
-        return
-    points = np.array(places)
-    far = points[np.linalg.norm(points - data["target"], axis=1).argmax()]
-    reach = float(np.linalg.norm(far - data["target"]))
-    if reach > data["length"]:
-        data["target"] = (data["target"] + 0.4 * (far - data["target"])).tolist()
-        data["length"] = max(data["length"], WIDENED * reach)
+def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[PlayedMotion]) -> None:
+    """Has the picture hold the arms on their ways and what is around them, as far as that is near."""
+    bodies = [shape for shape in data["scene"] if "pale" not in shape or "own" in shape]
+    placed = [(triangles_of(shape)[0], np.array(shape["T"])) for shape in bodies]
+    points = [corners @ T[:3, :3].T + T[:3, 3] for corners, T in placed]
+    for robot, *ways in zip(robots, *((motion.q, *motion.beside) for motion in motions)):
+        points += [poses_at(robot, q[k])[:, :3, 3] for q in ways for k in (0, len(q) // 2, -1)]
+    middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
+    seen = np.clip(np.concatenate(points), middle - far, middle + far)
+    axes = axes_of(AZIMUTH + (TURNED if len(robots) > 1 else 0.0), ELEVATION)
+    across = seen @ axes.T
+    middle = (across.min(axis=0) + across.max(axis=0)) / 2
+    across -= middle
+    length = data["size"]
+    for _ in range(4):  # what is nearer is larger
+        nearer = DISTANCE * length / (DISTANCE * length + across[:, 2])
+        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0)
+        length = MARGIN * 2 * FIELD / DISTANCE * max(width / WIDE, height)
+    data |= {"length": float(length), "target": (middle @ axes).tolist()}
 
 
 def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
@@ -216,7 +223,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
         picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
     for mark in motion.marks:
         if mark.t0 <= t <= mark.t1 and mark.start == mark.end:
-            picture.dot(np.array(mark.start), "fail" if colours else "ink", 5.0, rings=True)
+            picture.dot(np.array(mark.start), "ink", 5.0, rings=True)
             picture.word(mark.text, np.array(mark.start), "fail" if colours else "ink")
         elif mark.t0 <= t <= mark.t1:
             picture.line(np.array([mark.start, mark.end]), INK if mark.text else REFERENCE, 1.5)

@@ -17,7 +17,7 @@ const [canvas, key, knife] = ["canvas", ".key", ".cut"].map((name) => place.quer
 const [low, high] = data.box.map((corner) => scaled(corner, 1e-3)); // m
 const size = subtract(high, low);
 const middle = scaled(add(low, high), 0.5);
-const left = new Set(); // names of layers that are not shown
+const left = new Set(data.layers.filter(({ shades }) => shades).map(({ name }) => name)); // names of what is not shown
 let awaited = false;
 
 const space = new Space(canvas, middle, data.filled * Math.hypot(...size), refresh);
@@ -130,7 +130,7 @@ function ticksOf(from, to) {
 // The names of what is seen, each with its colour and a box to leave it out.
 for (const { name, shades, colour } of [...layers, ...solids]) {
   const [label, check, swatch] = ["label", "input", "i"].map((tag) => document.createElement(tag));
-  Object.assign(check, { type: "checkbox", checked: true });
+  Object.assign(check, { type: "checkbox", checked: !left.has(name) });
   check.addEventListener("change", () => {
     if (check.checked) left.delete(name);
     else left.add(name);

@@ -87,7 +87,8 @@ def side_view(
     low, high = low - margin, high + margin
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
-    high += [LABEL * tall if labels else 0.0, NAME * tall * len(arms)]
+    high[0] = max([high[0], *(label.at[0] + LABEL * tall for label in labels)])
+    high[1] += NAME * tall * len(arms)
     wide, tall = high - low
     spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
     low, high = low - spare, high + spare
@@ -138,9 +139,11 @@ def _line(points: Reals) -> str:
 
 
 def _reach(arm: SeenArm) -> Markup:
-    """What is reached, in one path, so that rings within rings are left empty."""
-    rings = " ".join(f"M{_line(ring)}Z" for ring in arm.reach_mm)
-    return Markup('<path class="reach {}" fill-rule="evenodd" d="{}"/>').format(arm.kind, rings)
+    """What is reached, in one path, so that rings within rings let the colour of holes through."""
+    rings = [_line(ring) for ring in arm.reach_mm]
+    holes = Markup("").join(Markup('<polygon class="hole {}" points="{}"/>').format(arm.kind, ring) for ring in rings)
+    outline = " ".join(f"M{ring}Z" for ring in rings)
+    return holes + Markup('<path class="reach {}" fill-rule="evenodd" d="{}"/>').format(arm.kind, outline)
 
 
 def border_lines(arc: Integers, rho_m: Reals, z_m: Reals) -> list[Reals]:

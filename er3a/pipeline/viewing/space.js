@@ -13,6 +13,7 @@ const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor
 const GRID_STEPS = 8; // lines of the floor on each side of the base
 const PALE = 0.36;
+const SMALL = 0.12; // radius of a body that its name would hide, in parts of what is seen
 const HIDDEN = 0.22; // of a line, where a body is before it
 const CREASE = 0.7; // rad between two faces: less is drawn as one that is curved
 const WIDE = 3; // a word, in its heights, about
@@ -23,6 +24,7 @@ const PLACES = [-1.5, -1, -0.5, 0, 0.5, 1, 1.5]
 const NEAR = 3.2; // heights: a word that is not needed is no farther from its point
 const WORD = 0.85; // height of words, in letters of the page
 export const ARM = 0.05; // about half the width of an arm, in parts of its size: words keep off it
+const SIDES = 1.2; // a picture that is less wide, of its height, is filled on its sides
 const FIELD = 1.9; // distance of the eye, in heights of the picture at the target
 
 const pen = document.createElement("canvas").getContext("2d");
@@ -129,7 +131,7 @@ export class Space extends Orbit {
   /** Starts a picture: lines and words of the one before are gone. */
   begin() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    Object.assign(this, { width, height, eye: eyeOf(this), taken: [], words: [], scale: Math.min(width, height) * FIELD });
+    Object.assign(this, { width, height, eye: eyeOf(this), taken: [], words: [], scale: Math.min(width / SIDES, height) * FIELD });
     this.letters = Number.parseFloat(getComputedStyle(this.canvas).fontSize);
     for (const stroke of this.strokes.children) stroke.geometry.dispose();
     this.strokes.clear();
@@ -214,7 +216,7 @@ export class Space extends Orbit {
    * Where no place is free, one that is not `needed` is left out. With a `share` a bar below the word is filled that far.
    */
   word(text, point, css = this.page.ink, needed = true, share = null) {
-    const size = WORD * this.letters;
+    const size = (share === null ? WORD : 1.1) * this.letters;
     pen.font = `600 ${size}px system-ui, sans-serif`;
     const [x, y] = this.seen(point);
     const [width, height] = [pen.measureText(text).width + 0.5 * size, (share === null ? 1.25 : 2.2) * size];
@@ -228,18 +230,20 @@ export class Space extends Orbit {
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
     if (Math.hypot(edge[0] - x, edge[1] - y) > height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
     const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };
-    for (const [part, fill] of share === null ? [] : [[1, this.page.halo], [share, this.page.accent]]) this.#svg("rect", { ...bar, width: part * width, fill });
+    for (const [part, fill] of share === null ? [] : [[1, this.page.grid], [share, this.page.accent]]) this.#svg("rect", { ...bar, width: part * width, fill });
     this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
   }
 
   /** The names of what is around the arm: those of `needed` in a colour of their own, then others as far as there is room. */
   names(meshes, needed = new Set()) {
-    const named = meshes.filter(({ shape }) => !shape.pale || needed.has(shape.name));
-    for (const { shape, matrixWorld, geometry } of named.sort((a, b) => needed.has(b.shape.name) - needed.has(a.shape.name))) {
+    const named = meshes.filter(({ shape }) => !shape.pale || needed.has(shape.name)).sort((a, b) => needed.has(b.shape.name) - needed.has(a.shape.name));
+    const places = named.map(({ geometry, matrixWorld }) => {
       if (!geometry.boundingSphere) geometry.computeBoundingSphere();
-      const asked = needed.has(shape.name);
-      this.word(shape.name, geometry.boundingSphere.center.clone().applyMatrix4(matrixWorld).toArray(), asked ? this.page.touching : this.page.ink, asked);
-    }
+      const { center, radius } = geometry.boundingSphere.clone().applyMatrix4(matrixWorld);
+      if (radius < SMALL * this.length) this.keepClear([center.toArray()], radius);
+      return center.toArray();
+    });
+    named.forEach(({ shape: { name } }, k) => this.word(name, places[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name)));
   }
 
   #light() {

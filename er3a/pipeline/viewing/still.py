@@ -25,6 +25,7 @@ from er3a.pipeline.viewing.palette import GRID, rgb
 WIDTH, HEIGHT = 960, 540  # px
 FINE = 2  # px of the painting along one of the picture
 FIELD = 1.9  # as in space.js: distance of the eye, in heights of the picture at the target
+WIDE = 1.2  # as in space.js: width over height of a picture that is filled on both sides
 DISTANCE, AZIMUTH, ELEVATION = 3.7, -1.0, 0.35  # as in orbit.js
 LAMP = np.array([0.9, -1.3, 2.4]) / np.linalg.norm([0.9, -1.3, 2.4])
 AMBIENT, SHADOW, PALE = 0.62, 0.16, 0.28
@@ -38,6 +39,13 @@ FLAT = N_("This browser has no WebGL: the picture shows how the page opened.")
 QUALITY = 80  # of the WebP file
 
 
+def axes_of(azimuth: float, elevation: float) -> Reals:
+    """The directions to the right, down and away, (3, 3), of an eye that looks from there, rad."""
+    ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
+    back, right = np.array([ca * ce, sa * ce, se]), np.array([-sa, ca, 0.0])
+    return np.stack([right, -np.cross(back, right), -back])
+
+
 class Still:
     """A picture as it is being made; points in m, colours ``#rrggbb``."""
 
@@ -49,10 +57,8 @@ class Still:
         elevation: float = ELEVATION,
         floor: float | None = None,
     ) -> None:
-        ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
-        back, right = np.array([ca * ce, sa * ce, se]), np.array([-sa, ca, 0.0])
-        self.axes = np.stack([right, -np.cross(back, right), -back])  # to the right, down and away
-        self.eye, self.floor = np.asarray(target) + DISTANCE * length * back, floor
+        self.axes = axes_of(azimuth, elevation)
+        self.eye, self.floor = np.asarray(target) - DISTANCE * length * self.axes[2], floor
         shape = (HEIGHT * FINE, WIDTH * FINE)
         self.bodies, self.shadow = ((np.zeros((*shape, 4), "f4"), np.zeros(shape, "f4")) for _ in range(2))
         self.words: list[Markup] = []

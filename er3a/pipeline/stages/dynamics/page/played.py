@@ -51,7 +51,7 @@ def _size(torque: float, unit: Unit) -> str:
 
 def _peak(load: JointLoad) -> str:
     return tr(
-        "J{joint} at most {peak} {unit} on this path",
+        "J{joint} peaks: {peak} {unit}",
         joint=load.joint,
         peak=measured(load.peak, None, load.unit),
         unit=load.unit,

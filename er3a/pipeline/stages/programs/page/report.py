@@ -33,7 +33,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -70,14 +70,13 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     shown = {motion.name: motion for motion in played if len(motion.t)}
     known = {each.name: each for each in summary.programs}
     ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}
-    shares = dict(zip(ends, lengths(ends.values())))
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
     bad = {
-        each.name: row_of(each, shown.get(each.name), ends[each.name], shares[each.name], notes[each.name])
+        each.name: row_of(each, shown.get(each.name), ends[each.name], 1.0, notes[each.name])
         for each in wrong
     }
     sound = [
-        ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), shares[name])
+        ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), 1.0)
         for name, each in known.items()
         if name not in bad
     ]

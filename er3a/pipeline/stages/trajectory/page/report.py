@@ -116,20 +116,12 @@ def answer_of(
     motions, known = {motion.name: motion for motion in played}, {path.name: path for path in summary.paths}
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
-    fault_rows = {
-        path.name: row_of(
-            wrong[path.name],
-            motions.get(path.name),
-            path.duration_s,
-            shares[path.name],
-            met[repaired(path)].text if path.chosen and repaired(path) in met else "",
-        )
-        for path in paths
-        if path.name in wrong
-    }
-    for name in (name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met):
-        fault_rows[name] = replace(fault_rows[name], fix=None)
-    mended = [row for path in paths if path.chosen and (row := fault_rows.get(path.name))]
+    hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
+    fault_rows = {}
+    for path in (path for path in paths if path.name in wrong):
+        row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
+        fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
+    mended = [fault_rows[path.name] for path in paths if path.chosen and path.name in {*wrong} - {*hindered}]
     others = [path for path in paths if path.name not in wrong]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
@@ -148,8 +140,8 @@ def answer_of(
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
-    fix = fix_of(fault for fault in wrong.values() if not fault.instead or fault.instead[0] not in met)
-    return Answer(headline, rest, _in_short(paths, wrong), keys, groups, fix)
+    fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
+    return Answer(headline, rest, _in_short(paths, wrong, len(mended)), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
@@ -158,9 +150,8 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int
     return not path.collisions, len(path.outcomes)
 
 
-def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault]) -> str:
-    """What becomes of the paths that may not be run as they are."""
-    mended = sum(path.name in wrong and bool(path.chosen) for path in paths)
+def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault], mended: int) -> str:
+    """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
     early = sum(path.name in wrong and not path.chosen and path.sound_end is not None for path in paths)
     if not wrong:
         return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +23,8 @@ from er3a.robots.robot import Robot
 
 WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
-SIGHT = 0.1  # of the farthest distance, how far the drawn pyramid reaches: a longer one would be before the arm
-CAMERA_M = (0.05, 0.05, 0.04)
+SIGHT = 0.2  # of the farthest distance, how far the drawn pyramid reaches: a longer one would be before the arm
+CAMERA_M = (0.09, 0.07, 0.07)
 SIDES = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]  # of a pyramid, its top first
 CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
 
@@ -31,7 +32,7 @@ CONE = [*SIDES, *(side[::-1] for side in SIDES)]  # seen from both sides
 def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[PlayedMotion]:
     """The way to each object and away from it, with the arm before the approach drawn pale; the arm where it waits for
     an object that it does not grasp."""
-    home, sight = meant(robot, np.array(task.home_deg)), _sight(task, results.summary)
+    home, sight = meant(robot, np.array(task.home_deg)), _sight(results.summary)
     found = [_motion(robot, results, each, home) for each in results.summary.objects]
     return [
         replace(motion, marks=[*motion.marks, *(replace(edge, t1=float(motion.t[-1])) for edge in sight)])
@@ -41,9 +42,9 @@ def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[Play
 
 def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
     rows = results.ways.take(results.ways.target == each.name)
-    x, y, z = (value / 1000 for value in each.xyz_mm)
     if each.grasp is None or not len(rows):
-        mark = Mark(0.0, 1.0, (x, y, z), (x, y, z), "")
+        place = _metres(each.xyz_mm)
+        mark = Mark(0.0, 1.0, place, place, "")
         event = PlayedEvent(0.0, 1.0, refusal_text(each), "fail")
         return PlayedMotion(each.name, "", np.array([0.0, 1.0]), np.tile(home, (2, 1)), [event], [mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
@@ -96,16 +97,18 @@ def _corners(task: VisionFile, far: float) -> Reals:
     return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
 
 
-def _sight(task: VisionFile, summary: VisionSummary) -> list[Mark]:
-    """The edges of what a fixed camera sees, down to the farthest object; none of a camera that moves."""
+def _sight(summary: VisionSummary) -> list[Mark]:
+    """The line from a fixed camera to each object; none of a camera that moves."""
     found = summary.calibration
-    if found is None or found.setup != "eye_to_hand" or not summary.objects:
+    if found is None or found.setup != "eye_to_hand":
         return []
-    T = placed(found.hand_eye)
-    depths = (np.array([each.xyz_mm for each in summary.objects]) / 1000 - T[:3, 3]) @ T[:3, 2]
-    corners = _corners(task, float(depths.max())) @ T[:3, :3].T + T[:3, 3]
-    ends = [*zip([T[:3, 3]] * 4, corners), *zip(corners, np.roll(corners, -1, axis=0))]
-    return [Mark(0.0, 0.0, tuple(start.tolist()), tuple(end.tolist()), "") for start, end in ends]
+    start = _metres(found.hand_eye.xyz_mm)
+    return [Mark(0.0, 0.0, start, _metres(each.xyz_mm), "") for each in summary.objects]
+
+
+def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (value / 1000 for value in xyz_mm)
+    return x, y, z
 
 
 def _object(each: ObjectResult) -> Shape:

@@ -41,14 +41,17 @@ def from_above(
     for solid in scene.solids if scene else ():
         if seen := [1000 * corners for corners in outlines(solid, [0, 1])]:
             parts += [Markup('<polygon class="solid" points="{}"/>').format(_line(corners)) for corners in seen]
-            words.append(_word(np.concatenate(seen).mean(axis=0), height, own_title(solid.name), ""))
+            around = np.concatenate(seen)
+            at = np.array([around[:, 0].mean(), around[:, 1].max() + BASE * reach])
+            words.append(_word(at, height, own_title(solid.name), ""))
     for number, tray in enumerate(trays):
         (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
         kind = "tray other" if number else "tray"
         corners = np.array([[left, below], [right, below], [right, above], [left, above]])
         parts.append(Markup('<polygon class="{}" points="{}"/>').format(kind, _line(corners)))
         name = tray.name if len(trays) > 1 else tr("tray")
-        words.append(_word(np.array([(left + right) / 2, below - height]), height, name, kind))
+        at = np.array([(left + right) / 2, above + BASE * reach if number else below - height])
+        words.append(_word(at, height, name, kind, f"tray-{number + 1}"))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
@@ -68,7 +71,7 @@ def _line(points: Reals) -> str:
     return " ".join(f"{x:.0f},{-y:.0f}" for x, y in points)
 
 
-def _word(at: Reals, letters: float, text: str, kind: str) -> Markup:
-    return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
-        kind, at[0], -at[1], letters, text
+def _word(at: Reals, letters: float, text: str, kind: str, name: str = "") -> Markup:
+    return Markup('<text class="{}" id="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
+        kind, name, at[0], -at[1], letters, text
     )

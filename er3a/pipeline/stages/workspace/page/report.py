@@ -69,7 +69,7 @@ def _labelled(
         return None
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
-    trays = [each.tray for each in placing.tried] if placing else []
+    trays = [placing.tray] if placing else []
     return workspace_figures.labelled(robot, results, floor_mm, trays, kind)
 
 
@@ -80,11 +80,11 @@ def _answer(
     reach, volume = summary.reach_m, summary.volume_m3
     far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
     holes = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), "L"), "L")
     rest = (
-        tr("One hole, at least {size}.", size=litres)
+        tr("One hole, ≥ {size}.", size=litres)
         if len(holes) == 1
-        else tr("{count} holes, at least {size}.", count=len(holes), size=litres)
+        else tr("{count} holes, ≥ {size}.", count=len(holes), size=litres)
     )
     heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
     keys = [
@@ -108,7 +108,7 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}")
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}" if void.kind == "enclosed" else "#space")
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:

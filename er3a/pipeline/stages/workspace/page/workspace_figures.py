@@ -217,20 +217,16 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    labels = [_void_label(number_, void) for number_, void in enumerate(summary.voids, start=1)]
+    holes = [(number_, void) for number_, void in enumerate(summary.voids, start=1) if void.kind == "enclosed"]
+    labels = [_hole_label(number_, void) for number_, void in holes]
     outlines = [_tray_corners(tray) for tray in trays]
-    labels += [
-        Label(tray.name, corners[1], "tray other" if k > 1 else "tray", f"tray-{k}")
-        for k, (tray, corners) in enumerate(zip(trays, outlines), 1)
-    ]
+    labels += [Label(tray.name, corners[1], "tray") for tray, corners in zip(trays, outlines)]
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
-def _void_label(number_: int, void: model.VoidSummary) -> Label:
-    name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
-    if void.kind != "enclosed":
-        name = tr("pocket, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
+def _hole_label(number_: int, void: model.VoidSummary) -> Label:
+    name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, "L"))
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
