@@ -6,14 +6,13 @@
  * parts of its picture; without a motion of its own a panel shows that of the figure's `data-play`.
  */
 
-import { add, column, moved, scaled, subtract, translation } from "er3a/algebra";
+import { add, column, moved, scaled, subtract } from "er3a/algebra";
 import { constantLinks } from "er3a/kinematics";
-import { alongArm, Arm, ARM, Space } from "er3a/space";
+import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
-const WORLD = translation(0, 0, 0);
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
 const CLOSED = 0.02; // of the arm's size: a motion ends where it starts
 
@@ -191,12 +190,11 @@ function tell() {
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
   for (const plot of plots) plot(motion.name, t);
-  const was = stretches.find(({ classList }) => classList.contains("now"));
   for (const { dataset, classList } of stretches) {
     const [from, to] = [Number(dataset.from), Number(dataset.t)];
     classList.toggle("now", dataset.play === motion.name && t >= from - 1e-9 && t <= to + 1e-9);
   }
-  if (!was?.classList.contains("now")) listed();
+  listed();
 }
 
 /** The joints that fail at this moment, each with how gravely and what it would need; of several causes the gravest. */
@@ -326,7 +324,6 @@ for (const link of document.querySelectorAll("[data-t]")) {
     goTo(link.dataset.play, Number(link.dataset.t));
     dock(link.getBoundingClientRect().bottom);
     tell();
-    listed();
   });
 }
 addEventListener("resize", refresh);
@@ -340,7 +337,6 @@ function answer(query) {
   goTo(query.get("play"), Number(query.get("t")));
   dock();
   tell();
-  listed();
   return true;
 }
 

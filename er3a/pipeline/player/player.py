@@ -10,7 +10,6 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from markupsafe import Markup
 
@@ -21,14 +20,13 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
 from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
-from er3a.pipeline.viewing.page import packed_text
+from er3a.pipeline.viewing.page import packed_text, page_environment
 from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, TOUCHING
 from er3a.pipeline.viewing.still import AZIMUTH, DISTANCE, ELEVATION, FIELD, WIDE, axes_of, scene_still, triangles_of
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
-TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
 TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
@@ -48,35 +46,6 @@ LOOKS = {
     "both": N_("both"),
 }
 """What an arm with meshes can be shown by; see ``viewing/drawn.py``."""
-WORDS = {
-    "looks": N_("arm drawn as"),
-    "player": N_("Motion playback"),
-    "motion": N_("motion"),
-    "play": N_("Play"),
-    "pause": N_("Pause"),
-    "back": N_("one step back"),
-    "forward": N_("one step forward"),
-    "speed": N_("speed ×"),
-    "time": N_("time of the motion"),
-    "clock": N_("{t} of {end} s"),
-    "ends": N_("It may run up to here: {t} s."),
-    "joints": N_(
-        "Joint values at this moment, and how far each is from the nearer of its limits. ✕ and ▲ mark joints that fail "
-        "then, with what they would need."
-    ),
-    "nearest": N_("Nearest its limit: {joints}."),
-    "nearest_joint": N_("{joint}, {room}"),
-    "room": N_("{room} to limit"),
-    "beyond": N_("{room} beyond"),
-    "unlimited": N_("no limit"),
-    "start": N_("start"),
-    "end": N_("end"),
-    "start_and_end": N_("start and end"),
-    "undock": N_("return the player to its place"),
-    "picture": N_("The arm on its path. Drag or use the arrow keys to turn the picture, + and − to zoom."),
-    "joint_values": N_("Joints"),
-    "no_script": N_("The player needs JavaScript; recordings show the same in the Rerun viewer."),
-}
 
 
 def player(
@@ -101,21 +70,22 @@ def player(
     shown = [motion for motion in motions if len(motion.t) > 1]
     if not shown:
         return Markup()
-    words = {key: tr(word) for key, word in WORDS.items()} | {"between": tr("; ")}
-    data = _data(robot, shown, scene, words, beside, signs)
+    data = _data(robot, shown, scene, beside, signs)
     for shape in added:
         data["carried" if shape["frame"] else "scene"].append(shape)
     known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
     data["opened"] = known or _worst(robot, shown)
     first = next(motion for motion in shown if motion.name == data["opened"][0])
-    _frame(data, (robot, *beside), shown)
+    robots = (robot, *beside)
+    _frame(data, robots, shown)
     return Markup(
-        TEMPLATES.get_template("player.html.j2").render(
-            words=words,
+        page_environment(_HERE)
+        .get_template("player.html.j2")
+        .render(
             looks={key: tr(word) for key, word in LOOKS.items()} if robot.visuals else {},
             motions=shown,
             data=data,
-            still=_still((robot, *beside), first, data),
+            still=_still(robots, first, data),
             script=(_HERE / "player.js").read_text(encoding="utf-8"),
         )
     )
@@ -148,7 +118,6 @@ def _data(
     robot: Robot,
     motions: Sequence[PlayedMotion],
     scene: Scene | None,
-    words: dict[str, str],
     beside: Sequence[Robot],
     signs: Sequence[str],
 ) -> dict[str, Any]:
@@ -169,7 +138,6 @@ def _data(
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "motions": [_motion(motion, most) for motion in motions],
         "joints": _joints(robot),
-        "words": words,
     }
 
 

@@ -142,7 +142,6 @@ for (const { name, shades, colour } of [...layers, ...solids]) {
 }
 
 knife.addEventListener("input", refresh);
-const colours = place.querySelector(".colours");
-if (colours) colours.style.background = `linear-gradient(to right, ${data.palette.join(", ")})`;
+place.querySelector(".colours")?.style.setProperty("background", `linear-gradient(to right, ${data.palette.join(", ")})`);
 refresh();
 performance.mark("turning");

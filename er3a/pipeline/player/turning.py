@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from markupsafe import Markup
 from matplotlib import colormaps
@@ -16,23 +15,17 @@ from matplotlib.colors import to_hex
 
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import N_, own_title, tr
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_arm, drawn_scene, poses_at
+from er3a.pipeline.viewing.page import page_environment
 from er3a.pipeline.viewing.palette import BODY, INK, rgb
 from er3a.pipeline.viewing.still import Still
 from er3a.robots.robot import Robot
 
 _HERE = Path(__file__).parent
-TEMPLATES = jinja2.Environment(loader=jinja2.FileSystemLoader(_HERE), autoescape=True, trim_blocks=True)
 STEPS = 65_535  # that the box around everything is divided into
 SHADES = 64
 DARKEST = 0.33  # of a scale of colours, which is still seen on a dark page
-WORDS = {
-    "picture": N_("Drag or use the arrow keys to turn the picture, + and − to zoom."),
-    "shown": N_("shown"),
-    "cut": N_("cut"),
-    "no_script": N_("This picture needs JavaScript; the recording of this stage shows the same in the Rerun viewer."),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +118,9 @@ def turning_figure(
         "layers": [_layer(layer, low, high) for layer in layers],
     }
     return Markup(
-        TEMPLATES.get_template("turning.html.j2").render(
-            words={key: tr(text) for key, text in WORDS.items()},
+        page_environment(_HERE)
+        .get_template("turning.html.j2")
+        .render(
             scale=scale,
             cut=data["cut"],
             data=data,

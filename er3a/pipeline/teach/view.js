@@ -1,10 +1,9 @@
 /** The picture of the arm: what is drawn at given joint angles. */
 
-import { add, column, moved, scaled, translation, turned } from "er3a/algebra";
+import { add, column, moved, scaled, turned } from "er3a/algebra";
 import { frames, tableFrames } from "er3a/kinematics";
-import { alongArm, Arm, ARM, Space } from "er3a/space";
+import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 
-const WORLD = translation(0, 0, 0);
 
 export class ArmView extends Space {
   /** `draw` is called when the view has changed and the picture has to be drawn again. */

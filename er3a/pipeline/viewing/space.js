@@ -7,7 +7,7 @@ import { add, column, cross, dot, scaled, subtract, translation } from "er3a/alg
 import { Orbit } from "er3a/orbit";
 import three from "er3a/three";
 
-const WORLD = translation(0, 0, 0);
+export const WORLD = translation(0, 0, 0);
 const LAMP = [0.9, -1.3, 2.4];
 const SHADOWS = 1024; // side of the map of shadows, px
 const MAX_PIXELS = 1.6e6; // more can't be painted often enough without a graphics processor

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +16,14 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
+from er3a.pipeline.player.motions import bar_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -79,22 +80,23 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     worst = next(((found.name, found.t_s) for found in closest if found.t_s is not None), None)
+    played, ends = motions(robot, results), dict(zip(results.paths.path.tolist(), results.paths.t_s.tolist()))
+    bars = {motion.name: bar_of(motion, ends[motion.name]) for motion in played}
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, closest, _unreached(results.paths)),
+        _answer(summary, closest, _unreached(results.paths), bars),
         matrix=_matrix(robot, results.matrix),
         never=int((results.matrix.state == "never").sum()),
         tried=TRIED,
         most_often=most_often(results.pairs),
         places=_places(robot, results, scene),
         left=_left(summary),
-        player=player(robot, [*motions(robot, results), *poses(robot, results)], scene, opened=worst),
+        player=player(robot, [*played, *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",
         home_from=word("collision.home", HOMES, summary.home_from),
-        mounting=[_mounted(contact.solid, contact.depth_mm, contact.inside) for contact in summary.mounting],
     )
 
 
@@ -103,10 +105,15 @@ def _unreached(paths: model.PathClearances) -> set[str]:
     return set(paths.path[np.isnan(paths.q_deg).any(axis=1)].tolist())
 
 
-def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest], unreached: set[str]) -> Answer:
+def _answer(
+    summary: model.CollisionSummary,
+    closest: Sequence[model.Closest],
+    unreached: set[str],
+    bars: Mapping[str, Sequence[Part]],
+) -> Answer:
     """How much of the joint space is free, and how near each path and chosen solution comes to anything.
 
-    ``unreached``: of some paths only a part was measured.
+    ``unreached``: of some paths only a part was measured; ``bars``: of paths, by their names.
     """
     found = {figure.name: figure.value for figure in summary.figures}
     free, places = found.get("free_of_collisions"), summary.places
@@ -115,20 +122,21 @@ def _answer(summary: model.CollisionSummary, closest: Sequence[model.Closest], u
     touch = sum(each.clearance_mm < 0 for each in closest)
     rest = tr("{count} of {all} motions collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
-    groups = (
-        Group(tr("Paths"), [_row(each, unreached) for each in closest[:MAX_ROWS] if each.kind == "path"]),
-        Group(tr("Targets"), [_row(each, set()) for each in closest[:MAX_ROWS] if each.kind == "target"]),
-    )
+    rows = [(each.kind, _row(each, unreached, bars)) for each in closest[:MAX_ROWS]]
+    titles = ("path", tr("Paths")), ("target", tr("Targets"))
+    groups = [Group(title, [row for own, row in rows if own == kind]) for kind, title in titles]
     return Answer(headline, rest, "", keys, groups)
 
 
-def _row(found: model.Closest, unreached: set[str]) -> ListRow:
-    """A path or chosen solution: how near it comes, and to what."""
+def _row(found: model.Closest, unreached: set[str], bars: Mapping[str, Sequence[Part]]) -> ListRow:
+    """A path with its bar, or a chosen solution: how near it comes, and to what."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     mark: Mark = "fail" if found.clearance_mm < 0 else "pass"
-    if mark == "pass" and found.name in unreached:
+    of_path = found.kind == "path"
+    if mark == "pass" and of_path and found.name in unreached:
         mark, note = "none", joined([note, tr("not all of it is reached")], ", ")
-    return ListRow(mark, found.name, note, play=(found.name, found.t_s or 0.0))
+    bar = bars[found.name] if of_path else ()
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), float(of_path), bar)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:
@@ -156,13 +164,3 @@ def _angles(robot: Robot, values: Reals) -> str:
     if not np.isfinite(values).all():
         return ""
     return ", ".join(fixed(value, 0) + (" mm" if slides else "°") for value, slides in zip(values, robot.slides))
-
-
-def _mounted(solid: str, depth_mm: float, inside: bool) -> str:
-    if inside:
-        return tr("The base's middle lies in {own_name}.", own_name=solid)
-    return tr(
-        "The base overlaps {own_name} by {depth} mm or more in every pose; this is taken to be its mounting.",
-        own_name=solid,
-        depth=fixed(depth_mm, 1),
-    )

@@ -71,10 +71,7 @@ def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequ
     known = {each.name: each for each in summary.programs}
     ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    bad = {
-        each.name: row_of(each, shown.get(each.name), ends[each.name], 1.0, notes[each.name])
-        for each in wrong
-    }
+    bad = {each.name: row_of(each, shown.get(each.name), ends[each.name], 1.0, notes[each.name]) for each in wrong}
     sound = [
         ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), 1.0)
         for name, each in known.items()

@@ -118,11 +118,11 @@ def answer_of(
     shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
     fault_rows = {}
-    for path in (path for path in paths if path.name in wrong):
+    for path in paths[: len(wrong)]:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-    mended = [fault_rows[path.name] for path in paths if path.chosen and path.name in {*wrong} - {*hindered}]
-    others = [path for path in paths if path.name not in wrong]
+    mended = [fault_rows[path.name] for path in paths[: len(wrong)] if path.chosen and path.name not in hindered]
+    others = paths[len(wrong) :]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
         replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
@@ -141,7 +141,7 @@ def answer_of(
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(paths, wrong, len(mended)), keys, groups, fix)
+    return Answer(headline, rest, _in_short(paths[: len(wrong)], len(mended)), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
@@ -150,9 +150,9 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int
     return not path.collisions, len(path.outcomes)
 
 
-def _in_short(paths: Sequence[model.PathSummary], wrong: Mapping[str, Fault], mended: int) -> str:
+def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
-    early = sum(path.name in wrong and not path.chosen and path.sound_end is not None for path in paths)
+    early = sum(not path.chosen and path.sound_end is not None for path in wrong)
     if not wrong:
         return ""
     return tr(

@@ -52,11 +52,9 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         at_side=True,
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, placing, "wrong" if contradicted else "right"),
-        pocket_mm=3000 * summary.pocket_block_m,
         turning=workspace_figures.in_space(robot, results, scene),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
-        wide=100 * summary.proof.width,
         **context,
     )
 
@@ -108,7 +106,8 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}" if void.kind == "enclosed" else "#space")
+    place = f"#hole-{number_}" if void.kind == "enclosed" else "#space"
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, place)
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:

@@ -217,8 +217,7 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    holes = [(number_, void) for number_, void in enumerate(summary.voids, start=1) if void.kind == "enclosed"]
-    labels = [_hole_label(number_, void) for number_, void in holes]
+    labels = [_hole_label(number_, void) for number_, void in enumerate(summary.voids, 1) if void.kind == "enclosed"]
     outlines = [_tray_corners(tray) for tray in trays]
     labels += [Label(tray.name, corners[1], "tray") for tray, corners in zip(trays, outlines)]
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
