@@ -43,20 +43,15 @@ from er3a.robots.robot import Robot
 
 WORDS: dict[str, Any] = {
     "title": N_("teach panel"),
-    "no_script": N_("This page computes in the browser; it needs JavaScript."),
     "view": N_("The arm"),
     "picture": N_(
         "The arm in three dimensions at the joint angles of the sliders, each joint in its own colour. "
         "Arrow keys turn the view, plus and minus zoom."
     ),
-    "view_help": N_("Drag to turn the view. With the picture in focus the wheel and the plus and minus keys zoom."),
     "views": {"overview": N_("Overview"), "side": N_("Side"), "front": N_("Front"), "top": N_("Top")},
     "looks": N_("Arm drawn as"),
     "look": LOOKS,
     "frames": N_("Frames of the table"),
-    "frames_none": N_("none"),
-    "frames_all": N_("all"),
-    "frames_row": N_("row {row}"),
     "row": {
         "standard": N_(
             "Row {row}: turn by θ = {theta} about z, go {d} mm along z and {a} mm along the new x, turn by α = {alpha} "
@@ -67,16 +62,8 @@ WORDS: dict[str, Any] = {
             "mm along it."
         ),
     },
-    "zoom_in": N_("Zoom in"),
-    "zoom_out": N_("Zoom out"),
     "joints": N_("Joints"),
-    "joints_help": N_(
-        "Arrow keys move by 1° (1 mm where a joint slides), with Shift by a tenth; Page Up and Page Down by ten; Home "
-        "and End go to the limits."
-    ),
-    "slider": N_("{joint}, slider"),
     "typed": N_("{joint} in degrees"),
-    "typed_length": N_("{joint} in millimetres"),
     "angle": N_("{degrees} degrees"),
     "way": N_("{degrees} millimetres"),
     "endless_joint": N_("turns without end"),
@@ -86,28 +73,19 @@ WORDS: dict[str, Any] = {
     "no_number": N_("{joint} needs a number, in degrees."),
     "no_length": N_("{joint} needs a number, in millimetres."),
     "zero": N_("Zero pose"),
-    "copy_joints": N_("Copy joints"),
-    "copy_link": N_("Copy link"),
     "copied": N_("The joints are copied: {text}"),
     "link_copied": N_("The link to this pose is copied."),
     "not_copied": N_("This browser does not let pages copy; copy it from here: {text}"),
     "bad_link": N_("The joints in the link were not used: {reason}"),
     "bad_count": N_("it names {count} numbers where {joints} are needed."),
     "jog": N_("Jog"),
-    "jog_help": N_(
-        "Along and about the axes of the base or the tool (rotations keep the tool point fixed), or joint by joint."
-    ),
-    "jog_frame": N_("Frame"),
     "jog_frames": {"base": N_("base"), "tool": N_("tool"), "joints": N_("joints")},
     "jog_axes": ["X", "Y", "Z", "RX", "RY", "RZ"],
     "jog_along": N_("Along {axis} of the {frame}."),
     "jog_about": N_("About {axis} of the {frame}: the tool turns or tilts, its point rests."),
     "no_jog_along": N_("The arm does not move: its joints cannot move the tool point along {axis} of the {frame}."),
     "no_jog_about": N_("The arm does not move: its joints cannot turn the tool about {axis} of the {frame}."),
-    "jog_mm": N_("step in mm"),
-    "jog_deg": N_("step in degrees"),
     "jog_step": N_("A step needs a number above 0."),
-    "typed_pose": N_("Go to a pose"),
     "pose_fields": [
         N_("x in mm"),
         N_("y in mm"),
@@ -116,8 +94,6 @@ WORDS: dict[str, Any] = {
         N_("pitch in degrees"),
         N_("yaw in degrees"),
     ],
-    "pose_go": N_("Go there"),
-    "pose_take": N_("Use the current pose"),
     "pose_number": N_("“{field}” needs a number."),
     "not_reached": N_("The arm does not move: {reason}."),
     "not_found": N_(
@@ -130,23 +106,9 @@ WORDS: dict[str, Any] = {
     ),
     "no_such_motion": N_("The arm does not move: its joints cannot move the tool that way."),
     "points": N_("Way points"),
-    "points_help": N_(
-        "Export two or more saved points as a path file (joint moves that stop at each point) or as an RPL "
-        "program at a tenth of full speed. The motions between them are not checked here: use er3a check, the "
-        "trajectory stage and er3a check-program."
-    ),
-    "points_help_path": N_(
-        "Export two or more saved points as a path file: joint moves that stop at each point. The motions "
-        "between them are not checked here: use er3a check and the trajectory stage."
-    ),
-    "save_point": N_("Save this point"),
-    "export_path": N_("Export path file"),
-    "export_program": N_("Export program"),
-    "clear_points": N_("Remove all"),
     "go_to_point": N_("go to point {number}"),
     "remove_point": N_("remove point {number}"),
     "pose": N_("Tool pose"),
-    "pose_help": N_("Of the tool's frame in the base frame."),
     "position": N_("Position"),
     "orientation": N_("Orientation as"),
     "orientations": {
@@ -160,14 +122,7 @@ WORDS: dict[str, Any] = {
         "zyz": [N_("φ about Z"), N_("ϑ about Y"), N_("ψ about Z")],
         "quaternion": ["w", "x", "y", "z"],
     },
-    "matrix_caption": N_("Transform from the tool to the base; its last column is the position in mm"),
     "measures": N_("How near to a singularity?"),
-    "measures_help": N_(
-        "At a singularity the tool loses a direction, and near it slow tool motions need fast joints; moving the "
-        "joints one by one is unaffected. The measures are "
-        "of the Jacobian with its linear rows divided by {length} mm, {length_is}. At a singularity the first two are "
-        "0 and the condition number is infinite."
-    ),
     "length_is": {"wrist": N_("the reach of the wrist centre"), "links": N_("half the length along all links")},
     "manipulability": N_("Manipulability"),
     "smallest": N_("Smallest singular value"),
@@ -193,14 +148,7 @@ WORDS: dict[str, Any] = {
         ),
     },
     "near_unnamed": N_("Near a singularity: the smallest singular value is {value}."),
-    "unnamed": N_("The kinds of singularity of this arm have no names here, because {reason}."),
     "solutions": N_("All IK solutions of this pose"),
-    "solutions_some": N_("IK solutions of this pose"),
-    "solutions_help": N_(
-        "Choose one and the arm goes there; the tool stays in place. Point at one to see it as a pale arm. "
-        "Branches: wrist in front of axis 1 or behind it (back), elbow up or down, wrist flipped or not. "
-        "Numbers are J1 to J6 in degrees."
-    ),
     "previous": N_("Previous"),
     "next": N_("Next"),
     "count": N_("{within} of {total} within the limits, further turns counted"),
@@ -247,11 +195,6 @@ WORDS: dict[str, Any] = {
         "The arm has more joints than a pose needs, so there are infinitely many solutions; some that are far "
         "apart are shown."
     ),
-    "clearance_help": N_(
-        "Clearance: the least distance between the arm's shapes and the scene's, and between links of the arm "
-        "that can collide, as checked by the collision stage. A line shows where."
-    ),
-    "clearance_allowed": N_("Not watched, as the robot's file decides: {pairs}."),
     "clearance_is": N_("Clearance {distance}: {pair}."),
     "overlap": N_("Collision: {pair} overlap by {distance}."),
     "overlap_deep": N_("Collision: {pair} overlap by {distance} or more."),

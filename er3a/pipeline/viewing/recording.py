@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +36,8 @@ from er3a.pipeline.viewing.arm import (
     solid_parts,
     touching_parts,
 )
-from er3a.pipeline.viewing.drawn import drawn_scene
-from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, MUTED, VERDICTS, legible, rgb
+from er3a.pipeline.viewing.drawn import SCENE_COLOUR, drawn_scene
+from er3a.pipeline.viewing.palette import HIGHLIGHT, JOINT_NAMES, JOINTS, LINK, VERDICTS, legible, rgb
 from er3a.robots.joint_limits import joint_names, size_of
 from er3a.robots.joint_limits import shown as in_units
 from er3a.robots.robot import Robot
@@ -179,7 +180,7 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
 
     Returns
     -------
-    look_s : when the first fault is on, s on the recording's timeline; None where there is none
+    look_s : when the gravest event begins, s on the recording's timeline; None where there is none
 
     Raises
     ------
@@ -211,15 +212,23 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
         before: set[str] = set()
         for run, start in zip(shown.runs, starts):
             before = _log_run(stream, shown, run, start, before)
-    return next((start + t for run, start in zip(shown.runs, starts) if (t := _first_fault(run)) is not None), None)
+    return _moment_to_show(shown, starts)
 
 
 def _with_angles(robot: Robot, run: Run) -> Run:
     return replace(run, curves={"angle": in_units(robot, run.q), **run.curves}) if len(run.t) else run
 
 
-def _first_fault(run: Run) -> float | None:
-    return min((each.t for each in run.events if each.status == "fail"), default=None)
+def _moment_to_show(shown: Recorded, starts: Sequence[float]) -> float | None:
+    """When the gravest event begins, s on the timeline: a collision before others, rather with what is around the arm
+    than with itself; None where there is none."""
+    around = {solid.name for solid in shown.scene.solids} if shown.scene else set()
+    moments = [
+        (WEIGHTS.index(each.status), bool(around.intersection(each.bodies)), bool(each.bodies), start + each.t)
+        for run, start in zip(shown.runs, starts)
+        for each in run.events
+    ]
+    return max(moments, key=itemgetter(0, 1, 2), default=(0, False, False, None))[3]
 
 
 def _log_styles(stream: rr.RecordingStream, shown: Recorded, curves: Curves) -> None:
@@ -362,7 +371,7 @@ def record_stage(study: Study, stored: Stored[Any], output: Path, note: str, **s
 
     Returns
     -------
-    look_s : when the first fault is on, s on the recording's timeline; None where there is none
+    look_s : when the gravest event begins, s on the recording's timeline; None where there is none
     """
     robot, findings = study.robot(stored.robot), say_all(stored.results.summary.verdict.findings)
     text = note.format(title=escaped(robot.title), findings=escaped(findings))
@@ -444,7 +453,7 @@ def _log_scene(stream: rr.RecordingStream, shown: Recorded) -> None:
     """The solids, each an entity, and what the tool carries."""
     if shown.scene is None:
         return
-    groups = (shown.scene.solids, f"{shown.stage}/scene", MUTED), (shown.scene.carried, "arm/tool/carried", LINK)
+    groups = (shown.scene.solids, f"{shown.stage}/scene", SCENE_COLOUR), (shown.scene.carried, "arm/tool/carried", LINK)
     for solids, below, colour in groups:
         for shape in drawn_scene(solids, shown.robot):
             stream.log(f"{below}/{shape['name']}", *solid_parts(shape, (*rgb(colour), SCENE_ALPHA)), static=True)

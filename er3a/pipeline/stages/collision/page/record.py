@@ -18,15 +18,15 @@ from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
 NOTE = """# Where it is free of collisions
-**Look first** at the points: places that the tool can be brought to.
+**Look first** at the red bodies: they overlap at that moment.
 
 {findings}
 
 - green: with an arm free of collisions, joined to home by a motion that is free of them too
 - blue: with such an arm, not joined to home
 - red points: none was found, however often tried
-- the arm: the bodies that are measured (beside meshes they are hidden: `checked`); grey solids: the scene
-- red bodies: they overlap at that moment
+- points: places that the tool can be brought to
+- the arm: the bodies that are measured (where there are meshes, hidden: `checked`); sand: the scene
 
 Press play: the arm runs along its paths; the magenta line joins the two points that are nearest at that time, and the
 curve shows how far they are apart. Below 0 they overlap.
@@ -53,7 +53,7 @@ def record(study: Study, stored: Stored[CollisionResults], output: Path) -> floa
 
 
 def _places(results: CollisionResults) -> dict[str, Logged]:
-    rows, radius = results.places, results.summary.places.cell_m / 14
+    rows, radius = results.places, results.summary.places.cell_m / 30
     groups = {
         "joined": (rows.joined, VERDICTS["pass"]),
         "clear": (rows.clear & ~rows.joined, JOINTS[5]),

@@ -16,7 +16,7 @@ from er3a.pipeline.stages.vision.model import ObjectResult, SampleRows, VisionRe
 from er3a.pipeline.stages.vision.page.played import OBJECT_M, SIGHT, placed
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import AXES
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, MUTED, REFERENCE, rgb
+from er3a.pipeline.viewing.palette import HIGHLIGHT, MODEL, REFERENCE, VERDICTS, rgb
 from er3a.pipeline.viewing.recording import Logged, Run, escaped, record_stage
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
@@ -34,8 +34,8 @@ are a fault.
 
 - orange pyramid: what the camera sees; a double click on it looks through
 - blue dots and arrows: samples that the calibration rests on; magenta: samples left out
-- boxes with axes: the objects, as the camera places them; red balls around them: 95 % of errors
-- grey solids: the scene
+- boxes with axes: the objects, as the camera places them, red those that are not grasped; balls: 95 % of errors
+- sand: the scene
 
 Press play: the arm goes through the samples, then to each object that it can grasp, and away.
 """
@@ -110,7 +110,7 @@ def _samples(rows: SampleRows, size: float) -> dict[str, Logged]:
 def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
     w, x, y, z = each.quaternion_wxyz
     place = rr.Transform3D(translation=np.array(each.xyz_mm) / 1000, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
-    colour, entity = rgb(MODEL if each.grasp else MUTED), f"objects/{each.name}"
+    colour, entity = rgb(VERDICTS["pass" if each.grasp else "fail"]), f"objects/{each.name}"
     box = rr.Boxes3D(sizes=[OBJECT_M], colors=[colour], labels=[each.name], show_labels=True)
     axes = rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002)
     shapes: dict[str, Logged] = {entity: [place, box], f"{entity}/axes": axes}
@@ -143,6 +143,6 @@ def _grasped(robot: Robot, results: VisionResults, each: ObjectResult, home: Rea
         t=STEP_S * np.arange(len(q), dtype=float),
         q=q,
         outcome=outcome,
-        status="plain" if each.grasp else "caution",
+        status="plain" if each.grasp else "fail",
         pause_s=SAMPLE_S,
     )
