@@ -157,7 +157,7 @@ function tellLoads(poses) {
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
     const text = `J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`;
-    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, true, Math.abs(load) / most);
+    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > 0.01 * most, Math.abs(load) / most);
   });
 }
 

@@ -108,7 +108,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         findings=listed(summary.findings),
         links=_links(summary),
         uses=[_use(use) for use in summary.uses[:MAX_USES]],
-        more_uses=max(0, len(summary.uses) - MAX_USES),
         motors=_motors(summary.motors),
         paths=[_path(path) for path in summary.paths if path.counts],
         not_run=joined((path.name for path in summary.paths if not path.counts), ", "),

@@ -36,8 +36,8 @@ OF_THE_ARM = (
     Curves("smallest", "Smallest singular value", ["smallest singular value"], [REFERENCE]),
 )
 NOTE = """# {title}: paths
-**Look first** at the velocity curves where an event is listed: a spike is the price of passing near a singular pose. \
-Press play: the arm runs along one path after another.
+**Look first** at the red bodies and events. Where velocity curves have a spike, the arm passes near a singular pose. \
+Press play: it runs along one path after another.
 
 {findings}
 
