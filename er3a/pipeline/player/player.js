@@ -317,8 +317,8 @@ chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser
 bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {
   link.addEventListener("click", (event) => {
-    const inner = event.target.closest("a");
-    if (inner && inner !== link) return; // a link of its own within a row, as to the teach panel
+    if ((event.target.closest("a") ?? link) !== link) return; // a link of its own within a row, as to the teach panel
+    play(false);
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
     goTo(link.dataset.play, Number(link.dataset.t));

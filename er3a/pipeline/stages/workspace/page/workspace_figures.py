@@ -219,7 +219,7 @@ def labelled(
     lines = border_lines(border.arc, border.rho_m, border.z_m)
     labels = [_hole_label(number_, void) for number_, void in enumerate(summary.voids, 1) if void.kind == "enclosed"]
     outlines = [_tray_corners(tray) for tray in trays]
-    labels += [Label(tray.name, corners[1], "tray") for tray, corners in zip(trays, outlines)]
+    labels += [Label(tr("tray"), corners[1], "tray") for corners in outlines]
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
