@@ -629,17 +629,23 @@ def test_a_table_and_a_program_at_the_slower_pace_that_is_advised_keep_the_limit
 
 
 def test_a_repair_that_meets_the_tray_is_marked_wherever_it_is_offered(study, stored, tmp_path, monkeypatch):
-    """In its row, in the section's answer, beside its programs and in their heads, and in the player; it is no fix."""
+    """In the section's answer, at its programs and in their heads, and in the player; it is no fix, so that its
+    path is listed with those that may not run, and with its own fault."""
     met = {"line_limits, repaired": Meeting(0.21, "link 4")}
     monkeypatch.setattr("er3a.pipeline.stages.trajectory.page.report.met_in_tray", lambda study, stored: met)
     report(study, replace(stored["er3_600"], rests_on={"validation": "pass"}), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert page.count('data-t="0.21">meets the tray at 0.21 s: link 4</a>') == 2
-    assert page.count("<small>meets the tray at 0.21 s: link 4</small>") == 1
+    assert "<small>meets the tray at 0.21 s: link 4</small>" not in page
     found = stored["er3_600"].results
     wrong = {fault.name: fault for fault in faults(found) if fault.name == "line_limits"}
     assert answer_of(found.summary, wrong, ()).fix
-    assert answer_of(found.summary, wrong, (), met).fix is None
+    hindered = answer_of(found.summary, wrong, (), met)
+    assert hindered.fix is None
+    assert [(row.name, row.note, row.fix) for row in hindered.groups[0].rows if row.name in wrong] == [
+        ("line_limits", wrong["line_limits"].verdict, None)
+    ]
+    assert not hindered.groups[1].rows
     assert page.count('"text": "meets the tray at 0.21 s: link 4"') == 1
     for file, packed in re.findall(r'download="([^"]+)" data-packed="([^"]+)"', page):
         text = gzip.decompress(base64.b64decode(packed)).decode()
