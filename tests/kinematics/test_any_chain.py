@@ -41,6 +41,7 @@ def stanford() -> Robot:
     )
 
 
+@pytest.mark.long
 @given(data=st.data(), robot=chains())
 def test_any_chain_agrees_with_pinocchio(data, robot):
     q, peer = data.draw(joints_within(robot))[None], PinocchioArm(robot)

@@ -90,6 +90,7 @@ def usable(T: np.ndarray, scene: Scene | None) -> bool:
     return bool((margin & (Bodies(ROBOT, scene).min_distance(q)[0] >= CLEARANCE - 1e-9)).any())
 
 
+@pytest.mark.long
 def test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins(refused):
     colliding = [(T, found) for T, found in refused.values() if found.outcome == "collides"]
     advised = ["move_obstacle" in {advice.code for advice in found.advice} for _, found in colliding]

@@ -76,6 +76,7 @@ def test_shares_agree_with_other_random_vectors(results, random):
         assert abs(free - share.ratio) < 5 * (high - low) / 2
 
 
+@pytest.mark.long
 def test_what_lies_below_the_floor_is_lost(results):
     rows = results.places
     assert not rows.clear[rows.middle_mm[:, 2] < -100].any()

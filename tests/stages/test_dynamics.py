@@ -243,6 +243,7 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
         assert left["wrist_guess"] == ()
 
 
+@pytest.mark.long
 def test_limits_that_no_path_was_held_against_are_no_pass(full):
     summary = full[1].results.summary
     shown = [

@@ -76,6 +76,7 @@ def test_summary_and_tables_belong_together(done):
             assert ((high[i] <= low[j] + 1e-9) | (high[j] <= low[i] + 1e-9)).any()
 
 
+@pytest.mark.long
 def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done):
     robot, placed = load_robot("er3_600"), done.placement
     task = placed.task
