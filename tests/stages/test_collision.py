@@ -91,6 +91,7 @@ def test_page_and_recording_say_what_was_found(folder, tmp_path):
         assert words in page
 
 
+@pytest.mark.long
 def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results):
     found, closest = results.summary.verdict.finding, results.summary.closest
     of_targets = [each for each in closest if each.kind == "target"]

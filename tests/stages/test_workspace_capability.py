@@ -111,6 +111,7 @@ def test_the_same_input_gives_the_same_numbers(done):
     assert again.places.frame().equals(done.places.frame())
 
 
+@pytest.mark.long
 def test_slices_show_the_cells_they_cut(done):
     lookup, cells = CellLookup(done.capability, done.cells), done.cells
     some = np.random.default_rng(1).choice(len(cells), 50, replace=False)
