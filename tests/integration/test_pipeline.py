@@ -107,7 +107,6 @@ def test_edits_of_views_compute_nothing_and_that_of_a_budget_its_stage_only(smal
     all_views = {*map(views, small_study.robots), "write the index"}
     edits = [
         (package / "stages/inverse/page/report.html.j2", "{% block content %}", "{% block content %}<!-- -->"),
-        (package / "messages/inverse.py", '"""', '"""Edited. '),
         (small_study.folder / "config/small.yaml", "\ntrajectory:", "\nreport: {language: zh}\ntrajectory:"),
     ]
     for edit in edits:
