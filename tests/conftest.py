@@ -28,7 +28,6 @@ from er3a.pipeline.stages.run import compute
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
-from testing import chromium
 from testing.made_once import SHARED
 from testing.processes import run
 from testing.small_study import STUDY, fresh
@@ -180,6 +179,8 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory):
     """Headless Chromium; skipped with its reason where there is none."""
+    from testing import chromium  # half a second of Selenium, which the fast set does not need
+
     if reason := chromium.lacking():
         if os.environ.get("CI") == "true":
             pytest.fail("CI must have Chromium and its driver")

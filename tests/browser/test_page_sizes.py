@@ -11,6 +11,8 @@ from selenium.webdriver.common.by import By
 from testing import chromium
 from tests.browser.pages import PAGES
 
+pytestmark = pytest.mark.long
+
 LARGEST_PAGE = 2_000_000
 
 

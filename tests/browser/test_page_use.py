@@ -13,6 +13,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 from testing import chromium
 from tests.browser.pages import PAGES_WITH_EACH_CONTROL
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("page", PAGES_WITH_EACH_CONTROL)
 def test_tab_key_reaches_everything_in_the_page_s_order(browser, small_study, page):

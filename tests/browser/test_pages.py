@@ -15,6 +15,8 @@ from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
 from tests.browser.test_page_sizes import check_fit, check_print
 from tests.browser.test_page_use import check_sorting
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module", params=PAGES_OF_EACH_KIND)
 def page(request, browser, small_study) -> str:
@@ -112,7 +114,6 @@ def serious_faults(browser, **options) -> list[tuple[str, list[str]]]:
     return [(fault["id"], [node["html"][:200] for node in fault["nodes"][:3]]) for fault in serious]
 
 
-@pytest.mark.long
 def test_index_leads_to_every_page(browser, small_study):
     browser.get((small_study.folder / "reports/index.html").as_uri())
     links = browser.execute_script("return [...document.querySelectorAll('.matrix td a')].map(a => a.href)")

@@ -7,8 +7,9 @@ import pytest
 
 from er3a.numerics.quasi_random import quasi_random_points
 
+pytestmark = pytest.mark.long
 
-@pytest.mark.long
+
 def test_points_fill_the_box_more_evenly_than_random_ones(random):
     from scipy.stats import qmc  # takes a second to import
 
