@@ -28,7 +28,6 @@ from er3a.pipeline.stages.run import compute
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.viewer import without_statistics
 from er3a.robots.robot import Robot
-from testing import chromium
 from testing.made_once import SHARED
 from testing.processes import run
 from testing.small_study import STUDY, fresh
@@ -37,7 +36,10 @@ ROBOTS = ("er3a_c60", "er3a_c60_article", "er3_600")
 ROBOT = "er3_600"  # the one of those tests for which one is enough
 LONGEST_S = 900
 MOST_FAST_S, SHOWN_SLOW = 0.4, 20  # processor time of a test of the fast set
-LONGEST_FILES = (
+FIRST_FILES = (  # these compile most kernels, either other ones: one process each, then the longest
+    "stages/test_checked.py",
+    "kinematics/test_inverse.py",
+    "kinematics/test_numerical.py",
     "integration/test_wheel.py",
     "identifiability/test_evidence.py",
     "browser/test_page_use.py",
@@ -49,12 +51,12 @@ LONGEST_FILES = (
     "browser/test_pages.py",
     "identifiability/test_oracle.py",
     "calibration/test_points.py",
-    "stages/test_checked.py",
     "robots/test_urdf_round_trip.py",
     "kinematics/test_by_class.py",
     "comparison/test_compare.py",
     "integration/test_offices.py",
 )
+ROOMS_OF_COLLISIONS = ("program_check", "programs", "robots", "stages", "vision", "workspace", "planning", "collision")
 ROOT = Path(__file__).resolve().parents[1]
 ALL_LONG = re.compile(r"^pytestmark = (\[\s*)?pytest\.mark\.long\b", re.MULTILINE)
 
@@ -101,10 +103,12 @@ def _process_number() -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's.
 
-    Processes are given one file after the other (pyproject.toml): the longest first, those with short tests last.
+    Processes are given one file after the other (pyproject.toml): the longest first, then those that need none of the
+    kernels that the first is compiling, those with short tests last.
     """
-    ranks = {ROOT / "tests" / name: rank for rank, name in enumerate(LONGEST_FILES)}
-    items.sort(key=lambda item: (ranks.get(item.path, len(ranks)), item.path.parent == ROOT / "tests", item.path))
+    ranks = {ROOT / "tests" / name: rank for rank, name in enumerate(FIRST_FILES)}
+    rooms = {"kinematics": -1, **dict.fromkeys(ROOMS_OF_COLLISIONS, 1), "tests": 2}
+    items.sort(key=lambda item: (ranks.get(item.path, len(ranks)), rooms.get(item.path.parent.name, 0), item.path))
     for item in items:
         fixtures = getattr(item, "fixturenames", ())
         if {"small_study", "small_results"} & set(fixtures):
@@ -175,6 +179,8 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 @pytest.fixture(scope="session")
 def browser(tmp_path_factory: pytest.TempPathFactory):
     """Headless Chromium; skipped with its reason where there is none."""
+    from testing import chromium  # half a second of Selenium, which the fast set does not need
+
     if reason := chromium.lacking():
         if os.environ.get("CI") == "true":
             pytest.fail("CI must have Chromium and its driver")

@@ -182,6 +182,7 @@ def test_settings_named_with_their_section_exist(page):
     assert [each for each in named if each.split(".")[1] not in known(each.split(".")[0])] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_commands_of_documents_exist(page):
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))

@@ -13,6 +13,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+
+pytestmark = pytest.mark.long  # the whole package is parsed
+
 LONGEST_FUNCTION = 60  # lines without its docstring
 MAX_POSITIONAL = 6
 KERNELS = {"kernel", "inner_kernel"}
@@ -61,7 +64,6 @@ def several(places: dict[str, set[str]]) -> dict[str, set[str]]:
     return {name: where for name, where in places.items() if len(where) > 1}
 
 
-@pytest.mark.long
 def test_the_rules_are_read_off_the_whole_package():
     assert len(trees()) > 200
     assert len(list(functions())) > 1000

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 IMPORT_ALL = """
 import copy, os, pkgutil, signal, sys
 from importlib import import_module
@@ -29,7 +31,6 @@ for old, new in zip(before, settings(), strict=True):
 """
 
 
-@pytest.mark.long
 def test_importing_every_module_leaves_other_libraries_settings_alone():
     done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]

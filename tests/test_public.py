@@ -358,6 +358,7 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
+@pytest.mark.long
 def test_every_public_object_equals_its_copies_and_hashes_alike(shown):
     for name, each in shown.items():
         for way, made in COPIES.items():

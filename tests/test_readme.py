@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
 from testing.readme import answer
+
+pytestmark = pytest.mark.long
 
 
 def figures(small_study, stage: str) -> dict:

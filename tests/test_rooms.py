@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[1]
 RUNNER = "benchmarks.campaigns"  # of the campaigns, no campaign itself: it is tested
 FOREIGN = {
@@ -25,7 +27,6 @@ def imported(path: Path) -> set[str]:
     return {module.partition(".")[0] for module in modules if module != RUNNER}
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("room", FOREIGN)
 def test_a_room_imports_nothing_from_those_above_it(room):
     files = list((ROOT / room).rglob("*.py"))
@@ -33,7 +34,6 @@ def test_a_room_imports_nothing_from_those_above_it(room):
     assert [path.name for path in files if imported(path) & FOREIGN[room]] == []
 
 
-@pytest.mark.long
 def test_campaigns_are_imported_by_their_full_names():
     campaigns = {path.stem for path in (ROOT / "benchmarks").glob("*.py")}
     files = [path for room in FOREIGN for path in (ROOT / room).rglob("*.py")]

@@ -7,6 +7,8 @@ import pytest
 from testing import chromium
 from tests.browser.pages import OVER_ALL, PAGES, STAGE_PAGES
 
+pytestmark = pytest.mark.long
+
 WIDTH, HEIGHT = 1400, 1000
 HEADLINE, READ = 12, 40  # words of the verdict, and in runs of eight or more on the first screen
 PICTURE = {"index.html": 0.3}  # of the first screen, at least
@@ -57,7 +59,6 @@ def measured(browser, small_study):
     return found
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("page", [*OVER_ALL, *STAGE_PAGES])
 def test_the_first_screen_shows_a_verdict_and_a_picture(measured, page):
     own = measured[page]
@@ -66,7 +67,6 @@ def test_the_first_screen_shows_a_verdict_and_a_picture(measured, page):
     assert own["picture"] >= PICTURE.get(page.rsplit("/", 1)[-1], USUAL_PICTURE)
 
 
-@pytest.mark.long
 def test_all_pages_together_can_be_read(measured):
     assert sum(own["visible"] for own in measured.values()) <= VISIBLE
     assert sum(own["unfolded"] for own in measured.values()) <= UNFOLDED

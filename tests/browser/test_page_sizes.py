@@ -1,4 +1,4 @@
-"""Every page on a phone, a laptop and a 4K screen, and on sheets of A4."""
+"""A page's size, on a phone, a laptop and a 4K screen, and on sheets of A4."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import pytest
 from selenium.webdriver.common.by import By
 
 from testing import chromium
-from tests.browser.pages import PAGES, PAGES_OF_EACH_KIND
+from tests.browser.pages import PAGES
+
+pytestmark = pytest.mark.long
 
 LARGEST_PAGE = 2_000_000
 
@@ -19,9 +21,8 @@ def test_page_is_small_enough(small_study, page):
     assert (small_study.folder / "reports" / page).stat().st_size < LARGEST_PAGE
 
 
-@pytest.mark.parametrize("page", PAGES_OF_EACH_KIND)
-def test_page_fits_phone_laptop_and_4k(browser, small_study, page):
-    browser.get((small_study.folder / "reports" / page).as_uri())
+def check_fit(browser) -> None:
+    """The open page on a phone, a laptop and a 4K screen."""
     for width, height, letters in ((390, 844, 16), (1280, 900, 16), (3840, 2160, 26)):
         with chromium.emulating(browser, width, height):
             assert browser.execute_script("return document.documentElement.scrollWidth") <= width
@@ -57,9 +58,8 @@ return parts.filter((part) => !part.closest("#turning")).map((part) => part.getB
 """
 
 
-@pytest.mark.parametrize("page", PAGES_OF_EACH_KIND)
-def test_page_prints_on_a4_with_nothing_cut(browser, small_study, page):
-    browser.get((small_study.folder / "reports" / page).as_uri())
+def check_print(browser) -> None:
+    """The open page on sheets of A4, with nothing cut."""
     pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"])
     sizes = re.findall(rb"/MediaBox ?\[0 0 ([\d.]+) ([\d.]+)\]", pdf)
     assert sizes

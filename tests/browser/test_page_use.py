@@ -11,7 +11,9 @@ from selenium.webdriver.support.expected_conditions import staleness_of
 from selenium.webdriver.support.wait import WebDriverWait
 
 from testing import chromium
-from tests.browser.pages import OVER_ALL, PAGES_WITH_EACH_CONTROL, STAGE_PAGES_OF_EACH_KIND
+from tests.browser.pages import PAGES_WITH_EACH_CONTROL
+
+pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize("page", PAGES_WITH_EACH_CONTROL)
@@ -52,25 +54,6 @@ if (document.activeElement.closest("#turning")) return [null, null];
 const { outlineStyle, outlineWidth } = getComputedStyle(document.activeElement);
 return [controls.indexOf(document.activeElement), outlineStyle !== "none" && parseFloat(outlineWidth) >= 1];
 """
-
-
-MENUS = """
-return [...document.querySelectorAll(".top .menu")].map((menu) => {
-  menu.open = true;
-  const { left, top, width, height } = menu.querySelector(":scope > :not(summary)").getBoundingClientRect();
-  const shown = document.elementFromPoint(left + width / 2, top + Math.min(height, 40) / 2);
-  menu.open = false;
-  return height > 20 && menu.contains(shown);
-});
-"""
-
-
-@pytest.mark.parametrize("page", [*STAGE_PAGES_OF_EACH_KIND, "er3a_c60/teach.html"])
-def test_what_the_menus_of_the_header_open_is_seen(browser, small_study, page):
-    browser.get((small_study.folder / "reports" / page).as_uri())
-    seen = browser.execute_script(MENUS)
-    assert seen
-    assert all(seen)
 
 
 def test_figures_enlarge_and_give_the_focus_back(browser, small_study):
@@ -328,10 +311,9 @@ def test_joint_vectors_lead_to_the_teach_panel(browser, small_study):
     assert taken == pytest.approx(shown, abs=0.06)
 
 
-@pytest.mark.parametrize("page", [*OVER_ALL, *STAGE_PAGES_OF_EACH_KIND])
-def test_every_table_sorts_by_every_column(browser, small_study, page):
-    """Numbers with units, signs, spreads, marks and "at least" by value, before words, empty cells last."""
-    browser.get((small_study.folder / "reports" / page).as_uri())
+def check_sorting(browser) -> None:
+    """The open page's tables, by each column: numbers with units, signs, spreads, marks and "at least" by value, before
+    words, empty cells last."""
     sorted_columns = browser.execute_script(SORT_ALL)
     assert bool(sorted_columns) == browser.execute_script(HAS_TABLES)
     for numeric, by_verdict, written, rising, falling in sorted_columns:

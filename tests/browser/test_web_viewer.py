@@ -12,6 +12,8 @@ from er3a.pipeline.viewing.viewer import address, server
 from testing import chromium
 from tests.viewing.pictures import joints_seen
 
+pytestmark = pytest.mark.long
+
 DRAWS_BY_ITSELF = ("use-angle=swiftshader", "enable-unsafe-swiftshader", "window-size=1000,700")
 PATIENCE_S = 300
 

@@ -75,6 +75,7 @@ def test_exact_positions_give_an_arm_with_the_same_positions_everywhere(name, co
     assert found.rms_after_mm < 3e-3 < 0.3 < found.rms_before_mm
 
 
+@pytest.mark.long
 def test_estimates_are_those_of_an_independent_solver(random):
     robot = load_robot("er3a_c60")
     rows = measured(bent(robot, random), poses_in(robot, random, 30), 0.05, random)
@@ -297,6 +298,7 @@ def test_joints_that_read_a_little_otherwise_are_one_pose(random):
     assert merged.row_values == pytest.approx(seen.row_values.reshape(3, 5, 6).mean(axis=0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("poses", "deviation"), [(8, 0.05), (8, None), (5, 0.05)])
 def test_entries_left_out_widen_the_intervals_of_the_others(poses, deviation, random):
     """As entries that aren't estimated may be off, too; that is no misfit."""

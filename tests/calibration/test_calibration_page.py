@@ -16,6 +16,8 @@ from er3a.pipeline.viewing.calibration import write_calibration
 from tests.conftest import ROOT
 from tests.viewing.untranslated import PageTexts, plain_words, wide_letters
 
+pytestmark = pytest.mark.long
+
 DATA = ROOT / "data" / "measurements"
 ROWS = 60
 
@@ -36,7 +38,6 @@ def written(tmp_path_factory):
     return folder
 
 
-@pytest.mark.long
 def test_the_page_hands_out_the_corrected_robot(written):
     page = (written / "page.html").read_text(encoding="utf-8")
     found = re.search(r'href="data:text/plain;base64,([^"]+)" download="mine.yaml"', page)
@@ -51,7 +52,6 @@ def test_the_page_hands_out_the_corrected_robot(written):
     assert "保留的 20 个位置" in page
 
 
-@pytest.mark.long
 def test_each_word_of_the_page_can_be_translated(written, tmp_path):
     robot = er3a.load_robot(DATA / "wam.yaml")
     rows = er3a.load_measurements(written / "wam.csv", robot)

@@ -12,6 +12,8 @@ import er3a
 from er3a.calibration.observations import Measurement
 from er3a.files.robot_library import load_robot
 
+pytestmark = pytest.mark.long
+
 ETS = pytest.importorskip("roboticstoolbox").ET
 POSES = 40
 
@@ -43,7 +45,6 @@ def shown(chain, q: np.ndarray, deviations: tuple[float, float], random: np.rand
     return rows
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "ur5e"])
 def test_orientations_settle_what_positions_of_one_point_leave_open(name, random):
     robot = load_robot(name)
@@ -64,7 +65,6 @@ def test_orientations_settle_what_positions_of_one_point_leave_open(name, random
     assert by_positions < settled
 
 
-@pytest.mark.long
 def test_a_turned_orientation_is_set_aside(random):
     robot = load_robot("ur5e")
     q = random.uniform(robot.lower, robot.upper, (POSES, robot.joints)) / 2

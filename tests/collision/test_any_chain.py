@@ -17,6 +17,8 @@ from er3a.kinematics.chain import constant_links
 from er3a.robots.robot import Envelope, Robot
 from testing.arms import chains, joints_at_random
 
+pytestmark = pytest.mark.long
+
 DEPTH = 1e-3  # m
 PATHS, POINTS = 4, 400
 
@@ -87,7 +89,6 @@ def scene_about(robot: Robot, random: np.random.Generator) -> Scene:
     return Scene("two", tuple(solids))
 
 
-@pytest.mark.long
 def test_quill_that_slides_down_meets_the_floor_where_it_says():
     sliding = np.array([False, False, True, False])
     reach = np.array([2.5, 2.5, 0.3, 3.1])
@@ -117,7 +118,6 @@ def test_quill_that_slides_down_meets_the_floor_where_it_says():
     assert (both.pairs[pair].solid, round(least, 9)) == ("floor", -0.07), "the deepest is named"
 
 
-@pytest.mark.long
 @settings(max_examples=3)
 @given(robot=chains(2, 7), seed=st.integers(0, 1 << 32))
 def test_distances_are_those_of_coal(robot, seed):
@@ -139,7 +139,6 @@ def test_distances_are_those_of_coal(robot, seed):
         assert bodies.joined.any() or least < 0 or abs(least - expected) < 1e-5
 
 
-@pytest.mark.long
 @settings(max_examples=3)
 @given(robot=chains(2, 5), seed=st.integers(0, 1 << 32))
 def test_what_never_meets_does_not(robot, seed):
@@ -163,7 +162,6 @@ def test_what_never_meets_does_not(robot, seed):
             assert ((row.witness >= robot.lower - 1e-12) & (row.witness <= robot.upper + 1e-12)).all()
 
 
-@pytest.mark.long
 @settings(max_examples=3)
 @given(robot=chains(2, 6), seed=st.integers(0, 1 << 32))
 def test_moves_that_are_proven_free_touch_nothing_in_between(robot, seed):

@@ -11,6 +11,8 @@ from er3a.collision.shapes import arm_shapes
 from er3a.formats.urdf import import_urdf
 from testing.mesh_peers import held_against_meshes
 
+pytestmark = pytest.mark.long
+
 SHARED = Path(str(find_spec("pinocchio").origin)).parents[4] / "share" / "example-robot-data" / "robots"
 XACRO = Path(str(find_spec("rtbdata").origin)).parent / "xacro"
 ARMS = {
@@ -21,7 +23,6 @@ ARMS = {
 POSES = 60
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ARMS)
 def test_what_is_said_of_shapes_holds_of_the_meshes(name):
     """Never meet, always overlap, clearance as a lower bound; and an arm by its maker moves without hitting itself."""

@@ -13,6 +13,7 @@ from er3a.files.scene_file import load_scene
 from er3a.robots.robot import ConvexPiece, Envelope
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "ur5e"])
 @pytest.mark.parametrize("margin", [0.0, 0.001, 0.02, 0.05])
 def test_arms_that_keep_a_margin_are_those_whose_least_distance_does(name, margin, random):

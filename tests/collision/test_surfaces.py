@@ -93,6 +93,7 @@ def test_a_move_that_is_proven_free_is_free_between_its_ends(arm: Robot) -> None
     assert not all(states)
 
 
+@pytest.mark.long
 def test_a_short_move_with_room_around_it_is_proven_where_hulls_overlap(arm: Robot) -> None:
     bodies = Bodies(arm, None)
     q = np.random.default_rng(9).uniform(arm.lower, arm.upper, (200, arm.joints))

@@ -38,6 +38,7 @@ def arm_of(robot: er3a.Robot) -> Arm:
     return Arm(*(getattr(robot, field) for field in Arm.__dataclass_fields__))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_right_table_is_accused(kind):
     random = np.random.default_rng(KINDS.index(kind))
@@ -106,6 +107,7 @@ def article() -> er3a.Robot:
     return er3a.load_robot("er3a_c60_article")
 
 
+@pytest.mark.long
 def test_the_articles_table_is_another_arm():
     found = er3a.compare(article(), er3a.load_robot("er3a_c60"))
     assert found.verdict == "other_arm"
@@ -121,6 +123,7 @@ def test_the_articles_table_is_another_arm():
     assert er3a.compare(found.corrected, er3a.load_robot("er3a_c60")).verdict == "equal"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("slip", "cause"),
     [
@@ -203,6 +206,7 @@ def test_a_twist_of_the_wrong_sign_beside_an_offset_is_one_entry():
     assert (found.zero.same, found.directions.same) == (True, True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "entry"),
     [("er3a_c60", "a1"), ("er3a_c60", "a3"), ("er3a_c60", "d4"), ("er3_600", "a3"), ("ur5e", "d5")],
@@ -666,6 +670,7 @@ def changed(robot: er3a.Robot, column: str, values: dict[int, float]) -> er3a.Ro
     return robot.replace(**{column: own})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("offsets", [{}, {2: 0.0}, {2: 0.0, 6: 0.0}, {3: np.pi / 2, 5: 0.7}])
 def test_a_length_of_the_wrong_sign_is_named_where_zeros_differ_too(offsets):
     right = irb120()

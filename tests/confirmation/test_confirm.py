@@ -102,6 +102,7 @@ def test_zero_and_sense_of_joints_are_named():
     assert np.allclose(er3a.forward(back.corrected, q), shown(q * [1, 1, 1, 1, -1, 1]), atol=1e-12)
 
 
+@pytest.mark.long
 def test_what_is_counted_from_the_ground_is_named():
     q = poses()
     own = q.copy()
@@ -307,6 +308,7 @@ def test_digits_that_differ_refuse_no_right_arm(tmp_path, decimals, seed):
     assert er3a.confirm(longer, path, angles="rpy").verdict != "agrees"
 
 
+@pytest.mark.long
 def test_a_controller_s_poses_are_a_document_about_the_arm(tmp_path):
     q, X, Y = poses(), moved((0.02, 0, 0.12), (0, 30, 0)), moved((0.3, -0.2, 0.05), (0, 0, 45))
     model = arm()

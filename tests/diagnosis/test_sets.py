@@ -140,6 +140,7 @@ def entries_of(hypothesis: Hypothesis) -> list[set[str | None]]:
     return [{entry_of(fault) for fault in faults} for faults in members]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("entry", "by"),
     [
@@ -200,6 +201,7 @@ def test_a_limit_that_only_a_pose_contradicts(arm):
     assert first.explains
 
 
+@pytest.mark.long
 def test_what_explains_comes_before_what_does_not():
     """A length off by six half-widths: an angle comes near, but leaves a reference missed."""
     robot = load_robot("er3a_c60")

@@ -11,6 +11,7 @@ import pytest
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.finding import Finding, is_one
+from er3a.identifiability import continuous
 from er3a.identifiability.continuous import Extents
 from er3a.identifiability.entries import continuous_of, gauge_of
 from er3a.identifiability.proposals import proposals_of
@@ -134,7 +135,7 @@ def test_tables_with_other_values_meet_all_that_the_drawing_says(entry):
 
 @cache
 def found_elsewhere() -> list[oracle.Rows]:
-    """Tables that the search finds about the ER3-600's, with its directions."""
+    """Tables that a short search finds about the ER3-600's, with its directions."""
     robot, references = load_robot("er3_600"), load_references("er3_600")
     stated = [each for each in references.references if each.document == "drawing_v1_1"]
     free, table = continuous_of(robot), tables_of(robot)
@@ -142,7 +143,11 @@ def found_elsewhere() -> list[oracle.Rows]:
     asked = Asked(robot, requirements_of(stated))
     extents = Extents(asked, table, free, speaking, gauge_of(robot, free), ToolRange(robot, table))
     assert extents.met
-    arms = [extents.region.tables(direction[None], amounts[None]) for direction, amounts in extents.elsewhere]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(continuous, "SPREAD", 48)
+        patch.setattr(continuous, "ROUNDS", 0)
+        found = extents.elsewhere
+    arms = [extents.region.tables(direction[None], amounts[None]) for direction, amounts in found]
     return [{name: getattr(arm, name) for name in oracle.COLUMNS} for arm in arms]
 
 

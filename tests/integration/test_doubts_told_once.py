@@ -9,10 +9,11 @@ import yaml
 
 from testing.small_study import STUDY
 
+pytestmark = pytest.mark.long
+
 ROBOT = "ur5e"  # without references: its validation takes a second
 
 
-@pytest.mark.long
 def test_a_doubtful_number_of_the_study_is_one_line_of_a_run(fresh_project):
     """After a run that was cut off, too, whose lock another process takes away; and of Snakemake by itself."""
     run = fresh_project("doubtful")

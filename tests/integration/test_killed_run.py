@@ -18,6 +18,8 @@ from testing.processes import started
 from testing.small_study import STUDY
 from tests.conftest import ROBOT, leave_one_robot
 
+pytestmark = pytest.mark.long
+
 STAGES_RUN = ("validation", "workspace", "inverse")
 QUICK_STAGES = ("inverse", "programs", "dynamics")
 
@@ -32,7 +34,6 @@ def finished_results(run) -> list[Path]:
     return [path for path in run.folder.glob("results/*/*/summary.json") if path.parent not in in_the_making]
 
 
-@pytest.mark.long
 def test_kill_9_in_mid_run_then_the_same_bytes_on_one_core(small_study, fresh_project):
     """Of some stages; the campaign on kills has all, with pages and recordings."""
     run = fresh_project("killed")
@@ -59,7 +60,6 @@ def test_kill_9_in_mid_run_then_the_same_bytes_on_one_core(small_study, fresh_pr
         assert path.stat().st_mtime_ns == changed, f"{path} was finished and yet made again"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_a_run_and_its_jobs_and_the_next_run_goes_on(fresh_project, tmp_path, number):
     """Ctrl-C goes to all processes of a terminal and ends them; after SIGTERM to the run alone, jobs end as they do."""

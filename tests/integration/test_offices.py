@@ -22,6 +22,8 @@ import pytest
 from testing.processes import run
 from testing.small_study import ROOT
 
+pytestmark = pytest.mark.long
+
 ODD_STUDY = "config/one's ü.yaml"
 WHEEL = "tiny-1.0-py3-none-any.whl"
 
@@ -37,7 +39,6 @@ def copied(fresh_project, folder: Path):
     return moved
 
 
-@pytest.mark.long
 @needs_make
 def test_a_study_and_a_checkout_with_blanks_quotes_and_umlauts(fresh_project, tmp_path):
     folder = copied(fresh_project, tmp_path / "my cöpy of it")
@@ -109,7 +110,6 @@ class _Silent(SimpleHTTPRequestHandler):
         """Nothing is told of requests."""
 
 
-@pytest.mark.long
 @needs_make
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
 @pytest.mark.skipif(not Path(sys.prefix, "bin/uv").is_file(), reason="uv is not installed here")

@@ -12,6 +12,8 @@ import pytest
 
 from testing.small_study import STUDY
 
+pytestmark = pytest.mark.long
+
 FILES = {
     "pipeline/stages/toy/__init__.py": '"""How long the arm is."""\n',
     "pipeline/stages/toy/entry.py": '''"""The stage in the registry."""

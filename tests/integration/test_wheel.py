@@ -113,12 +113,8 @@ def test_the_core_is_light_and_answers_without_extras(wheel, tmp_path):
     (tmp_path / "table.csv").write_text(DH, encoding="utf-8")
     for code, words in (
         (1, ("compare", "table.csv", "irb120")),
-        (0, ("arms", "irb120")),
-        (0, ("check", "table.csv")),
-        (0, ("confirm", "table.csv", "--plan")),
         (0, ("teach", "table.csv")),
         (0, ("check-program", ROOT / "data/programs/pick_place.src", "--robot", "er3a_c60")),
-        (0, ("calibrate", "er3_600", "--help")),
         (2, ("run",)),
     ):
         done = run([place / "bin/er3a", *words], cwd=tmp_path, env=STRANGER)

@@ -41,6 +41,7 @@ def stanford() -> Robot:
     )
 
 
+@pytest.mark.long
 @given(data=st.data(), robot=chains())
 def test_any_chain_agrees_with_pinocchio(data, robot):
     q, peer = data.draw(joints_within(robot))[None], PinocchioArm(robot)
@@ -54,6 +55,7 @@ def test_any_chain_agrees_with_pinocchio(data, robot):
         np.testing.assert_allclose(forward(same, q), forward(robot, q), rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 @given(data=st.data(), robot=chains(coupled=False))
 def test_many_tables_have_the_frames_of_one(data, robot):
     q = np.stack([data.draw(joints_within(robot)) for _ in range(2)])

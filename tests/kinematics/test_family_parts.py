@@ -25,6 +25,7 @@ def beyond(robot, q):
     return excess
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factors", [(0, 0, 0, 1.0, 0, 0.5), (0, 1.0, 0, 0, 0, 1.0), (0, 0, 0, 1.0, 0, 1.0)])
 def test_a_line_of_aligned_wrists_keeps_limits_of_sums_and_is_told_in_all_its_turns(factors):
     total = float(np.dot(factors, ALIGNED))

@@ -174,6 +174,7 @@ def test_nearest_equivalents_are_the_best_of_all_turns(data, robot):
         assert np.abs(inside - near[j]).min() < 1e-9
 
 
+@pytest.mark.long
 def test_a_regular_pose_is_solved_at_once_with_the_rows_of_the_longer_way_in_six_modules(random, monkeypatch):
     """The short way may only leave things out: its rows, slots, limits and reasons are those of the longer one."""
     entered: set[str] = set()

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 CALL = """
 import numpy as np
@@ -20,7 +22,6 @@ print(sum(dot.stats.cache_hits.values()), sum(dot.stats.cache_misses.values()))
 """
 
 
-@pytest.mark.long
 def test_a_copy_with_equal_kernels_compiles_nothing_and_one_with_others_does(tmp_path):
     def hits_and_misses(copy: Path) -> str:
         environment = os.environ | {"PYTHONPATH": str(copy), "XDG_CACHE_HOME": str(tmp_path / "cache")}

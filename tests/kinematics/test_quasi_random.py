@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from er3a.numerics.quasi_random import quasi_random_points
+
+pytestmark = pytest.mark.long
 
 
 def test_points_fill_the_box_more_evenly_than_random_ones(random):

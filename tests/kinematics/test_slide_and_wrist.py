@@ -12,6 +12,8 @@ from er3a.kinematics.classes.slide_and_wrist import solve_slide_and_wrist
 from er3a.kinematics.inverse import inverse
 from testing.arms import made_of
 
+pytestmark = pytest.mark.long
+
 WRIST = [("R", 0, -90, 0, -170, 170), ("R", 0, 90, 0, -170, 170), ("R", 0, 0, 100, -170, 170)]
 ARMS = {
     "Stanford": [("R", 0, -90, 412, -170, 170), ("R", 0, 90, 154, -170, 170), ("P", 0, 0, 0, 300, 1200)],
@@ -52,7 +54,6 @@ def apart(rows, q, others):
     return np.abs(np.where([row[0] == "P" for row in rows], away, (away + np.pi) % (2 * np.pi) - np.pi)).max(axis=1)
 
 
-@pytest.mark.long
 @pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ARMS)
 def test_no_start_leads_to_an_arm_that_is_not_told(name, random):
@@ -89,7 +90,6 @@ def test_own_joints_are_found_at_singular_poses_and_each_pose_by_itself(name, ra
     assert any(motion.within_limits for motion in inverse(robot, poses[0], q[0]).families)
 
 
-@pytest.mark.long
 def test_the_wrist_centre_on_axis_1_leaves_that_joint_free():
     rows = [("R", 0, -90, 412, -170, 170), ("R", 0, 90, 0, -170, 170), ("P", 0, 0, 0, 300, 1200), *WRIST]
     robot, q = made_of(rows), np.array([0.4, 0.0, 0.7, 0.3, 0.9, -0.4])

@@ -69,6 +69,7 @@ def test_what_is_usable_ends_at_the_end_within_all_limits(results, name):
         assert np.abs(price.motion.acceleration / case.limits.acceleration).max() <= 1 + 1e-6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["wrist_near", "wrist_met", "shoulder_near"])
 def test_stop_rests_on_the_path_before_the_region(results, name):
     case, price = segment_of(name), results[name]["stop"].cost

@@ -13,6 +13,8 @@ from er3a.kinematics.forward import forward
 from er3a.planning.follow import WIDE_STEP, branches_along, follow, turned_difference, with_whole_turns
 from er3a.planning.moves import line
 
+pytestmark = pytest.mark.long
+
 GRID = np.linspace(0, 1, 121)
 
 
@@ -51,7 +53,6 @@ def every_sequence(grid):
                         yield slot
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", "er3_600"])
 def test_no_other_sequence_stays_within_limits_for_longer(name):
     robot, random = load_robot(name), np.random.default_rng(6)

@@ -187,6 +187,7 @@ def carried_out(block, values, rng, done):
             carried_out(rest[2 if holds else 3], values, rng, done)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(60))
 def test_each_run_of_a_random_program_does_what_was_followed(seed, tmp_path):
     made = Made(random.Random(seed))

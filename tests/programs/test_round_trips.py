@@ -65,6 +65,7 @@ def tool_path(bends: int = 0):
     return q, ToolSequenceCommand(Start(joints=q), tuple(parts[: bends or None]), 5.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_joints_of_random_paths_come_back_to_the_digits_printed(language, tmp_path):
     rng = np.random.default_rng(7)

@@ -19,6 +19,8 @@ from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
 from er3a.robots.masses import MassBody
 
+pytestmark = pytest.mark.long
+
 ROBOT = load_robot("er3a_c60")
 HOME = np.radians([0.0, -20.0, 15.0, 0.0, -60.0, 0.0])
 TURNED = HOME + np.radians([35.0, 0, 0, 0, 0, 0])
@@ -370,7 +372,6 @@ def seconds(tmp_path_factory):
     return {name: check_program(read_program(saved(folder, *text())), ARM, options) for name, text in SECOND.items()}
 
 
-@pytest.mark.long
 def test_zones_arcs_loads_and_configurations_are_the_same(seconds):
     ends = [carried_out(check)[-1].end for name, check in seconds.items() if name != "rpl"]
     for end in ends:
@@ -387,7 +388,6 @@ def test_zones_arcs_loads_and_configurations_are_the_same(seconds):
                 assert a.path.law.duration == pytest.approx(b.path.law.duration, abs=1e-6)
 
 
-@pytest.mark.long
 def test_what_the_second_cell_is_for_is_found(seconds):
     for name, check in seconds.items():
         motions = carried_out(check)
@@ -401,7 +401,6 @@ def test_what_the_second_cell_is_for_is_found(seconds):
             assert (load.mass, load.centre) == (50.0, pytest.approx(LOAD.centre, abs=1e-12))
 
 
-@pytest.mark.long
 def test_the_motions_are_the_same(checks):
     for (one, first), (other, second) in pairwise(checks.items()):
         assert len(carried_out(first)) == 13
@@ -413,7 +412,6 @@ def test_the_motions_are_the_same(checks):
                     np.testing.assert_allclose(mine, own, atol=1e-7, err_msg=f"{one} {other}")
 
 
-@pytest.mark.long
 def test_the_times_are_the_same(checks):
     for (one, first), (other, second) in pairwise(checks.items()):
         assert first.cycle.stopping_s == pytest.approx(second.cycle.stopping_s, abs=1e-6), (one, other)
@@ -423,7 +421,6 @@ def test_the_times_are_the_same(checks):
                 assert a.path.law.duration == pytest.approx(b.path.law.duration, abs=1e-6), (one, other)
 
 
-@pytest.mark.long
 def test_the_findings_are_the_same(checks):
     codes = {
         language: [sorted({found.code for found in motion.findings}) for motion in carried_out(check)]

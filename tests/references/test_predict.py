@@ -150,6 +150,7 @@ def test_a_batch_of_candidates_is_read_at_once():
         np.testing.assert_array_equal(row, predict(candidate, references))
 
 
+@pytest.mark.long
 @OTHERS_LONG
 @pytest.mark.parametrize("point", ["wrist_centre", "flange"])
 @pytest.mark.parametrize(

@@ -82,6 +82,7 @@ def test_published_tables_get_their_name(tmp_path, table, name):
     assert name in (found["arm"], *found["same_geometry"])
 
 
+@pytest.mark.long
 def test_an_offset_left_out_is_named(tmp_path):
     rows = [(0, -90, 290, 0, 1), (270, 0, 0, 0, 1), (70, -90, 0, 0, 1), (0, 90, 302, 0, 1), (0, -90, 0, 0, 1)]
     found = said(written(tmp_path / "table.csv", [*rows, (0, 0, 72, 180, 1)], "standard"))

@@ -243,9 +243,12 @@ def test_bodies_beside_those_that_a_joint_holds_are_no_error_of_the_shapes(tmp_p
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory) -> list[tuple[str, UrdfFile, UrdfImport]]:
-    """Chains of every twelfth URDF of packages, three of each file with several; the fleet's campaign has all."""
+    """Chains of every twelfth URDF of packages, three of each file with several; the fleet's campaign has all.
+
+    Of three dogs that with the largest meshes is left out: it alone takes half of the time.
+    """
     found, turn = [], cycle((True, *11 * (False,)))
-    for file in urdf_files(tmp_path_factory.mktemp("expanded"), lambda name: next(turn)):
+    for file in urdf_files(tmp_path_factory.mktemp("expanded"), lambda name: next(turn) and not name.startswith("b1_")):
         if isinstance(file, UrdfFile):
             try:
                 found.append((file.name, file, import_urdf(file.path, snap=False)))

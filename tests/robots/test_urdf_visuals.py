@@ -55,6 +55,7 @@ def test_links_look_as_their_urdf_says_and_are_checked_by_other_shapes(imported)
     assert any("base" in note and "lost.stl is no file of a mesh" in note for note in imported.notes)
 
 
+@pytest.mark.long
 def test_triangles_that_stand_twice_front_and_back_are_simplified_too():
     ball = trimesh.creation.icosphere(4, RADIUS)
     corners = np.array(ball.vertices)
@@ -65,6 +66,7 @@ def test_triangles_that_stand_twice_front_and_back_are_simplified_too():
     assert np.array_equal(points, once_points)
 
 
+@pytest.mark.long
 def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_path):
     write_robot(imported.robot.replace(name="arm"), tmp_path / "arm.yaml")
     again = load_robot(tmp_path / "arm.yaml")

@@ -26,6 +26,8 @@ from er3a.workspace.orientations import asked_of
 from er3a.workspace.placement import Task, find_places, narrowed
 from er3a.workspace.proven import EMPTY, cavities, prove_robot
 
+pytestmark = pytest.mark.long
+
 ROBOT = load_robot("er3a_c60")
 FLOOR = Scene("floor", (Plane("floor", np.array([0.0, 0.0, 1.0]), 0.05),))
 CLEARANCE = 0.02
@@ -62,7 +64,6 @@ def refused() -> dict[str, tuple[np.ndarray, TargetResult]]:
     return {name: each for name, each in found.items() if each[1].chosen_deg is None}
 
 
-@pytest.mark.long
 def test_a_target_moved_or_turned_as_advised_is_reached_with_margin(refused):
     carried_out = 0
     for name, (T, before) in refused.items():
@@ -98,7 +99,6 @@ def test_the_obstacle_is_to_be_moved_only_where_the_arm_alone_keeps_its_margins(
     assert not all(advised)
 
 
-@pytest.mark.long
 def test_a_void_disappears_when_a_limit_is_extended_as_the_page_says():
     """The changed arm is proven anew."""
     robot, carried_out = load_robot("er3a_c60_article"), 0
@@ -115,7 +115,6 @@ def test_a_void_disappears_when_a_limit_is_extended_as_the_page_says():
     assert carried_out == 3
 
 
-@pytest.mark.long
 def test_a_box_that_is_moved_as_far_as_is_said_stays_clear_of_the_scene():
     """Beside a wall, at the end of its room each way: an arm with the margin, by distances in full, at all asked."""
     robot, down, margin = load_robot("er3_600"), np.array([0.0, 0.0, -1.0]), 0.02

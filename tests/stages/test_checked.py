@@ -166,6 +166,7 @@ def test_a_path_that_collides_passes_by_no_allowed_contact_missing_shape_or_miss
             assert gap_text(missing(verdict)[0]) in say_all(verdict.findings)
 
 
+@pytest.mark.long
 def test_rates_that_do_not_go_together_in_a_trajectory_of_ros_are_no_pass(study, tmp_path):
     """Without velocities the motion starts at once; with them it is judged by the cubic that a controller makes."""
     ends = [0, -0.2, -0.2, 0, -1.2, 0], [0.1, -0.3, -0.2, 0, -1.2, 0]
@@ -185,6 +186,7 @@ def test_rates_that_do_not_go_together_in_a_trajectory_of_ros_are_no_pass(study,
         assert speed == pytest.approx(np.degrees(0.05 if named else 0.075), rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("blend", [None, 3.0])
 def test_rows_that_a_table_passes_beside_though_nobody_asked_for_it_are_no_pass(study, tmp_path, blend):
     """At a turn back, corners that are rounded over half of a side end far before the row; a program would go to it."""
@@ -237,6 +239,7 @@ def test_what_is_expected_to_fail_alone_is_no_pass(study, tmp_path, stage):
     assert "Expected to fail, and did" in say_all(verdict.findings)
 
 
+@pytest.mark.long
 def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
     """One random joint vector of no collision: no place is shown to be reached from home."""
     few = {"samples": 1, "cells_across": 4, "rounds": 0, "neighbours": 1}
@@ -314,6 +317,7 @@ DOUBTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DOUBTS)
 def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     """The path is safe, but its program in doubt: neither path nor stage passes, and code and line are named."""
@@ -341,6 +345,7 @@ def test_paths_of_a_program_carry_what_its_check_finds(study, tmp_path, name):
     assert f"er3a: check-program says of the program that this path is of: {code} (" in text
 
 
+@pytest.mark.long
 def test_a_path_is_no_pass_where_its_program_is_not_followed(study, tmp_path):
     entry = {"paths": program_paths(tmp_path, {"job": "PTP {near}\nPTP XSEEN"})}
     results = trajectory(changed(study, entry, trajectory={"avoidance": "slow"}), ROBOT)
@@ -363,6 +368,7 @@ def test_a_line_that_is_left_out_breaks_the_path(study, tmp_path):
     np.testing.assert_allclose(ends, [[0, 10], [20, 20]], atol=1e-6)
 
 
+@pytest.mark.long
 def test_a_program_that_no_path_can_be_made_of_leaves_the_others(study, tmp_path):
     tool = "$BASE=$NULLFRAME\n$TOOL={X 0,Y 0,Z 99,A 0,B 0,C 0}\nPTP {near}\nLIN_REL {Z 5}"
     entry = {"paths": program_paths(tmp_path, {"unknown": "PTP XSEEN", "tool": tool, "sound": "PTP {near}"})}
@@ -405,6 +411,7 @@ def test_what_a_scene_allows_and_shows_of_a_tool_is_named(study):
     assert "bare_tool" not in {each.reason for each in open_points(robot, held)}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("solids", "bare"),
     [
@@ -927,6 +934,7 @@ def test_values_of_the_robots_file_that_are_assumed_are_named(tmp_path, monkeypa
     assert [(each.reason, each.names) for each in written[0].assumed] == [("own_values", named)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arm", "given", "status", "named"),
     [

@@ -76,6 +76,7 @@ def test_shares_agree_with_other_random_vectors(results, random):
         assert abs(free - share.ratio) < 5 * (high - low) / 2
 
 
+@pytest.mark.long
 def test_what_lies_below_the_floor_is_lost(results):
     rows = results.places
     assert not rows.clear[rows.middle_mm[:, 2] < -100].any()
@@ -90,6 +91,7 @@ def test_page_and_recording_say_what_was_found(folder, tmp_path):
         assert words in page
 
 
+@pytest.mark.long
 def test_the_verdict_names_the_nearest_target_and_the_paths_that_collide(results):
     found, closest = results.summary.verdict.finding, results.summary.closest
     of_targets = [each for each in closest if each.kind == "target"]
@@ -240,7 +242,7 @@ def with_a_base_too_large(folder: Path) -> Study:
     study["robots"] = {"arm": study["robots"][name] | {part: str(folder / f"{part}.yaml") for part in contents}}
     study["collision"] |= {"scene": None, "samples": 1000, "cells_across": 8, "rounds": 0}
     study["inverse"] |= {"scene": None, "round_trips": 10}
-    study["workspace"] |= {"samples": 20_000, "blocks": 1, "proof_cells": 2000}
+    study["workspace"] |= {"samples": 5000, "blocks": 1, "proof_cells": 200}
     study["capability"] |= {"directions": 20}
     return Study.model_validate(study)
 

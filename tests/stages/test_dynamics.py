@@ -243,6 +243,7 @@ def test_limits_that_are_guessed_settle_nothing(full, tmp_path, group, need):
         assert left["wrist_guess"] == ()
 
 
+@pytest.mark.long
 def test_limits_that_no_path_was_held_against_are_no_pass(full):
     summary = full[1].results.summary
     shown = [
@@ -315,6 +316,7 @@ def test_peaks_are_not_missed_between_few_samples(tmp_path):
     np.testing.assert_allclose(found[11], found[2001], rtol=2e-3)
 
 
+@pytest.mark.long
 def test_no_torque_with_its_tolerance_is_above_the_peak_with_its_own(full):
     results = full[1].results
     for path in (each for each in results.summary.paths if each.complete):

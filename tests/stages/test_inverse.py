@@ -115,6 +115,7 @@ def test_article_target_has_eight_solutions_and_none_within_limits(folders):
     assert exceeded.excess.value == pytest.approx(17.7, abs=0.05)
 
 
+@pytest.mark.long
 def test_every_solution_reproduces_its_target(computed):
     name, results = computed
     solutions = results.solutions

@@ -170,6 +170,7 @@ def test_what_passes_and_is_no_pass_is_marked_on_the_index_and_told_on_its_page(
     assert {each for each, text in told.items() if each in text} == ({words} - {""})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["line_collides", "line_limits"])
 def test_a_path_that_ends_where_its_advice_says_keeps_the_margin(tmp_path, name):
     """The advised point as it is printed, in the path's own file, judged by the stage itself."""

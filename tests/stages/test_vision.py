@@ -25,6 +25,8 @@ from testing.on_demand import OnDemand
 from tests.vision.test_boards import CHARUCO, board_places, rendered
 from tests.vision.test_hand_eye_file import HEAD, columns, write
 
+pytestmark = pytest.mark.long
+
 STAGE = STAGES["vision"]
 ARTICLE = "er3a_c60_article"
 
@@ -42,7 +44,6 @@ def folders(study, small_results):
     return OnDemand(lambda name: small_results("vision", name, study))
 
 
-@pytest.mark.long
 def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     assert summary.verdict.status == "caution"  # no gripper has a shape
@@ -62,7 +63,6 @@ def test_objects_are_grasped_as_expected_and_the_turned_board_is_named(folders):
     assert {each.refusal.code for each in summary.objects if each.refusal} == {"grasp_collides", "grasp_out_of_reach"}
 
 
-@pytest.mark.long
 def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     for near, clear in (((), 2), (("can",), 1), (("can", "box"), 0)):
@@ -74,7 +74,6 @@ def test_objects_within_the_margin_of_assumed_shapes_count_apart(folders):
         assert figures["objects_grasped"] == clear
 
 
-@pytest.mark.long
 def test_only_grasps_that_pass_are_told_to_succeed(folders):
     results = read_results(folders["er3a_c60"], VisionResults).results
     verdict, (can, *others) = results.summary.verdict, results.summary.objects
@@ -89,7 +88,6 @@ def test_only_grasps_that_pass_are_told_to_succeed(folders):
     assert told(expect="not graspable") == ["box"]
 
 
-@pytest.mark.long
 def test_an_object_without_a_grasp_is_not_grasped_whatever_refuses_it(folders):
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
     (can, *_), none = summary.objects, {"grasp": None, "refusal": None, "expect": None}
@@ -99,7 +97,6 @@ def test_an_object_without_a_grasp_is_not_grasped_whatever_refuses_it(folders):
         assert (verdict.status, verdict.finding.grasped) == (status, grasped)
 
 
-@pytest.mark.long
 def test_the_verdict_names_the_least_success_whatever_level_the_study_asks_for(folders):
     """A study that asks for no level counts a grasp that fails 199 times in 200, and says so."""
     summary = read_results(folders["er3a_c60"], VisionResults).results.summary
@@ -112,7 +109,6 @@ def test_the_verdict_names_the_least_success_whatever_level_the_study_asks_for(f
     assert "Probability" not in say(verdict_of(summary.calibration, (), ()).finding)
 
 
-@pytest.mark.long
 def test_a_wrong_table_shows_in_the_calibration(folders):
     """The same recording, its joint angles turned into poses by the article's table."""
     summary = read_results(folders[ARTICLE], VisionResults).results.summary
@@ -121,7 +117,6 @@ def test_a_wrong_table_shows_in_the_calibration(folders):
     assert summary.objects == ()
 
 
-@pytest.mark.long
 def test_tables_say_what_the_summary_says(folders):
     results = read_results(folders["er3_600"], VisionResults).results
     found = results.summary.calibration
@@ -132,7 +127,6 @@ def test_tables_say_what_the_summary_says(folders):
         assert each.error_mm.together >= max(each.error_mm.camera, each.error_mm.calibration, each.error_mm.table)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["er3a_c60", ARTICLE, "er3_600"])
 def test_the_page_is_written(study, folders, tmp_path, name):
     run.show("report", "vision", study, name, folders[name], tmp_path / "report")
@@ -140,7 +134,6 @@ def test_the_page_is_written(study, folders, tmp_path, name):
     assert "T_flange_board" in page or "T_base_board" in page
 
 
-@pytest.mark.long
 def test_images_come_with_their_reprojected_corners(study, tmp_path):
     """Rendered boards, one of them taken with the arm 5 mm beside where it says it was: its lines all point one way.
 
@@ -188,7 +181,6 @@ def test_images_come_with_their_reprojected_corners(study, tmp_path):
     assert "magnified" in page
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("turning", [False, True])
 def test_samples_without_a_calibration_leave_every_object_unexamined(study, tmp_path, turning):
     """All samples at one pose determine nothing; with some, but a wrong one, no grasp rests on it either."""

@@ -76,6 +76,7 @@ def test_summary_and_tables_belong_together(done):
             assert ((high[i] <= low[j] + 1e-9) | (high[j] <= low[i] + 1e-9)).any()
 
 
+@pytest.mark.long
 def test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice(done):
     robot, placed = load_robot("er3_600"), done.placement
     task = placed.task
@@ -110,6 +111,7 @@ def test_the_same_input_gives_the_same_numbers(done):
     assert again.places.frame().equals(done.places.frame())
 
 
+@pytest.mark.long
 def test_slices_show_the_cells_they_cut(done):
     lookup, cells = CellLookup(done.capability, done.cells), done.cells
     some = np.random.default_rng(1).choice(len(cells), 50, replace=False)

@@ -40,6 +40,7 @@ KINDS = [(stage, "er3a_c60") for stage in stages_of("er3a_c60")] + [("validation
 def test_a_page_has_chinese_marks_and_units(stage, name, chinese, tmp_path):
     page = tmp_path / "page.html"
     show("report", stage, chinese, name, Path("results") / name / stage, page)
+    assert '<html lang="zh-CN"' in page.read_text(encoding="utf-8")
     texts = [" ".join(text.split()) for text in PageTexts(page.read_text(encoding="utf-8")).texts]
     for wrong in (MARKS, BRACKETS, UNITS, WORDS):
         assert [text for text in texts if wrong.search(text)] == []

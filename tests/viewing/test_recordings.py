@@ -106,6 +106,7 @@ def test_recordings_of_a_robot_merge_without_being_mixed(small_study, tmp_path):
     assert sorted(recording.application_id for recording in kept) == sorted(f"{stage} er3_600" for stage in STAGES)
 
 
+@pytest.mark.long
 def test_bodies_are_red_and_the_contact_marked_while_they_overlap(robot, tmp_path):
     post = Sphere("post", np.eye(4), 0.1)
     overlap = PlayedEvent(0.5, 0.8, "collision", "fail", ("link_2", "post"))

@@ -65,6 +65,7 @@ def test_writing_a_recording_leaves_no_statistics(written):
     assert kept_in(environment) == []
 
 
+@pytest.mark.long
 def test_rerun_collects_statistics_by_itself(home, recording):
     subprocess.run([RERUN, "rrd", "verify", recording], env=home, check=True, capture_output=True, timeout=60)
     assert kept_in(home), "if this fails, Rerun has changed its ways, and without_statistics() may be of no use"

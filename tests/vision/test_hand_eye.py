@@ -171,6 +171,7 @@ def test_intervals_hold_the_truth_of_boards_that_opencv_locates(setup, cell):
     assert (np.abs(held - 0.95) < 0.06).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setup", SETUPS)
 def test_a_board_turned_by_half_is_named_and_left_out(setup):
     samples = a_set(setup, 3)
@@ -382,6 +383,7 @@ def test_residuals_that_nothing_explains_are_an_error():
     assert grave.rms_mm > 30
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stated", [False, True])
 def test_a_step_of_the_setup_is_named_with_and_without_stated_deviations(stated):
     samples = a_set("eye_in_hand", 14, **({"camera_covariance": covariance(15)} if stated else {}))
@@ -547,6 +549,7 @@ def test_sound_sets_are_not_of_two_setups():
         assert moved_between(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("setup", "apart"), [("eye_in_hand", 1e-4), ("eye_to_hand", 2e-5)])
 def test_samples_at_one_pose_count_as_one(setup, apart):
     """Four near copies of each of six samples tell no more than the six: with errors that the copies share."""

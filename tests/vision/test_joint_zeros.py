@@ -12,8 +12,9 @@ from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
 from er3a.vision.vision_findings import grave_warnings
 from testing.hand_eye_coverage import ROBOT, a_set
 
+pytestmark = pytest.mark.long
 
-@pytest.mark.long
+
 @pytest.mark.parametrize("setup", ["eye_in_hand", "eye_to_hand"])
 def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_examined(setup):
     for joint, deg in ((3, 5.0), (6, 5.0), (3, 0.0)):
@@ -34,7 +35,6 @@ def test_a_joint_zero_that_is_off_is_named_and_one_that_no_sample_shows_is_not_e
     assert zeros_tried(calibrate_hand_eye(poses), ROBOT)[1] == ("J1", "J2", "J3", "J4", "J5", "J6")
 
 
-@pytest.mark.long
 def test_a_joint_zero_below_the_size_that_is_stated_goes_unnamed():
     for share, named in ((0.5, False), (1.5, True)):
         least = zeros_tried(calibrate_hand_eye(a_set("eye_to_hand", 5, {}, 12, stated=False)), ROBOT)[2]
@@ -43,7 +43,6 @@ def test_a_joint_zero_below_the_size_that_is_stated_goes_unnamed():
         assert ("joint_zero" in {each.code for each in found.warnings}) == named
 
 
-@pytest.mark.long
 def test_a_moved_camera_is_no_joint_zero():
     samples = a_set("eye_to_hand", 6, {}, 14, stated=False)
     samples.target[7:, :3, 3] += [0.02, 0, 0]

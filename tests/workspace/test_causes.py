@@ -16,6 +16,8 @@ from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.proven import Cavity
 from testing.arms import made_of, tools_by_hand
 
+pytestmark = pytest.mark.long
+
 TURN = 2 * np.pi
 DEG = np.pi / 180
 
@@ -64,7 +66,6 @@ def share_by_hand(robot: Robot, cavity: Cavity, lower: np.ndarray, upper: np.nda
     return float(np.mean(hit))
 
 
-@pytest.mark.long
 def test_a_slide_that_ends_too_far_out_makes_a_hole():
     robot = polar()
     cavity = of_cells(robot, (0.06, 0.29), (0.05, 0.45), (0.0, TURN))
@@ -78,7 +79,6 @@ def test_a_slide_that_ends_too_far_out_makes_a_hole():
         assert (found == 1) == filled
 
 
-@pytest.mark.long
 def test_a_tube_along_a_slide_is_of_the_elbow():
     robot = on_a_slide()
     frame = cell_frame(robot)
@@ -96,7 +96,6 @@ def test_a_tube_along_a_slide_is_of_the_elbow():
     assert share_by_hand(robot, cavity, robot.lower - aside, robot.upper + aside, 0.0) == 0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("coupling", [None, np.array([[1.0, 0, 0], [0, 1, 0], [0, -1, 1]])])
 def test_a_hole_by_a_sum_of_joints_is_told_so(coupling):
     robot = summed(coupling)
@@ -112,7 +111,6 @@ def test_a_hole_by_a_sum_of_joints_is_told_so(coupling):
     assert share_by_hand(robot, cavity, robot.lower, robot.upper, by) == 1
 
 
-@pytest.mark.long
 def test_a_hole_by_a_sum_of_slides_is_told_so():
     """Two slides outwards, each from 0: only their sum keeps the tool 300 mm from axis 1."""
     rows = [("R", 0, 0, 0, -180, 180), ("P", 0, 90, 0, 0, 500), ("P", 0, 0, 0, 0, 500), ("P", 0, 0, 0, 0, 500)]
@@ -129,7 +127,6 @@ def test_a_hole_by_a_sum_of_slides_is_told_so():
     assert share_by_hand(robot, cavity, robot.lower - 0.4 * robot.sliding, robot.upper, 0.0) == 0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("factor", [1.0, 40.0])
 def test_a_hole_by_a_sum_of_a_turn_and_a_slide_is_told_so(factor):
     """A slide outwards from 0, which a turning joint behind it only lets come in where that turns: rad, and rad/m."""

@@ -104,6 +104,7 @@ def test_filled_cells_about_axis_1_are_reached(proven, random):
         assert reachable(robot, point, random) or reachable(robot, point, random, 200_000)
 
 
+@pytest.mark.long
 def test_bracket_narrows(proven):
     robot, proof = proven
     coarse, finer = prove_robot(robot, 500, 1).proof, proof.proof

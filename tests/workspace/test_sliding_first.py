@@ -11,6 +11,8 @@ from er3a.robots.robot import CombinedLimit, Robot
 from er3a.workspace.proven import EMPTY, FILLED, Proven, prove_robot
 from testing.arms import DEG, dh_matrix, gantry, made_of, placement, tools_by_hand
 
+pytestmark = pytest.mark.long
+
 TILTED = placement([0.3, -0.2, 0.5], [0.4, -0.7, 1.1])
 ARM = [
     *(("R", 90, -90, 300, -100, 150), ("R", 350, 0, 40, -120, 40), ("R", 60, -90, 0, -70, 130)),
@@ -94,7 +96,6 @@ def states(proven: Proven, points: np.ndarray) -> np.ndarray:
     return proven.section.status(*proven.in_section(points))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("make", MADE, ids=lambda make: make.__name__)
 def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
     robot = make()
@@ -112,7 +113,6 @@ def test_empty_cells_hold_no_point_and_filled_ones_are_reached(make, random):
     assert all(is_reached(robot, point, random) for point in filled)
 
 
-@pytest.mark.long
 def test_the_volume_of_a_gantry_lies_in_its_bracket():
     proven = prove_robot(gantry(), 500, 1)
     lower, upper = proven.proof.bounds
@@ -120,7 +120,6 @@ def test_the_volume_of_a_gantry_lies_in_its_bracket():
     assert lower > 0.8 * upper
 
 
-@pytest.mark.long
 def test_an_ur5_on_a_track_is_bounded_to_a_tenth():
     rows = [
         *(("R", 0, 90, 89.2, -360, 360), ("R", -425, 0, 0, -360, 360), ("R", -392.25, 0, 0, -360, 360)),
@@ -129,7 +128,6 @@ def test_an_ur5_on_a_track_is_bounded_to_a_tenth():
     assert prove_robot(made_of([("P", 0, 90, 0, 0, 2000), *rows]), 8000, 1).proof.width < 0.1
 
 
-@pytest.mark.long
 def test_a_sphere_that_slides_has_the_volume_of_a_formula():
     """A ball's shell is swept along the track: no void is left in a shell that is moved by more than its hole."""
     rows = [("P", 0, 0, 0, 0, 800), ("R", 0, 90, 0, -180, 180), ("R", 0, -90, 0, -180, 180), ("P", 0, 0, 0, 100, 400)]
