@@ -36,6 +36,7 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
+Distances = tuple[float | None, float | None, float | None, float | None]
 ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, and poses of the first
 ALIGN_POWER = 4  # of a distance, by which it counts
 TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
@@ -254,7 +255,7 @@ def compare(
 
 
 def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explained: bool = True) -> Comparison:
-    """What :func:`compare` finds; without causes and the best alignment if they are not asked for."""
+    """What :func:`compare` finds; without causes, the best alignment and distances if they are not asked for."""
     counts = robot_a.joints, robot_b.joints
     beside = given_by_both(beside_the_table(robot_a), beside_the_table(robot_b))
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
@@ -296,7 +297,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
     alignment = _alignment(plain) if same or not explained else _best_alignment(*in_right_units, plain)
-    off = _distances(printed, in_right_units, alignment, robot_a)
+    off: Distances = _distances(printed, in_right_units, alignment, robot_a) if explained else (None, None, None, None)
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing: list[Uncompared] = ["limits"] if limits.same is None else []
@@ -372,11 +373,10 @@ def best_of(
 
 def _misfit(found: Comparison) -> tuple[float, ...]:
     """Less is a better fit."""
-    if found.geometry is None or found.aligned_mm is None:
+    if found.geometry is None:
         return (3.0,)
-    differences = found.geometry.differences
-    size = sum(abs(each.difference) for each in differences)
-    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), len(differences), size, found.aligned_mm
+    size = sum(abs(each.difference) for each in found.geometry.differences)
+    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), found.different_entries, size, found.geometry.worst_mm
 
 
 def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
@@ -536,17 +536,17 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
         u = row_values(a, poses)
         return forward_of_rows(a, u), _aligned_flanges(a, b, moved(x), u)
 
-    def off(x: Reals, poses: Reals, scale: float) -> Reals:
-        one, other = flanges(x, poses)
-        gap = (other - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0) / max(scale, NO_OFFSET)
-        size = np.linalg.norm(gap.reshape(len(poses), 12), axis=1)
-        return np.asarray((gap.reshape(len(poses), 12) * size[:, None] ** ALIGN_POWER).ravel())
+    def off(x: Reals, u: Reals, one: Reals, scale: float) -> Reals:
+        gap = (_aligned_flanges(a, b, moved(x), u) - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0)
+        gap = gap.reshape(len(u), 12) / max(scale, NO_OFFSET)
+        return np.asarray((gap * np.linalg.norm(gap, axis=1)[:, None] ** ALIGN_POWER).ravel())
 
     best = x = np.zeros(12 + a.rows)
     least, worst = worst_pose(shift_between, lambda poses: flanges(best, poses), a)
     for _ in range(ALIGNED if least > NO_OFFSET else 0):
         q = np.concatenate([q, worst[None]])
-        x = scipy.optimize.leastsq(off, x, (q, least), maxfev=ALIGN_TRIES, full_output=True)[0]
+        u = row_values(a, q)
+        x = scipy.optimize.leastsq(off, x, (u, forward_of_rows(a, u), least), maxfev=ALIGN_TRIES, full_output=True)[0]
         now = x
         gap, worst = worst_pose(shift_between, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
         if gap < least:
@@ -556,7 +556,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
 
 def _distances(
     as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], alignment: Alignment, ranges: Robot
-) -> tuple[float, float, float, float]:
+) -> Distances:
     """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
     (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
 

@@ -297,14 +297,14 @@ def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Fla
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
     out[:] = links[0]
     for k, link in enumerate(links[1:]):
-        u = direction[k] * q[:, k]
-        step = np.tile(np.eye(4), (len(q), 1, 1))
+        u = (direction[k] * q[:, k])[:, None]
         if sliding[k]:
-            step[:, 2, 3] = u
+            out[..., 3] += u * out[..., 2]
         else:
             cosine, sine = np.cos(u + start_at[k]), np.sin(u + start_at[k])
-            step[:, 0, 0], step[:, 0, 1], step[:, 1, 0], step[:, 1, 1] = cosine, -sine, sine, cosine
-        out[:] = out @ step @ link
+            x, y = out[..., 0].copy(), out[..., 1]
+            out[..., 0], out[..., 1] = cosine * x + sine * y, cosine * y - sine * x
+        out[:] = (out.reshape(-1, 4) @ link).reshape(out.shape)
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 

@@ -104,16 +104,12 @@ def compare(
         compare_several([a, *others], asked)
 
 
-def compare_two(
-    a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None, read: Read | None = None
-) -> None:
+def compare_two(a: str, b: str, asked: CompareRequest) -> None:
     """Compare an arm with another, and print what was found.
 
     Parameters
     ----------
     a, b : as they were named on the command line
-    known : what is printed as JSON of a known arm that ``b`` names, too
-    read : A, if it has been read
 
     Raises
     ------
@@ -124,17 +120,38 @@ def compare_two(
     from er3a.files.robot_library import holds_table
     from er3a.robots.robot import to_modified, to_standard
 
-    first, found_before = read or _read(a, asked)
+    first = _read(a, asked)
     # Names of columns are those of A, or of B if A is no table.
-    of_table = {"columns": (), "joints": first.robot.joints} if holds_table(a) else {}
-    second, found_then = _read(b, replace(asked, options=asked.options | of_table))
-    arm = first.robot
-    if not first.printed and second.printed:
-        arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
-    tolerances = asked.tolerance_mm, asked.tolerance_deg
-    found = _beside(
-        compare_arms(arm, second.robot, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1]), first, second
-    )
+    of_table = {"columns": (), "joints": first[0].robot.joints} if holds_table(a) else {}
+    second = _read(b, replace(asked, options=asked.options | of_table))
+    arm, there = first[0].robot, second[0].robot
+    if not first[0].printed and second[0].printed:
+        arm = (to_modified if there.convention == "modified" else to_standard)(arm)
+    found = compare_arms(arm, there, tolerance_mm=asked.tolerance_mm, tolerance_deg=asked.tolerance_deg)
+    _print_compared((a, arm, first), (b, there, second), found, asked)
+
+
+def _print_compared(
+    one: tuple[str, Robot, Read],
+    other: tuple[str, Robot, Read],
+    found: Comparison,
+    asked: CompareRequest,
+    known: Mapping[str, Any] | None = None,
+) -> None:
+    """Print a comparison, and write the files that were asked for.
+
+    Parameters
+    ----------
+    one, other : their names on the command line, the arms as they were compared and as they were read
+    known : what is printed as JSON of a known arm that ``other`` names, too
+
+    Raises
+    ------
+    typer.Exit
+        with code 1 if anything differs
+    """
+    (a, arm, (first, found_before)), (b, there, (second, found_then)) = one, other
+    found = _beside(found, first, second)
     doubtful = list({str(each): each for each in (*found_before, *found_then)}.values())
     doubts = [str(each) for each in _unsettled(doubtful, found, Path(a) == Path(b))]
     if found.verdict == "equal" and doubts:
@@ -142,7 +159,8 @@ def compare_two(
     notes = _notes((a, first), (b, second))
     for note in notes:
         print_note(note)
-    written = _written((a, arm), (b, second.robot), found, asked.output, asked.html, (*tolerances, doubts))
+    tolerances = asked.tolerance_mm, asked.tolerance_deg, doubts
+    written = _written((a, arm), (b, there), found, asked.output, asked.html, tolerances)
     if asked.as_json:
         print_json(_record(found) | {"notes": notes, "doubtful_units": doubts} | dict(known or {}))
     else:
@@ -178,10 +196,12 @@ def identify(source: str, asked: CompareRequest) -> None:
     from er3a.comparison.compare import best_of
     from er3a.comparison.nearest import likely, of_equal_geometry
     from er3a.files.arm_catalogue import known_arms
+    from er3a.files.robot_library import ReadArm
     from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
+    from er3a.robots.robot import to_standard
 
     read, known = _read(source, asked), known_arms()
-    robot = read[0].robot
+    robot = read[0].robot if read[0].printed else to_standard(read[0].robot)
     robots = {name: arm.robot for name, arm in known.items()}
     tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
     ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
@@ -199,7 +219,8 @@ def identify(source: str, asked: CompareRequest) -> None:
     if not asked.as_json:
         print("\n".join(identified_lines(known[name], best, *groups)))
     record = {"arm": name, "same_geometry": list(alike), "as_near": sorted(others)}
-    compare_two(source, name, asked, record, read)
+    there = robots[name]
+    _print_compared((source, robot, read), (name, there, (ReadArm(there, True), ())), best, asked, record)
 
 
 def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
