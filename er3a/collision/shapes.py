@@ -518,7 +518,7 @@ def _depths_in(body: Body, points: Reals) -> Reals:
         return np.asarray(np.min([body.disc - away, height, length - height], axis=0))
     try:
         faces = scipy.spatial.ConvexHull(body.points).equations
-    except scipy.spatial.QhullError:  # flat
+    except RuntimeError:  # flat, says qhull
         return np.full(len(points), -np.inf)
     return np.asarray(-(points @ faces[:, :3].T + faces[:, 3]).max(axis=1))
 

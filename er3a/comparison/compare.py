@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import exp_rotation, posed, rot_x, rot_z, rotation_angle, sines_about_axes, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -36,7 +36,6 @@ Uncompared = Literal[
     "limits", "speeds", "limits_on_sums", "tool", "envelopes", "pair_rules", "inertia", "drives", "wrist_load", "weight"
 ]
 Columns = dict[str, Reals | str]
-Distances = tuple[float | None, float | None, float | None, float | None]
 ALIGNED, ALIGN_TRIES, ALIGN_POSES = 6, 200, 128  # rounds, evaluations in each, and poses of the first
 ALIGN_POWER = 4  # of a distance, by which it counts
 TURN_COUNTS = 0.01  # m, of the flange's axes in an alignment, so that a turn about its origin is not free
@@ -213,14 +212,14 @@ class Comparison(ByValue):
     coupling: CouplingLayer | None = None
     limits: RangeLayer | None = None
     speeds: RangeLayer | None = None
-    as_printed_mm: float | None = None
-    aligned_mm: float | None = None
-    as_printed_deg: float | None = None
-    aligned_deg: float | None = None
     joints: tuple[int, int] = (0, 0)
     corrected: Robot | None = None
     alignment: Alignment | None = None
     not_examined: tuple[Uncompared, ...] = ()
+    as_printed_mm: float | None = None
+    aligned_mm: float | None = None
+    as_printed_deg: float | None = None
+    aligned_deg: float | None = None
 
     @property
     def different_entries(self) -> int:
@@ -297,13 +296,13 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
     alignment = _alignment(plain) if same or not explained else _best_alignment(*in_right_units, plain)
-    off: Distances = _distances(printed, in_right_units, alignment, robot_a) if explained else (None, None, None, None)
+    off = _distances(printed, in_right_units, alignment, robot_a) if explained else ()
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing: list[Uncompared] = ["limits"] if limits.same is None else []
     missing += ["speeds"] if speeds.same is None else []
     missing += ["limits_on_sums"] if robot_a.combined or robot_b.combined else []
-    return Comparison(verdict, *layers, *off, counts, corrected, alignment, (*missing, *beside))
+    return Comparison(verdict, *layers, counts, corrected, alignment, (*missing, *beside), *off)
 
 
 def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
@@ -424,11 +423,12 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, about = mechanism.turn_of(T), log_rotation(T[:3, :3])
-    size = float(np.linalg.norm(about))
-    axis = about / size if size > NO_TURN else np.array([0.0, 0.0, 1.0])
+    angle, axis = mechanism.turn_of(T), np.array([0.0, 0.0, 1.0])
     if angle > HALF_TURN:
+        axis = np.linalg.eigh(T[:3, :3] + T[:3, :3].T)[1][:, 2]
         axis *= np.sign(axis[np.abs(axis).argmax()])
+    elif angle > NO_TURN:
+        axis = sines_about_axes(T[:3, :3]) / (2 * math.sin(angle))
     u, v, w = (axis + 0.0).tolist()
     turn = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
@@ -556,7 +556,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
 
 def _distances(
     as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], alignment: Alignment, ranges: Robot
-) -> Distances:
+) -> tuple[float, ...]:
     """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
     (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
 

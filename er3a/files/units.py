@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -164,31 +164,25 @@ def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
 
     Yields
     ------
-    noted : a list that fills while the block runs; warnings of other kinds pass through as before
+    noted : a list that is filled as the block ends; warnings of other kinds are shown then
 
     Notes
     -----
-    Python's ``warnings.showwarning`` is replaced meanwhile, so blocks of several threads must not overlap.
+    Python's warnings are recorded meanwhile, so blocks of several threads must not overlap.
     """
-    told: set[str] = set()
-    noted: list[DoubtfulUnit] = []
-    show = warnings.showwarning
-
-    def note(message: Warning | str, *rest: Any, **named: Any) -> None:
-        if not isinstance(message, DoubtfulUnit):
-            show(message, *rest, **named)
-        elif str(message) not in told:
-            told.add(str(message))
-            noted.append(message)
-
+    found: list[DoubtfulUnit] = []
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", DoubtfulUnit)
-            warnings.showwarning = note
-            yield noted
+            yield found
     finally:
-        for each in noted:
-            warnings.warn(each, stacklevel=3)
+        noted = {str(each.message): each.message for each in caught if isinstance(each.message, DoubtfulUnit)}
+        found += noted.values()
+        for each in caught:
+            if str(each.message) not in noted:
+                warnings.showwarning(each.message, each.category, each.filename, each.lineno)
+        for doubtful in found:
+            warnings.warn(doubtful, stacklevel=3)
 
 
 def look_like_radians(values: Sequence[float]) -> bool:

@@ -10,6 +10,7 @@ References
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from er3a.errors import PoseError, ShapeError
 from er3a.numerics.arrays import Reals, as_floats, for_kernel
@@ -159,12 +160,21 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     It comes from sine and cosine both, so that neither small turns nor half turns lose digits.
     """
     R = np.swapaxes(R_a, -1, -2) @ R_b
-    angle: Reals = np.arctan2(np.linalg.norm(_skew_part(R), axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    angle: Reals = np.arctan2(np.linalg.norm(sines_about_axes(R), axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
     return angle
 
 
-def _skew_part(R: Reals) -> Reals:
-    """The axes (..., 3) of rotations, twice their angles' sines long."""
+def sines_about_axes(R: Reals) -> Reals:
+    """The axes of rotations, as long as twice the sines of their angles.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+
+    Returns
+    -------
+    v : (..., 3); 0 of no turn and of a half turn
+    """
     return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
 
 
@@ -199,9 +209,7 @@ def exp_rotation(v: Reals) -> Reals:
     -------
     R : (..., 3, 3)
     """
-    half_turns = np.linalg.norm(v, axis=-1)[..., None, None] / np.pi
-    K = skew(v)
-    R: Reals = np.eye(3) + np.sinc(half_turns) * K + np.sinc(half_turns / 2) ** 2 / 2 * (K @ K)
+    R: Reals = scipy.spatial.transform.Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix().reshape(*v.shape, 3)
     return R
 
 
@@ -216,9 +224,7 @@ def log_rotation(R: Reals) -> Reals:
     -------
     v : (..., 3), rad, of length pi at most
     """
-    q = quaternion_of(R)
-    half = np.arctan2(np.linalg.norm(q[..., 1:], axis=-1, keepdims=True), q[..., :1])
-    v: Reals = 2 * q[..., 1:] / np.sinc(half / np.pi)
+    v: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec().reshape(R.shape[:-1])
     return v
 
 
@@ -368,21 +374,12 @@ def quaternion_of(T: Reals) -> Reals:
     Returns
     -------
     q : (..., 4), in the order w, x, y, z with w >= 0 (q and -q are the same rotation)
-
-    Notes
-    -----
-    Of the products of q's four entries, which a rotation matrix holds, the row of the largest entry loses no digits.
     """
     R = T[..., :3, :3]
-    trace = np.trace(R, axis1=-2, axis2=-1)[..., None, None]
-    products = np.empty((*R.shape[:-2], 4, 4))
-    products[..., 1:, 1:] = R + transposed(R) + (1 - trace) * np.eye(3)
-    products[..., :1, :1] = 1 + trace
-    products[..., 0, 1:] = products[..., 1:, 0] = _skew_part(R)
-    largest = np.diagonal(products, axis1=-2, axis2=-1).argmax(axis=-1)
-    q: Reals = np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :]
-    q /= np.linalg.norm(q, axis=-1, keepdims=True) * np.where(q[..., :1] < 0, -1.0, 1.0)
-    return q
+    q: Reals = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(
+        canonical=True, scalar_first=True
+    )
+    return q.reshape(*R.shape[:-2], 4)
 
 
 def check_poses(T: Reals, argument: str = "T") -> Reals:

@@ -296,15 +296,15 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
 def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
     out[:] = links[0]
+    entries, (x, y, z, place) = out.reshape(-1, 4), np.moveaxis(out, 2, 0)
     for k, link in enumerate(links[1:]):
-        u = (direction[k] * q[:, k])[:, None]
+        u = direction[k] * q[:, k, None]
         if sliding[k]:
-            out[..., 3] += u * out[..., 2]
+            place += u * z
         else:
             cosine, sine = np.cos(u + start_at[k]), np.sin(u + start_at[k])
-            x, y = out[..., 0].copy(), out[..., 1]
-            out[..., 0], out[..., 1] = cosine * x + sine * y, cosine * y - sine * x
-        out[:] = (out.reshape(-1, 4) @ link).reshape(out.shape)
+            x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
+        entries[:] = entries @ link
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 

@@ -12,13 +12,13 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, wraps
+from functools import cache
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from types import ModuleType
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -98,10 +98,11 @@ def kernel(function: Function) -> Function:
 
     Notes
     -----
+    Where it runs as Python, it says nothing of infinities and NaN either.
     No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
     release the interpreter's lock, so threads can run them side by side.
     """
-    return machine_code.compiled(function, kernels_folder()) if machine_code else _in_python(function)
+    return machine_code.compiled(function, kernels_folder()) if machine_code else np.errstate(all="ignore")(function)
 
 
 def inner_kernel(function: Function) -> Function:
@@ -121,17 +122,6 @@ def inner_kernel(function: Function) -> Function:
     function once more for that number; ``int(0)`` does not.
     """
     return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True) if machine_code else function
-
-
-def _in_python(function: Function) -> Function:
-    """A kernel as the Python that it is written in; like machine code, it says nothing of infinities and NaN."""
-
-    @wraps(function)
-    def quiet(*values: Any) -> Any:
-        with np.errstate(all="ignore"):
-            return function(*values)
-
-    return cast(Function, quiet)
 
 
 # Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.
