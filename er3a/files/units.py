@@ -64,12 +64,16 @@ def joint_names(path: Path, header: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(found, key=found.__getitem__))
 
 
-def check_millimetres(values: Sequence[float]) -> None:
-    """Reject lengths that can't be millimetres.
+def as_millimetres(values: list[float]) -> list[float]:
+    """Reject lengths that can't be millimetres, as a pydantic validator.
 
     Parameters
     ----------
     values : mm; all zero is allowed
+
+    Returns
+    -------
+    values : as they are
 
     Raises
     ------
@@ -82,6 +86,7 @@ def check_millimetres(values: Sequence[float]) -> None:
         raise ValueError(f"{shown} mm can only be metres | Multiply by 1000")
     if largest > MAX_DISTANCE_MM:
         raise ValueError(f"{shown} mm is more than 100 m | Write mm, not micrometres")
+    return values
 
 
 def check_degrees(values: Sequence[float], slides: bool = False) -> None:
@@ -268,22 +273,6 @@ def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
         problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
         raise InputError(None, field, problem, f"Give {robot.joints}")
     return meant(robot, given)
-
-
-def as_millimetres(values: list[float]) -> list[float]:
-    """Lengths that :func:`check_millimetres` finds nothing wrong with, as a pydantic validator.
-
-    Parameters
-    ----------
-    values : mm
-
-    Raises
-    ------
-    ValueError
-        as ``problem | remedy``, for values that can't be millimetres
-    """
-    check_millimetres(values)
-    return values
 
 
 def _looked_at(values: list[float]) -> list[float]:
