@@ -132,7 +132,8 @@ def _rows(group: CodeGroup) -> list[list[str]]:
     if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
         return [row_cells(each[1:-1]) for each in inner]
     lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-    if group.bracket != "[" or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
+    matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
+    if not matrix or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
         return []
     return [row_cells(each.strip().strip("[],")) for each in lines]
 
@@ -200,19 +201,20 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
 
 
 def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
-    """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so."""
+    """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
+    named tuple."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
     for each in groups:
-        named, names = re.search(r"(\w+)\s*$", each.before), _parameters(each.inside)
+        named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = [heading.quantity for name in names if (heading := heading_of(name))]
-        if each.bracket == "(" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
+        if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
             orders.setdefault(named[1], names)
     return orders
 
 
 def _parameters(text: str) -> list[str]:
     """Names of parameters without their types and defaults."""
-    return [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*") for part in parts(text)]
+    return [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
 
 
 def _of_signature(order: list[str], text: str) -> dict[str, str]:

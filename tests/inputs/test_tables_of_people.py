@@ -204,7 +204,12 @@ ARRAYS = (
 )
 
 
-@pytest.mark.parametrize("text", [CALLS, DECLARED, KDL, DEFINED, TOML, WORDS, NO_ANGLE, ARRAYS])
+NAMED = "Row = namedtuple('Row', ['a', 'alpha', 'd', 'theta'])\n"
+NAMED += "arm = [Row(0, -FRAC_PI_2, 0.29, 'q1'), Row(0.27, 0, 0, 'q2-pi/2')]\n"
+CELLS = "% theta, d, a, alpha\nDH = {'q1' 0.29 0 -pi/2;\n  'q2-pi/2' 0 0.27 0};\n"
+
+
+@pytest.mark.parametrize("text", [NAMED, CELLS, CALLS, DECLARED, KDL, DEFINED, TOML, WORDS, NO_ANGLE, ARRAYS])
 def test_two_rows_of_an_irb_120_are_read_in_programs_and_files_of_others(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
