@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from er3a.files.by_name import evidence as evidence
     from er3a.files.by_name import load_calibration as load_calibration
     from er3a.files.by_name import load_measurements as load_measurements
-    from er3a.files.by_name import load_table as load_table
     from er3a.files.hand_eye_file import load_hand_eye as load_hand_eye
     from er3a.files.reference_sets import load_references as load_references
     from er3a.files.robot_library import load_robot as load_robot
@@ -100,7 +99,6 @@ _PUBLIC = {
     "calibrate": "er3a.files.by_name",
     "load_measurements": "er3a.files.by_name",
     "load_calibration": "er3a.files.by_name",
-    "load_table": "er3a.files.by_name",
     "load_references": "er3a.files.reference_sets",
     "load_hand_eye": "er3a.files.hand_eye_file",
     "CalibrationSet": "er3a.vision.calibration_set",

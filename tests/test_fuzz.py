@@ -50,7 +50,6 @@ FOUND = [
     ("er3_600.yaml", ROBOT, D_MM, "d_mm: !!float 6:30", "tags"),  # was 390
     ("er3_600.yaml", ROBOT, D_MM, "d_mm: ! '367.5'", "tags"),  # a text, was a number
     ("er3_600.yaml", ROBOT, D_MM, "d_mm: !!bool 1", "tags"),  # was a KeyError
-    ("er3_600.yaml", ROBOT, D_MM, "d_mm: 1e-400", "1e-400 would be read as 0"),
     ("er3_600.yaml", ROBOT, "alpha_deg: 90", "alpha_deg: 1e300", "more than ten turns"),
     ("er3_600.yaml", ROBOT, "kind: robot", "kind: robot\n" + "k" * 900 + ": 1", "unknown key"),
     ("scene.yaml", SCENE, "normal: [0, 0, 1]", "normal: [0, 0, 1e200]", "no direction"),  # its length overflowed
@@ -58,7 +57,6 @@ FOUND = [
     ("targets.yaml", TARGETS, "[[0, 0, 1], ", "[[0, 0, 1e200], ", "not a rotation"),
     ("targets/table.csv", TARGET_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
     ("targets/table.csv", TARGET_TABLE, "300.5", "\u0661\u0662", "is not a number"),  # was 12
-    ("targets/table.csv", TARGET_TABLE, "first,0", "first,1e-400", "too small"),  # was 0
     ("paths/tool.csv", PATH_TABLE, "x_mm,", "x_mm\rx,", "not valid CSV"),  # was a traceback
     ("measured.csv", MEASUREMENTS, "512,0.2", '512,"0.2', "not valid CSV"),  # a quote that is never closed
     ("measured.csv", MEASUREMENTS, "210.5", "1e300", "too large"),

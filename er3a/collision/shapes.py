@@ -24,7 +24,7 @@ from functools import lru_cache
 from typing import assert_never
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import scipy
 
 from er3a.collision.convex import cylinder_points, distances_from_hull
 from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, WORLD, Layout
@@ -517,8 +517,8 @@ def _depths_in(body: Body, points: Reals) -> Reals:
         away = np.linalg.norm(np.cross(points - start, along), axis=1) / length
         return np.asarray(np.min([body.disc - away, height, length - height], axis=0))
     try:
-        faces = ConvexHull(body.points).equations
-    except QhullError:  # flat
+        faces = scipy.spatial.ConvexHull(body.points).equations
+    except RuntimeError:  # flat, says qhull
         return np.full(len(points), -np.inf)
     return np.asarray(-(points @ faces[:, :3].T + faces[:, 3]).max(axis=1))
 

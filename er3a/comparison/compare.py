@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import exp_rotation, log_rotation, posed, rot_x, rot_z, rotation_angle, translation
+from er3a.geometry.transforms import exp_rotation, posed, rot_x, rot_z, rotation_angle, sines_about_axes, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -212,14 +212,14 @@ class Comparison(ByValue):
     coupling: CouplingLayer | None = None
     limits: RangeLayer | None = None
     speeds: RangeLayer | None = None
-    as_printed_mm: float | None = None
-    aligned_mm: float | None = None
-    as_printed_deg: float | None = None
-    aligned_deg: float | None = None
     joints: tuple[int, int] = (0, 0)
     corrected: Robot | None = None
     alignment: Alignment | None = None
     not_examined: tuple[Uncompared, ...] = ()
+    as_printed_mm: float | None = None
+    aligned_mm: float | None = None
+    as_printed_deg: float | None = None
+    aligned_deg: float | None = None
 
     @property
     def different_entries(self) -> int:
@@ -254,7 +254,7 @@ def compare(
 
 
 def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, explained: bool = True) -> Comparison:
-    """What :func:`compare` finds; without causes and the best alignment if they are not asked for."""
+    """What :func:`compare` finds; without causes, the best alignment and distances if they are not asked for."""
     counts = robot_a.joints, robot_b.joints
     beside = given_by_both(beside_the_table(robot_a), beside_the_table(robot_b))
     if counts[0] != counts[1] or robot_a.rows != robot_b.rows:
@@ -296,13 +296,13 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
     agree = agree and units.same and not known.slips and limits.same is not False and speeds.same is not False
     verdict: VerdictWord = "equal" if same and agree else "same_arm" if same else "other_arm"
     alignment = _alignment(plain) if same or not explained else _best_alignment(*in_right_units, plain)
-    off = _distances(printed, in_right_units, alignment, robot_a)
+    off = _distances(printed, in_right_units, alignment, robot_a) if explained else ()
     corrected = _corrected(robot_a, robot_b, found, tolerances, limits, signs=reverses, joint_zeros=joint_zeros)
     layers = known.slips, units, geometry, zero, directions, base, flange, coupled, limits, speeds
     missing: list[Uncompared] = ["limits"] if limits.same is None else []
     missing += ["speeds"] if speeds.same is None else []
     missing += ["limits_on_sums"] if robot_a.combined or robot_b.combined else []
-    return Comparison(verdict, *layers, *off, counts, corrected, alignment, (*missing, *beside))
+    return Comparison(verdict, *layers, counts, corrected, alignment, (*missing, *beside), *off)
 
 
 def beside_the_table(robot: Robot) -> frozenset[Uncompared]:
@@ -372,11 +372,10 @@ def best_of(
 
 def _misfit(found: Comparison) -> tuple[float, ...]:
     """Less is a better fit."""
-    if found.geometry is None or found.aligned_mm is None:
+    if found.geometry is None:
         return (3.0,)
-    differences = found.geometry.differences
-    size = sum(abs(each.difference) for each in differences)
-    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), len(differences), size, found.aligned_mm
+    size = sum(abs(each.difference) for each in found.geometry.differences)
+    return {"equal": 0, "same_arm": 1}.get(found.verdict, 2), found.different_entries, size, found.geometry.worst_mm
 
 
 def _other_kinds(robot: Robot, kinds: Reals) -> GeometryLayer:
@@ -424,11 +423,12 @@ def _undone(robot: Robot, known: Explained) -> Iterator[Difference]:
 
 def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.Tolerances) -> PlacementLayer:
     x, y, z = (1000 * T[:3, 3]).tolist()
-    angle, about = mechanism.turn_of(T), log_rotation(T[:3, :3])
-    size = float(np.linalg.norm(about))
-    axis = about / size if size > NO_TURN else np.array([0.0, 0.0, 1.0])
+    angle, axis = mechanism.turn_of(T), np.array([0.0, 0.0, 1.0])
     if angle > HALF_TURN:
+        axis = np.linalg.eigh(T[:3, :3] + T[:3, :3].T)[1][:, 2]
         axis *= np.sign(axis[np.abs(axis).argmax()])
+    elif angle > NO_TURN:
+        axis = sines_about_axes(T[:3, :3]) / (2 * math.sin(angle))
     u, v, w = (axis + 0.0).tolist()
     turn = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)
@@ -536,17 +536,17 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
         u = row_values(a, poses)
         return forward_of_rows(a, u), _aligned_flanges(a, b, moved(x), u)
 
-    def off(x: Reals, poses: Reals, scale: float) -> Reals:
-        one, other = flanges(x, poses)
-        gap = (other - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0) / max(scale, NO_OFFSET)
-        size = np.linalg.norm(gap.reshape(len(poses), 12), axis=1)
-        return np.asarray((gap.reshape(len(poses), 12) * size[:, None] ** ALIGN_POWER).ravel())
+    def off(x: Reals, u: Reals, one: Reals, scale: float) -> Reals:
+        gap = (_aligned_flanges(a, b, moved(x), u) - one)[:, :3] * (TURN_COUNTS, TURN_COUNTS, TURN_COUNTS, 1.0)
+        gap = gap.reshape(len(u), 12) / max(scale, NO_OFFSET)
+        return np.asarray((gap * np.linalg.norm(gap, axis=1)[:, None] ** ALIGN_POWER).ravel())
 
     best = x = np.zeros(12 + a.rows)
     least, worst = worst_pose(shift_between, lambda poses: flanges(best, poses), a)
     for _ in range(ALIGNED if least > NO_OFFSET else 0):
         q = np.concatenate([q, worst[None]])
-        x = scipy.optimize.leastsq(off, x, (q, least), maxfev=ALIGN_TRIES, full_output=True)[0]
+        u = row_values(a, q)
+        x = scipy.optimize.leastsq(off, x, (u, forward_of_rows(a, u), least), maxfev=ALIGN_TRIES, full_output=True)[0]
         now = x
         gap, worst = worst_pose(shift_between, lambda poses, now=now: flanges(now, poses), a)  # type: ignore[misc]
         if gap < least:
@@ -556,7 +556,7 @@ def _best_alignment(robot_a: Robot, robot_b: Robot, found: mechanism.Match) -> A
 
 def _distances(
     as_printed: tuple[Robot, Robot], in_right_units: tuple[Robot, Robot], alignment: Alignment, ranges: Robot
-) -> tuple[float, float, float, float]:
+) -> tuple[float, ...]:
     """Largest distances (mm), then angles (deg), of the flanges that were found, each as printed and aligned."""
     (first, second), (a, b) = ([robot.without_tool() for robot in pair] for pair in (as_printed, in_right_units))
 

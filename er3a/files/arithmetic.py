@@ -25,7 +25,7 @@ def words_of(text: str) -> dict[str, str]:
 
 UNITS = words_of(
     "mm=mm 毫米=mm cm=cm m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
-    "°=deg deg=deg degs=deg degree=deg degrees=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
+    "°=deg deg=deg degs=deg degree=deg degrees=deg grad=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
 )
 _RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}
 _DEGREES = {"rad2deg", "degrees"}
@@ -43,6 +43,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"
 )
+_PI = re.compile(r"π|(?:m_|frac_)?pi(?:_([24]))?")
 _INDEX = re.compile(r"[(\[]\s*(\d+)\s*[)\]]\s*")
 _NONE = "is not a number or an expression"
 _SIGNS = str.maketrans("−–—﹣∗⋅·×∕÷º˚∘◦⍺", "----****//°°°°α")
@@ -150,8 +151,8 @@ def _in_python(text: str, given: Mapping[str, str], depth: int, values: dict[str
 
 def _named(word: str, low: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of pi, of a given name, of a degree as programs have it, or of a variable."""
-    if low in ("pi", "π", "m_pi"):
-        return CellAmount(math.pi, "rad")
+    if found := _PI.fullmatch(low):
+        return CellAmount(math.pi / int(found[1] or 1), "rad")
     for each in (word, name_of(word)):
         if each in given:
             return _amount(plain(given[each]), given, depth + 1)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -31,13 +29,9 @@ from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.references.predict import with_rounding
-from er3a.references.quantities import Pose
 from er3a.references.reference import Document, Documents, Reference, ReferenceSet
 from er3a.robots.joint_limits import joint_columns, meant
 from er3a.robots.robot import Robot, Source
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SAME = 1e-9  # m, rad, kg
 WRITE_CALIBRATION = "Write one: er3a calibrate ROBOT MEASUREMENTS.csv --json > FILE.json"
@@ -65,7 +59,6 @@ POSES_TO_JUDGE_SCALE = 4
 OTHER_UNITS_MM = {"metres": 1000.0, "feet": 304.8, "inches": 25.4, "cm": 10.0, "micrometres": 1e-3}
 MUCH, LEFT_BY_SCALE = 1.25, 0.05
 """Times a unit that points may be apart beside it, and the share of their squares that it may leave."""
-APART_DEVIATIONS = 8.0
 
 
 def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Measurement, ...]:
@@ -81,7 +74,7 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     ------
     InputError
         naming file, row and column: a wrong unit, a number missing or not finite, a deviation that is not positive,
-        values that can only be metres or radians, or rows that contradict each other
+        or values that can only be metres or radians
     """
     path = Path(path)
     joints = joint_columns(robot) if robot else joint_names(path, read_header(path)) or SIX
@@ -108,7 +101,6 @@ def load_measurements(path: str | Path, robot: Robot | None = None) -> tuple[Mea
     _check_units(path, rows, joints)
     if robot is not None:
         _check_scale(path, rows, robot)
-    _check_contradictions(path, rows)
     return tuple(rows)
 
 
@@ -153,25 +145,6 @@ def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
         problem = f"the points are {scale:.3g} times as far apart as {robot.name}'s table puts them: these are {unit}"
         remedy = f"Multiply by {OTHER_UNITS_MM[unit]:g}"
         raise InputError(path, "columns x_mm, y_mm, z_mm", problem, remedy)
-
-
-def _check_contradictions(path: Path, rows: list[Measurement]) -> None:
-    """Reject points of the same joint values that are farther apart than their deviations explain."""
-    if any(row.deviation_mm is None for row in rows):
-        return
-    by_pose: dict[tuple[Pose, str], list[Measurement]] = {}
-    for row in rows:
-        if not row.touched:
-            by_pose.setdefault((row.pose, row.point), []).append(row)
-    for first, row in (pair for same in by_pose.values() for pair in combinations(same, 2)):
-        most = APART_DEVIATIONS * math.hypot(first.deviation_mm or 0.0, row.deviation_mm or 0.0)
-        for name, one, other in zip("xyz", first.xyz_mm, row.xyz_mm):
-            if one is not None and other is not None and abs(one - other) > most:
-                problem = (
-                    f"contradicts row {first.row}: same joints, {abs(one - other):.3g} mm apart in {name}, "
-                    "far beyond the stated standard deviations"
-                )
-                raise InputError(path, f"row {row.row}", problem, "Remove the wrong one, or state its deviation")
 
 
 def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Diagnosis:
@@ -319,33 +292,3 @@ def _known(path: str | Path, where: str, known: dict[Any, Any], wanted: object) 
 
 def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:
     return getattr(first, name), getattr(second, name)
-
-
-def load_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of results, such as ``results/er3_600/validation/checks.parquet``.
-
-    Returns
-    -------
-    frame : ``frame.attrs["columns"]`` has unit and meaning of each column, by the column's name
-
-    Raises
-    ------
-    InputError
-        if the file is missing or is not a table of er3a
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    remedy = "Give a .parquet file of a study's results"
-    try:
-        stored = pq.ParquetFile(pa.BufferReader(Path(path).read_bytes())).read()
-    except OSError as error:
-        raise InputError(path, None, error.strerror or str(error), remedy) from None
-    except ValueError:
-        raise InputError(path, None, "this is not a Parquet file", remedy) from None
-    columns = {part.name: {k.decode(): v.decode() for k, v in (part.metadata or {}).items()} for part in stored.schema}
-    if not all({"unit", "meaning"} <= set(described) for described in columns.values()):
-        raise InputError(path, None, "its columns have no unit and meaning", remedy)
-    frame = stored.to_pandas()
-    frame.attrs["columns"] = columns
-    return frame

@@ -14,7 +14,6 @@ from typing import Any
 
 from er3a.errors import InputError, given_bytes
 from er3a.files.units import MIN_SPAN_MM, WIDEST_IN_RADIANS
-from er3a.files.yaml_file import vanished
 from er3a.formats.mesh_file import TOO_LARGE, read_text, text_of
 
 LARGEST_DIGITS = 9
@@ -282,8 +281,8 @@ def cell_value(path: Path, row: int, name: str, text: str, column: CsvColumn) ->
         raise InputError(path, where, f"'{text}' is not {number}", remedy)
     if not math.isfinite(value):
         raise InputError(path, where, f"'{text}' is not a finite number", "Write a number, or remove the row")
-    if abs(value) > 10.0**column.digits or vanished(text, value):
-        problem = f"'{text}' is too {'large' if value else 'small'} for any {column.quantity}"
+    if abs(value) > 10.0**column.digits:
+        problem = f"'{text}' is too large for any {column.quantity}"
         raise InputError(path, where, problem, "Check its exponent and unit")
     return value
 

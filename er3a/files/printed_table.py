@@ -8,6 +8,7 @@ ways is refused, with both.
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 import re
 import sys
@@ -38,7 +39,8 @@ _CELL = (
     (r"\((?:t|fixed|var(?:iable|\.)?|变量)\)", ""),
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
-    (r"^(?:\*+|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
+    (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
+    (r"\b[A-Za-z]\w*::", ""),
     (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
@@ -51,7 +53,7 @@ _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "re
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 SIGNS = {
     "modified": re.compile(
-        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig'?s\b", re.I
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b", re.I
     ),
     "standard": re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I),
 }
@@ -130,6 +132,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     InputError
         naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
     """
+    text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
     try:
         found, from_code = _tables(text, columns)
     except InputError as error:
@@ -359,14 +362,16 @@ class _Table:
 
     def _given(self) -> dict[str, str]:
         """Values of symbols, as expressions; a symbol with two values has none."""
+        several = r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$"
+        given, together = _GIVEN.findall(re.sub(several, "", self.text)), re.findall(several, self.text)
+        for names, values in together:
+            if names.count(",") == values.count(","):
+                given += zip(names.split(","), map(str.strip, values.strip(" ;").split(",")), itertools.repeat(""))
         found: dict[str, str] = {}
-        for name, value, unit in _GIVEN.findall(self.text):
+        for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 symbol, value = name_of(name), f"({value}) {unit}" if unit else value.rstrip(" \t.")
                 found[symbol] = value if found.get(symbol, value) == value else "two values"
-        for names, values in re.findall(r"(?m)^[ \t]*(\w+(?:[ \t]*,[ \t]*\w+)+)[ \t]*=[ \t]*([^=\n(]+)$", self.text):
-            if names.count(",") == values.count(","):
-                found |= dict(zip(map(name_of, names.split(",")), map(str.strip, values.strip(" ;").split(","))))
         return found
 
     def converted(self) -> PrintedTable:

@@ -23,8 +23,6 @@ from er3a.files.printed_table import table_text
 from er3a.files.units import doubt_millimetres
 from er3a.files.yaml_file import StrictModel, load
 from er3a.formats.mesh_file import read_stl, read_text
-from er3a.formats.urdf import import_urdf, urdf_table
-from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
 from er3a.geometry.transforms import rot_x, rot_y, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.robots.joint_limits import meant
@@ -105,6 +103,9 @@ def read_arm(
         robot = robot_of(content)
         return ReadArm(robot, True, notes, beside_the_table(robot), headed_units(path, **form))
     if path.suffix in URDF:
+        from er3a.formats.urdf import import_urdf, urdf_table  # half of what reading an arm needs
+        from er3a.formats.urdf_tree import plain_urdf, srdf_home, tip_after
+
         with plain_urdf(path, xacro) as plain:
             if tip is None and joints is not None:
                 tip = tip_after(plain, base, joints)

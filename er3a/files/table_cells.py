@@ -18,11 +18,14 @@ LONGEST_LINE = 2000
 MARKS = "|", "│", "┃", "║", "\t", ";", ",", "  ", " "
 """What separates cells, tried in this order; two blanks, then one, last."""
 _BOX = re.compile(r"[─━═│┃║┌┐└┘├┤┬┴┼╔╗╚╝╠╣╦╩╬╒╕╘╛╞╡╤╧╪╭╮╰╯┏┓┗┛┣┫┳┻╋━+|:=\s_-]*")
-_UNIT = r"(?:mm|cm|m|in|inch|deg\w*|rad\w*|°|毫米|米|度)"
+_UNIT = r"(?:mm|cm|m|in|inch|deg\w*|grad|rad\w*|°|毫米|米|度)"
 _LATEX = (
     (r"(?<!\\)%.*", ""),
     (r"\\(?:hline|toprule|midrule|bottomrule|hhline\{[^}]*\})|\\(?:cline|cmidrule)(?:\([lr]+\))?\{[^}]*\}", ""),
-    (r"\\multirow\s*\{[^}]*\}\s*(?:\[[^\]]*\])?\{[^}]*\}|\\(?:left|right|displaystyle|limits|bf|rm|it)\b", ""),
+    (
+        r"\\multirow\s*\{[^}]*\}\s*(?:\[[^\]]*\])?\{[^}]*\}|\\(?:left|right|displaystyle|limits|boldmath|bfseries|bf|rm|it)\b",
+        "",
+    ),
     (r"\\(?:SI|qty)\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1 \2"),
     (r"\\ang\s*\{([^{}]*)\}", r"\1°"),
     (r"\^\s*\{?\s*\\circ\s*\}?|\\(?:text)?degrees?\b|\\circ\b", "°"),

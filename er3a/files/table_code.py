@@ -132,7 +132,8 @@ def _rows(group: CodeGroup) -> list[list[str]]:
     if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
         return [row_cells(each[1:-1]) for each in inner]
     lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-    if group.bracket != "[" or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
+    matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
+    if not matrix or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
         return []
     return [row_cells(each.strip().strip("[],")) for each in lines]
 
@@ -166,16 +167,16 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread = list[_Link](), list[int]()
+    rows, unread, orders = list[_Link](), list[int](), _signatures(code, groups)
     for each in sorted(groups, key=lambda group: group.start):
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        cells = _arguments(named[2], each.inside)
+        cells = _arguments(named[2], each.inside) or _of_signature(orders.get(named[2], []), each.inside)
         index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if cells is None and _TOOLBOX.fullmatch(named[2]) and not index:
+        if not cells and _TOOLBOX.fullmatch(named[2]) and not (index or named[2] in orders):
             unread.append(code.line(each.start))
-        elif cells is not None:
+        elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
     if rows and unread:
@@ -183,7 +184,7 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
-    texts = [cell for row in rows for cell in row.cells.values()]
+    texts = [cell for row in rows for cell in _constants(row.cells)]
     if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
         return []
     if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
@@ -197,6 +198,35 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
     lists = [each for each in lists if len(each) > 1]
     return [_grid([(row.line, row.cells) for row in each]) for each in arms or lists or _begun_again(rows)]
+
+
+def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
+    """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
+    named tuple."""
+    orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
+    for each in groups:
+        named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
+        found = [heading.quantity for name in names if (heading := heading_of(name))]
+        if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
+            orders.setdefault(named[1], names)
+    return orders
+
+
+def _parameters(text: str) -> list[str]:
+    """Names of parameters without their types and defaults."""
+    return [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
+
+
+def _of_signature(order: list[str], text: str) -> dict[str, str]:
+    """A row of a function's arguments; none of its definition, nor of a call with elements of lists."""
+    cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
+    listed = any("[" in cell for cell in _constants(cells))
+    return {} if len(cells) < len(order) or _parameters(text) == order or listed else cells
+
+
+def _constants(cells: dict[str, str]) -> list[str]:
+    """The cells of a row without theta, which can be an element ``q[0]``."""
+    return [cell for name, cell in cells.items() if (own := heading_of(name)) is None or own.quantity != "theta"]
 
 
 @dataclass(frozen=True)
@@ -334,7 +364,7 @@ def _blocks(code: Code) -> list[Grid]:
     """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated."""
     rows: list[tuple[int, dict[str, str]]] = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
-        found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*:\s*([^\[{]*)", line)
+        found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
         key = found[2].lower()
@@ -512,9 +542,9 @@ def _pairs(code: Code) -> list[Grid]:
             row["offset"] = entries.get(("offset", joint), ("0", 0))[0]
         rows.append((code.line(cells[2][1] if cells[2] else 0), row))
     angles = found_names & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
-    return [_grid(rows)] if len(rows) > 1 and angles else []
+    return [_grid(rows)] if len(rows) > 1 and (angles or "DH_" in code.text) else []
 
 
 def _found(pattern: str, text: str) -> Iterator[tuple[str, str, str, int]]:
-    for each in re.finditer(pattern, text):
-        yield each[1], each[2], each[3], each.start()
+    for each in re.finditer(pattern, text, re.IGNORECASE):
+        yield each[1].lower(), each[2], each[3], each.start()

@@ -14,7 +14,7 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha "
+    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha al=alpha "
     "offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
     "type=type jointtype=type sigma=type σ=type 类型=type"
 )
@@ -28,6 +28,7 @@ _OURS = re.compile(r"(joint)|(a|alpha|d|offset)_(mm|cm|m|in|deg|rad)")
 _PRIVATE = re.compile(r"type|convention|direction|calibrated|(?:lower|upper|speed)_\w+|(?:beta|theta)_(?:deg|rad)")
 _OF_RANGES = re.compile(r"(?i)(?<![a-z])(?:min|max|range|limit)|范围|限")
 _LETTER = re.compile(r"[^\W\d_]|#")
+_LAST_WORD = re.compile(r".*\s([^\s(\[\]]+)\s*(?:[(\[]\D*)?")
 _BEFORE = re.compile(r"[ijn]-1")
 
 
@@ -71,4 +72,6 @@ def heading_of(text: str) -> Heading | None:
         return Heading("joint", "", False)
     marked = _NAMES.get(name) or next((quantity for mark, quantity in _WORDS.items() if mark in name), None)
     marked = marked or _NAMES.get(re.sub(r"[^a-z]", "", name) if not name.isascii() else "")
+    last = _LAST_WORD.fullmatch(plain(text.lower()))
+    marked = marked or (last and _NAMES.get(last[1]))
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -64,12 +64,16 @@ def joint_names(path: Path, header: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(found, key=found.__getitem__))
 
 
-def check_millimetres(values: Sequence[float]) -> None:
-    """Reject lengths that can't be millimetres.
+def as_millimetres(values: list[float]) -> list[float]:
+    """Reject lengths that can't be millimetres, as a pydantic validator.
 
     Parameters
     ----------
     values : mm; all zero is allowed
+
+    Returns
+    -------
+    values : as they are
 
     Raises
     ------
@@ -82,6 +86,7 @@ def check_millimetres(values: Sequence[float]) -> None:
         raise ValueError(f"{shown} mm can only be metres | Multiply by 1000")
     if largest > MAX_DISTANCE_MM:
         raise ValueError(f"{shown} mm is more than 100 m | Write mm, not micrometres")
+    return values
 
 
 def check_degrees(values: Sequence[float], slides: bool = False) -> None:
@@ -164,31 +169,25 @@ def noted_doubts() -> Iterator[list[DoubtfulUnit]]:
 
     Yields
     ------
-    noted : a list that fills while the block runs; warnings of other kinds pass through as before
+    noted : a list that is filled as the block ends; warnings of other kinds are shown then
 
     Notes
     -----
-    Python's ``warnings.showwarning`` is replaced meanwhile, so blocks of several threads must not overlap.
+    Python's warnings are recorded meanwhile, so blocks of several threads must not overlap.
     """
-    told: set[str] = set()
-    noted: list[DoubtfulUnit] = []
-    show = warnings.showwarning
-
-    def note(message: Warning | str, *rest: Any, **named: Any) -> None:
-        if not isinstance(message, DoubtfulUnit):
-            show(message, *rest, **named)
-        elif str(message) not in told:
-            told.add(str(message))
-            noted.append(message)
-
+    found: list[DoubtfulUnit] = []
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", DoubtfulUnit)
-            warnings.showwarning = note
-            yield noted
+            yield found
     finally:
-        for each in noted:
-            warnings.warn(each, stacklevel=3)
+        noted = {str(each.message): each.message for each in caught if isinstance(each.message, DoubtfulUnit)}
+        found += noted.values()
+        for each in caught:
+            if str(each.message) not in noted:
+                warnings.showwarning(each.message, each.category, each.filename, each.lineno)
+        for doubtful in found:
+            warnings.warn(doubtful, stacklevel=3)
 
 
 def look_like_radians(values: Sequence[float]) -> bool:
@@ -274,22 +273,6 @@ def joint_rates(robot: Robot, values: Sequence[float], field: str) -> Reals:
         problem = f"{given.shape[-1]} joint values for {robot.name}, which has {robot.joints} joints"
         raise InputError(None, field, problem, f"Give {robot.joints}")
     return meant(robot, given)
-
-
-def as_millimetres(values: list[float]) -> list[float]:
-    """Lengths that :func:`check_millimetres` finds nothing wrong with, as a pydantic validator.
-
-    Parameters
-    ----------
-    values : mm
-
-    Raises
-    ------
-    ValueError
-        as ``problem | remedy``, for values that can't be millimetres
-    """
-    check_millimetres(values)
-    return values
 
 
 def _looked_at(values: list[float]) -> list[float]:

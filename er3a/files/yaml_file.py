@@ -77,19 +77,6 @@ class _PlainLoader(Composer, yaml.CSafeLoader):
             raise yaml.constructor.ConstructorError(None, None, f"{unsupported} are not supported", event.start_mark)
         return super().compose_node(parent, index)
 
-    def construct_yaml_float(self, node):
-        """The value of a decimal number.
-
-        Raises
-        ------
-        yaml.constructor.ConstructorError
-            for a number other than zero that is too small for a float, and would be read as 0
-        """
-        value = super().construct_yaml_float(node)
-        if vanished(node.value, value):
-            raise yaml.constructor.ConstructorError(None, None, f"{node.value} would be read as 0", node.start_mark)
-        return value
-
     def construct_mapping(self, node, deep=False):
         """The mapping of a node, with all that is in it.
 
@@ -125,27 +112,11 @@ _PlainLoader.yaml_implicit_resolvers = {
     first: [(tag, pattern) for tag, pattern in resolvers if tag not in _NUMBERS]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
-_PlainLoader.add_constructor("tag:yaml.org,2002:float", _PlainLoader.construct_yaml_float)
 for _tag, _pattern in _NUMBERS.items():
     _PlainLoader.add_implicit_resolver(_tag, re.compile(_pattern), list("-+.0123456789"))
 
 
 _LINE_END = re.compile("\r\n|[\n\r\x85\u2028\u2029]")  # what PyYAML counts as one; a fault can lie after the last line
-
-
-def vanished(text: str, value: float) -> bool:
-    """Whether a number that is not written as zero is too small to be held as another.
-
-    Parameters
-    ----------
-    text : as it was written, with or without exponent
-    value : what it was read as
-
-    Returns
-    -------
-    vanished : True for 1e-400, False for 0.00
-    """
-    return value == 0 and re.search("[1-9]", text.lower().partition("e")[0]) is not None
 
 
 @lru_cache(maxsize=128)

@@ -160,9 +160,22 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     It comes from sine and cosine both, so that neither small turns nor half turns lose digits.
     """
     R = np.swapaxes(R_a, -1, -2) @ R_b
-    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
-    angle: Reals = np.arctan2(np.linalg.norm(skew, axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    angle: Reals = np.arctan2(np.linalg.norm(sines_about_axes(R), axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
     return angle
+
+
+def sines_about_axes(R: Reals) -> Reals:
+    """The axes of rotations, as long as twice the sines of their angles.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+
+    Returns
+    -------
+    v : (..., 3); 0 of no turn and of a half turn
+    """
+    return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
 
 
 def nearest_rotations(M: Reals) -> Reals:

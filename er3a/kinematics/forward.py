@@ -296,15 +296,15 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
 def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
     out[:] = links[0]
+    entries, (x, y, z, place) = out.reshape(-1, 4), np.moveaxis(out, 2, 0)
     for k, link in enumerate(links[1:]):
-        u = direction[k] * q[:, k]
-        step = np.tile(np.eye(4), (len(q), 1, 1))
+        u = direction[k] * q[:, k, None]
         if sliding[k]:
-            step[:, 2, 3] = u
+            place += u * z
         else:
             cosine, sine = np.cos(u + start_at[k]), np.sin(u + start_at[k])
-            step[:, 0, 0], step[:, 0, 1], step[:, 1, 0], step[:, 1, 1] = cosine, -sine, sine, cosine
-        out[:] = out @ step @ link
+            x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
+        entries[:] = entries @ link
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
 
 

@@ -12,21 +12,26 @@ import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, wraps
+from functools import cache
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar, cast
+from types import ModuleType
+from typing import Any, TypeVar
 
 import numpy as np
 
 from er3a.errors import Er3aError
 
+machine_code: ModuleType | None
 try:
-    from er3a.numerics import machine_code
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") == "0":
+        from er3a.numerics import machine_code
+    else:  # importing numba takes longer than some commands do
+        machine_code = None
 except ModuleNotFoundError:  # no numba
-    machine_code = None  # type: ignore[assignment]
+    machine_code = None
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
@@ -52,7 +57,7 @@ def is_compiled() -> bool:
     -------
     compiled : False where numba is not installed, or ``NUMBA_DISABLE_JIT`` switches it off
     """
-    return machine_code is not None and machine_code.is_on()
+    return machine_code is not None
 
 
 @cache
@@ -77,7 +82,7 @@ def compile_seconds() -> float:
     -------
     seconds : s, wall time; nested compilations count once
     """
-    return machine_code.waiting.seconds if machine_code else 0.0
+    return float(machine_code.waiting.seconds) if machine_code else 0.0
 
 
 def kernel(function: Function) -> Function:
@@ -93,10 +98,11 @@ def kernel(function: Function) -> Function:
 
     Notes
     -----
+    Where it runs as Python, it says nothing of infinities and NaN either.
     No fastmath and no contraction across operations: results must not depend on the machine's vector width. Kernels
     release the interpreter's lock, so threads can run them side by side.
     """
-    return machine_code.compiled(function, kernels_folder()) if is_compiled() else _in_python(function)
+    return machine_code.compiled(function, kernels_folder()) if machine_code else np.errstate(all="ignore")(function)
 
 
 def inner_kernel(function: Function) -> Function:
@@ -115,20 +121,7 @@ def inner_kernel(function: Function) -> Function:
     Leaving the entry out spares a sixth of the compiling. A literal as an argument, alone or in a tuple, compiles the
     function once more for that number; ``int(0)`` does not.
     """
-    if not is_compiled():
-        return function
-    return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True)
-
-
-def _in_python(function: Function) -> Function:
-    """A kernel as the Python that it is written in; like machine code, it says nothing of infinities and NaN."""
-
-    @wraps(function)
-    def quiet(*values: Any) -> Any:
-        with np.errstate(all="ignore"):
-            return function(*values)
-
-    return cast(Function, quiet)
+    return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True) if machine_code else function
 
 
 # Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.

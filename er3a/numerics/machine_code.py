@@ -20,17 +20,6 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def is_on() -> bool:
-    """Whether numba compiles, or is switched off for this process.
-
-    Returns
-    -------
-    on : False with ``NUMBA_DISABLE_JIT=1``
-    """
-    config: Any = numba.config
-    return not config.DISABLE_JIT
-
-
 class SharedByCopies(UserProvidedCacheLocator):
     """Numba's folders below a named one, by the place of a file in this package instead of the place of the package:
     copies of a checkout share what one of them has compiled."""

@@ -223,7 +223,6 @@ def test_the_command_writes_a_robot_file_that_has_the_corrected_kinematics(rando
         ("0,0,0,0,0,0,flange,,,,0.1", ["row 2", "x_mm", "no coordinate"]),
         ("0,0,0,0,0,0,tip,374,0,699.5,0.1", ["row 2", "point", "tool"]),
         ("0,0,0,0,0,0,flange,0.374,0,0.6995,0.1", ["columns x_mm", "metres", "1000"]),
-        ("0,0,0,0,0,0,flange,374,0,699.5,0.1\n0,0,0,0,0,0,flange,380,0,699.5,0.1", ["row 3", "contradicts row 2"]),
         (
             "0.5,0,0,0,0,0,flange,374,0,699,0.1\n1,0,0,0,0,0,flange,3,0,699,0.1\n2,0,0,0,0,0,flange,3,0,699,0.1",
             ["radians"],

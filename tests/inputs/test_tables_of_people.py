@@ -169,6 +169,52 @@ def numbers(content):
     ]
 
 
+CALLS = """
+def dh(theta, d, a, alpha):
+    return np.array([[cos(theta), d], [sin(theta), a]])
+T1 = dh(q[0], 0.29, 0, -pi/2)
+T2 = dh(q[1] - M_PI_2, 0, 0.27, 0)
+"""
+DECLARED = """
+Matrix4d link(double alpha, double a, double d, double theta);
+return link(-M_PI_2, 0, 0.29, q(0)) * link(0, 0.27, 0, q(1) - Eigen::PI / 2);
+"""
+KDL = """
+chain.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::RotZ), KDL::Frame::DH(0, -KDL::PI / 2, 0.29, 0)));
+chain.addSegment(KDL::Segment(KDL::Joint(KDL::Joint::RotZ), KDL::Frame::DH(0.27, 0, 0, -M_PI_2)));
+"""
+DEFINED = """
+#define DH_A1 0
+#define DH_A2 0.27
+#define DH_ALPHA1 -M_PI / 2
+#define DH_ALPHA2 0
+#define DH_D1 0.29
+#define DH_D2 0
+#define DH_THETA1 q1
+#define DH_THETA2 q2 - M_PI_2
+"""
+TOML = "[[joint]]\na = 0\nalpha = -90\nd = 290\noffset = 0\n[[joint]]\na = 270\nalpha = 0\nd = 0\noffset = -90\n"
+WORDS = (
+    "Gelenk;Drehwinkel θ [Grad];Achsabstand d [mm];Länge a [mm];Verdrehung α [Grad]\n1;θ1;290;0;-90\n2;θ2-90;0;270;0\n"
+)
+NO_ANGLE = '{"a": 0, "d": 290, "alpha": -90, "theta": null, "offset": 0}, '
+NO_ANGLE += '{"a": 270, "d": 0, "alpha": 0, "theta": null, "offset": -90}'
+ARRAYS = (
+    "d = np.array([0.29, 0])\nal = np.array([-np.pi/2, 0])\na = np.array([0, 0.27])\noffset = np.array([0, -np.pi/2])\n"
+)
+
+
+NAMED = "Row = namedtuple('Row', ['a', 'alpha', 'd', 'theta'])\n"
+NAMED += "arm = [Row(0, -FRAC_PI_2, 0.29, 'q1'), Row(0.27, 0, 0, 'q2-pi/2')]\n"
+CELLS = "% theta, d, a, alpha\nDH = {'q1' 0.29 0 -pi/2;\n  'q2-pi/2' 0 0.27 0};\n"
+
+
+@pytest.mark.parametrize("text", [NAMED, CELLS, CALLS, DECLARED, KDL, DEFINED, TOML, WORDS, NO_ANGLE, ARRAYS])
+def test_two_rows_of_an_irb_120_are_read_in_programs_and_files_of_others(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_a_table_is_read_as_it_is_meant_in_every_form(tmp_path, form):
     content, _ = read(tmp_path, form(IRB120, ["theta", "d", "a", "alpha"], "θ{}"))
@@ -223,6 +269,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
         ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
+        ("a1, a2 = 0, 0.3\na_2 = pi/2\nd = [0.2, 0]\na = [a1, a2]\nalpha = [a_2, 0]", "a2"),  # one symbol for er3a
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
             "one of them",

@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 Read = tuple["ReadArm", Sequence[DoubtfulUnit]]
 """An arm as it was read, and doubts about its units."""
 
-MAX_TOLERANCE = 1000.0  # mm, and deg
+Tolerance = Annotated[
+    float, typer.Option(min=1e-9, max=1000, help="lengths, or angles, that differ by at most this are equal")
+]
 NEAR = 1  # entries of geometry in which a table may differ from a known arm and still be near it
 NEAREST_SHOWN = 3  # known arms, if none is near
 TOOLS_EQUAL = 1e-9  # m, and of axes
@@ -80,8 +82,8 @@ def compare(
     base: Base = None,
     tip: Tip = None,
     xacro: Xacro = None,
-    tolerance_mm: Annotated[float, typer.Option(help="lengths that differ by at most this are equal")] = TOLERANCE_MM,
-    tolerance_deg: Annotated[float, typer.Option(help="angles that differ by at most this are equal")] = TOLERANCE_DEG,
+    tolerance_mm: Tolerance = TOLERANCE_MM,
+    tolerance_deg: Tolerance = TOLERANCE_DEG,
     output: Annotated[Path | None, typer.Option(help="write A, corrected to equal B, to this file (.yaml)")] = None,
     html: Annotated[Path | None, typer.Option(help="also write a page")] = None,
     as_json: AsJson = False,
@@ -92,7 +94,8 @@ def compare(
     """
     if [a, *(others or ())].count("-") > 1:
         raise Er3aError("standard input holds one table; give the others as files")
-    _refuse_wrong({"--tolerance-mm": tolerance_mm, "--tolerance-deg": tolerance_deg}, output)
+    if output is not None and output.suffix not in (".yaml", ".yml"):
+        raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
     options: dict[str, Any] = {"convention": convention, "length_unit": length_unit, "angle_unit": angle_unit}
     options |= {"base": base, "tip": tip, "as_printed": True, "columns": columns_of(column)}
     asked = CompareRequest(options, tuple(xacro or ()), tolerance_mm, tolerance_deg, output, html, as_json)
@@ -105,7 +108,12 @@ def compare(
 
 
 def compare_two(
-    a: str, b: str, asked: CompareRequest, known: Mapping[str, Any] | None = None, read: Read | None = None
+    a: str,
+    b: str,
+    asked: CompareRequest,
+    known: Mapping[str, Any] | None = None,
+    read: Read | None = None,
+    found: Comparison | None = None,
 ) -> None:
     """Compare an arm with another, and print what was found.
 
@@ -113,7 +121,7 @@ def compare_two(
     ----------
     a, b : as they were named on the command line
     known : what is printed as JSON of a known arm that ``b`` names, too
-    read : A, if it has been read
+    read, found : A, if it has been read, and what a comparison with B found, if there was one
 
     Raises
     ------
@@ -132,9 +140,9 @@ def compare_two(
     if not first.printed and second.printed:
         arm = (to_modified if second.robot.convention == "modified" else to_standard)(arm)
     tolerances = asked.tolerance_mm, asked.tolerance_deg
-    found = _beside(
-        compare_arms(arm, second.robot, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1]), first, second
-    )
+    if found is None:
+        found = compare_arms(arm, second.robot, tolerance_mm=tolerances[0], tolerance_deg=tolerances[1])
+    found = _beside(found, first, second)
     doubtful = list({str(each): each for each in (*found_before, *found_then)}.values())
     doubts = [str(each) for each in _unsettled(doubtful, found, Path(a) == Path(b))]
     if found.verdict == "equal" and doubts:
@@ -179,9 +187,10 @@ def identify(source: str, asked: CompareRequest) -> None:
     from er3a.comparison.nearest import likely, of_equal_geometry
     from er3a.files.arm_catalogue import known_arms
     from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
+    from er3a.robots.robot import to_standard
 
     read, known = _read(source, asked), known_arms()
-    robot = read[0].robot
+    robot = read[0].robot if read[0].printed else to_standard(read[0].robot)
     robots = {name: arm.robot for name, arm in known.items()}
     tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
     ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
@@ -199,7 +208,7 @@ def identify(source: str, asked: CompareRequest) -> None:
     if not asked.as_json:
         print("\n".join(identified_lines(known[name], best, *groups)))
     record = {"arm": name, "same_geometry": list(alike), "as_near": sorted(others)}
-    compare_two(source, name, asked, record, read)
+    compare_two(source, name, asked, record, read, best)
 
 
 def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:
@@ -255,14 +264,6 @@ def _written(
         write_comparison(one, other, found, html, asked[:2], asked[2])
         files.append(html)
     return files
-
-
-def _refuse_wrong(tolerances: dict[str, float], output: Path | None) -> None:
-    for option, value in tolerances.items():
-        if not 0 < value < MAX_TOLERANCE:
-            raise Er3aError(f"{option} is {value:g}; give a number above 0 and below {MAX_TOLERANCE:g}")
-    if output is not None and output.suffix not in (".yaml", ".yml"):
-        raise Er3aError(f"--output is '{output}'; robot files end in .yaml")
 
 
 def _unsettled(doubts: Sequence[DoubtfulUnit], found: Comparison, one_file: bool) -> list[DoubtfulUnit]:
