@@ -1,4 +1,4 @@
-"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and three tiles."""
+"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and the tiles."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, sentence
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
-from er3a.pipeline.overview.tiles import first_with, paths_tile, table_tile, tray_tile
+from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
 from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.page.workspace_figures import void_label
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
-from er3a.pipeline.viewing.page import SHORT_NAMES, Head, alternative_table, head_of
-from er3a.pipeline.viewing.side_view import Kind, SeenArm, border_lines, seen_arm, side_view
+from er3a.pipeline.viewing.page import SHORT_NAMES, Head, head_of
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, seen_arm, side_view
 
 MOST_DRAWN = 2  # arms in the picture
+AWAY = 1.15  # of what they reach, where words begin
 MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
@@ -55,7 +57,7 @@ class RobotRow:
     table : status of its validation; ``not_examined`` before that was computed
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    instead : the robot whose table is to be used; None where there is none
+    seen : the arm and what it reaches, small
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
@@ -65,7 +67,7 @@ class RobotRow:
     use: str
     decision: str
     cells: Sequence[StageCell | None]
-    instead: str | None
+    seen: str
     outdated: str
 
 
@@ -82,7 +84,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
     entries = [
-        _entry(study, name, stored[name], alternative_table(study, name, results), _changed_text(verdicts, name))
+        _entry(study, name, stored[name], _changed_text(verdicts, name))
         for name in study.robots
     ]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
@@ -133,8 +135,8 @@ def _computed(study: Study, name: str, folder: Path) -> Results:
     }
 
 
-def _entry(study: Study, name: str, stored: Results, instead: str | None, outdated: str) -> RobotRow:
-    """What the index shows of a robot; ``instead``: the robot whose table is to be used in place of its own."""
+def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
+    """What the index shows of a robot."""
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
     table = heads["validation"].status if "validation" in heads else "not_examined"
     failed = [
@@ -145,7 +147,8 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
     use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
     asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
-    return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
+    seen = side_view([_seen(study, name, stored, "wrong" if use == "never" else "right")], ratio=1.0)
+    return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, seen, outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -192,19 +195,44 @@ def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Res
     """The first arm that may not be relied on over the first that may, or the first two, with what they reach."""
     wrong = [entry for entry in entries if entry.use == "never"][:1]
     right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
-    drawn = [_seen(study, entry, stored[entry.name], first=entry in right[:1]) for entry in (*right[::-1], *wrong)]
+    drawn: list[tuple[RobotRow, Kind]] = [(entry, "other") for entry in right[:0:-1]]
+    drawn += [*((entry, "right") for entry in right[:1]), *((entry, "wrong") for entry in wrong)]
+    seen = [_seen(study, entry.name, stored[entry.name], kind) for entry, kind in drawn]
     floor = floor_of(study.scene(right[0].name, "trajectory")) if right else None
-    return side_view(drawn, None if floor is None else 1000 * floor)
+    floor_mm = None if floor is None else 1000 * floor
+    return side_view(seen, floor_mm, labels=_labels(drawn, seen, stored, floor_mm), column_mm=_beyond(seen))
 
 
-def _seen(study: Study, entry: RobotRow, stored: Results, *, first: bool) -> SeenArm:
-    kind: Kind = "wrong" if entry.use == "never" else "right" if first else "other"
+def _labels(
+    drawn: Sequence[tuple[RobotRow, Kind]], seen: Sequence[SeenArm], stored: Mapping[str, Results], floor_mm: float | None
+) -> list[Label]:
+    """The voids of the arm that may be relied on, and where a wrong one goes through the floor."""
+    found = []
+    for (entry, kind), arm in zip(drawn, seen):
+        results = stored[entry.name]["workspace"].results if "workspace" in stored[entry.name] else None
+        if kind == "right" and isinstance(results, WorkspaceResults):
+            voids = results.summary.enclosed_voids
+            found += [void_label(number, void) for number, void in enumerate(voids, 1)]
+        lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
+        if kind == "wrong" and floor_mm is not None and lowest[1] < floor_mm:
+            found.append(Label(tr("through the floor"), lowest, "wrong"))
+    return found
+
+
+def _beyond(seen: Sequence[SeenArm]) -> float:
+    """How far forward (mm) there is room for words: beyond what the arms that are not wrong reach."""
+    rings = [ring for arm in seen if arm.kind != "wrong" for ring in arm.reach_mm]
+    return max((float(ring[:, 0].max()) for ring in (*rings, *(arm.points_mm for arm in seen))), default=0.0) * AWAY
+
+
+def _seen(study: Study, name: str, stored: Results, kind: Kind) -> SeenArm:
+    robot = study.robot(name)
     found = stored["workspace"].results if "workspace" in stored else None
     if not isinstance(found, WorkspaceResults):
-        return seen_arm(study.robot(entry.name), entry.title, "", kind)
+        return seen_arm(robot, own_title(robot.title), "", kind)
     far = with_unit(fixed(1000 * found.summary.reach_m.furthest_from_axis, 0), "mm")
     lines = border_lines(found.border.arc, found.border.rho_m, found.border.z_m)
-    return seen_arm(study.robot(entry.name), entry.title, tr("reaches {far}", far=far), kind, lines)
+    return seen_arm(robot, own_title(robot.title), tr("reaches {far}", far=far), kind, lines)
 
 
 def _keys(chosen: RobotRow, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[tuple[str, str, str]]:
@@ -239,7 +267,7 @@ def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, st
     steps = []
     if not evidence or any(column_of(entry) == "direction" for entry in unsettled):
         panel = f"{chosen.name}/teach.html#q={','.join(['0'] * joints)}"
-        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), panel))
+        steps.append((tr("Jog each joint: does it turn as drawn?"), panel))
     left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
     if left or not evidence:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
@@ -258,7 +286,11 @@ def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Resul
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
         table_tile(study, doubtful[0], stored[doubtful[0]]),
-        paths_tile(study, name, stored[name]) if (name := first_with("trajectory", trusted, stored)) else None,
+        *(
+            motions_tile(study, name, stored[name][stage])
+            for stage in ("trajectory", "programs")
+            if (name := first_with(stage, trusted, stored))
+        ),
         tray_tile(study, name, stored[name]) if (name := first_with("workspace", trusted, stored)) else None,
     ]
     return [tile for tile in found if tile]

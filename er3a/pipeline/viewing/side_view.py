@@ -17,9 +17,9 @@ from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong", "other"]
 MARGIN = 0.06  # of the larger side
-WIDE, UPRIGHT = 1.68, 0.82  # width of a drawing, of its height
-NAME, LABEL, SCALE = 0.06, 0.3, 0.05  # of the height: room for names above, labels at the right, the scale below
-GAP = 0.04  # of the height, between two labels
+WIDE, UPRIGHT = 1.7, 0.86  # width of a drawing, of its height
+LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
+GAP = 0.045  # of the height, between two labels
 ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 SCALES_MM = (100, 200, 500, 1000, 2000)
@@ -46,12 +46,19 @@ class SeenArm:
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A word at a place (2,), mm, in the colour of its kind; ``name``: by which an address on the page leads to it."""
+    """A word at a place (2,), mm, in the colour of its kind.
+
+    Attributes
+    ----------
+    name : by which an address on the page leads to it
+    start : (2,), mm, from where a dashed line leads to the place; None for none
+    """
 
     text: str
     at: Reals
-    kind: Literal["wrong", "open", "hole", "tray", "tray other", "right"]
+    kind: Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
     name: str = ""
+    start: Reals | None = None
 
 
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
@@ -65,6 +72,7 @@ def side_view(
     ratio: float = WIDE,
     labels: Sequence[Label] = (),
     trays: Sequence[Reals] = (),
+    column_mm: float | None = None,
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
@@ -75,6 +83,7 @@ def side_view(
     ratio : width of the drawing, of its height
     labels : moved up or down where they would be on each other
     trays : corners (k, 2), mm, of what is drawn behind the arms
+    column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
 
     Returns
     -------
@@ -87,7 +96,7 @@ def side_view(
     low, high = low - margin, high + margin
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
-    high += [LABEL * tall if labels else 0.0, NAME * tall * len(arms)]
+    high[0] += LABEL * tall if labels else 0.0
     wide, tall = high - low
     spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
     low, high = low - spare, high + spare
@@ -101,6 +110,8 @@ def side_view(
         )
     outline = Markup('<polygon class="{}" points="{}"/>')
     parts += [outline.format("tray other" if k else "tray", _line(corners)) for k, corners in enumerate(trays)]
+    placed = _placed(labels, low, high, column_mm)
+    parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
     over = [arm.kind == "wrong" and len(arms) > 1 for arm in arms]
     parts += [_arm(arm, BONE * tall * (THINNER if thin else 1.0)) for arm, thin in zip(arms, over)]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
@@ -111,9 +122,9 @@ def side_view(
     scale = Markup('<span class="scale" style="width: {:.2f}%">{}</span>').format(
         100 * length / wide, tr("{length} mm", length=length)
     )
-    words = [*map(_name, arms), *_labels(labels, low, np.array([wide, tall])), scale]
-    return Markup('<div class="arms" style="--ratio: {:.3f}">{}{}</div>').format(
-        wide / tall, drawn, Markup("").join(words)
+    words = [_word(label, (place - low) / [wide, tall], column_mm is None) for label, place in placed]
+    return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
+        wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
 
 
@@ -121,16 +132,30 @@ def _name(arm: SeenArm) -> Markup:
     return Markup('<p class="{}"><b>{}</b> {}</p>').format(arm.kind, arm.title, arm.note)
 
 
-def _labels(labels: Sequence[Label], low: Reals, size: Reals) -> list[Markup]:
-    """Words at their places, in parts of the drawing."""
-    shown, above = [], np.inf
-    for label in sorted(labels, key=lambda each: -each.at[1]):
-        left, up = (label.at - low) / size
-        above = min(up, above - GAP)
-        text = '<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">◂ {}</span>'
-        name = Markup(' id="{}"').format(label.name) if label.name else ""
-        shown.append(Markup(text).format(label.kind, name, 100 * left, 100 * above, label.text))
-    return shown
+def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
+    """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
+    found: list[tuple[Label, Reals]] = []
+    gap, lowest = GAP * (high[1] - low[1]), low[1]
+    for label in sorted(labels, key=lambda each: each.at[1]):
+        lowest = max(lowest + gap, float(label.at[1]))
+        found.append((label, np.array([label.at[0] if column_mm is None else column_mm, lowest])))
+    return found[::-1]
+
+
+def _lead(label: Label, place: Reals) -> Markup:
+    """The line of a label: to its place, or where it has a start from there."""
+    line = _line(np.stack([label.at, place] if label.start is None else [label.start, label.at]))
+    return Markup('<polyline class="lead {} {}" points="{}"/>').format(
+        label.kind, "dashed" if label.start is not None else "", line
+    )
+
+
+def _word(label: Label, share: Reals, pointing: bool) -> Markup:
+    """A label, at its place in parts of the drawing."""
+    name = Markup(' id="{}"').format(label.name) if label.name else ""
+    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}{}</span>').format(
+        label.kind, name, *(100 * share), "◂ " if pointing else "", label.text
+    )
 
 
 def _line(points: Reals) -> str:

@@ -217,7 +217,7 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    labels = [_void_label(number_, void) for number_, void in enumerate(summary.voids, start=1)]
+    labels = [void_label(number_, void) for number_, void in enumerate(summary.voids, start=1)]
     outlines = [_tray_corners(tray) for tray in trays]
     labels += [
         Label(tray.name, corners[1], "tray other" if k > 1 else "tray", f"tray-{k}")
@@ -227,7 +227,8 @@ def labelled(
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
-def _void_label(number_: int, void: model.VoidSummary) -> Label:
+def void_label(number_: int, void: model.VoidSummary) -> Label:
+    """The name of a void, at its place."""
     name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
     if void.kind != "enclosed":
         name = tr("pocket, {size} L", size=at_least(1000 * void.volume_m3.lower, 1))
