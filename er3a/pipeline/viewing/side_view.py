@@ -16,6 +16,7 @@ from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong", "other"]
+LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 WIDE, UPRIGHT = 1.7, 0.86  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
@@ -56,7 +57,7 @@ class Label:
 
     text: str
     at: Reals
-    kind: Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
+    kind: LabelKind
     name: str = ""
     start: Reals | None = None
 
@@ -134,17 +135,19 @@ def _name(arm: SeenArm) -> Markup:
 
 def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
     """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
-    found: list[tuple[Label, Reals]] = []
-    gap, lowest = GAP * (high[1] - low[1]), low[1]
-    for label in sorted(labels, key=lambda each: each.at[1]):
-        lowest = max(lowest + gap, float(label.at[1]))
-        found.append((label, np.array([label.at[0] if column_mm is None else column_mm, lowest])))
-    return found[::-1]
+    order = sorted(labels, key=lambda each: -each.at[1])
+    gap, above = GAP * (high[1] - low[1]), high[1]
+    heights = [above := min(above - gap, float(label.at[1])) for label in order]
+    below = low[1]
+    for k in reversed(range(len(order))):
+        below = heights[k] = max(below + gap, heights[k])
+    across = [label.at[0] if column_mm is None else column_mm for label in order]
+    return list(zip(order, np.column_stack([across, heights])))
 
 
 def _lead(label: Label, place: Reals) -> Markup:
     """The line of a label: to its place, or where it has a start from there."""
-    line = _line(np.stack([label.at, place] if label.start is None else [label.start, label.at]))
+    line = _line(np.stack([*([] if label.start is None else [label.start]), label.at, place]))
     return Markup('<polyline class="lead {} {}" points="{}"/>').format(
         label.kind, "dashed" if label.start is not None else "", line
     )
@@ -153,8 +156,8 @@ def _lead(label: Label, place: Reals) -> Markup:
 def _word(label: Label, share: Reals, pointing: bool) -> Markup:
     """A label, at its place in parts of the drawing."""
     name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}{}</span>').format(
-        label.kind, name, *(100 * share), "◂ " if pointing else "", label.text
+    return Markup('<span class="label {} {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, "pointing" if pointing else "led", name, *(100 * share), label.text
     )
 
 

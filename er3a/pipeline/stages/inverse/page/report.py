@@ -26,7 +26,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -68,12 +68,12 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached, or else the one that the fewest of its solutions serve; the best of these."""
+    """A target that is not reached and should be, or else the one that the most solutions serve; the best of these."""
 
-    def served(target: model.TargetResult) -> tuple[bool, float]:
-        return target.outcome == "reached", target.within_limits / max(target.solutions, 1)
+    def order(target: model.TargetResult) -> tuple[bool, int]:
+        return target.outcome in ("reached", target.expect), -target.within_limits
 
-    return min(shown, key=served).name, 0.0
+    return min(shown, key=order).name, 0.0
 
 
 def _answer(
@@ -98,6 +98,7 @@ def _answer(
             Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
             Group(tr("Reached"), [row for row in rows if row.mark == "pass"]),
         ),
+        next((row.fix for row in rows if row.fix), None),
     )
 
 
@@ -111,7 +112,9 @@ def _row(target: model.TargetResult, motion: PlayedMotion) -> ListRow:
     mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
     parts = bar_of(motion, float(motion.t[-1])) if target.solutions else ()
     length = 1.0 if target.solutions else 0.0
-    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts)
+    advice = listed(target.advice) if mark == "fail" else ()
+    fix = Fix(advice[-1], f"#{target.name}-solutions") if advice else None
+    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts, fix)
 
 
 def _section(

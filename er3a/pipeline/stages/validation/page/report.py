@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, cast
 
 import numpy as np
 from markupsafe import Markup
@@ -27,21 +27,24 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
+    SETTLED,
     evidence_section,
     other_robot,
     plain_table,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
+    status_word,
     text_address,
 )
-from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, Label, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, Label, LabelKind, seen_arm, side_view
 from er3a.robots.robot import Robot
 
-SEEN_M = 2e-3  # by which two arms differ in a drawing
+SEEN_MM = 2.0  # by which two arms differ in a drawing
+COLUMN = 0.1  # of their size, from the arms to the names of entries
 ANGLES = ("alpha", "beta", "offset")
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -65,7 +68,7 @@ def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     return found
 
 
-def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
+def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     """A row for each set and group."""
     rows = []
     for title, own in by_set(checks).items():
@@ -74,17 +77,21 @@ def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
             counted = Counter(check.status for check in part)
             status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=lambda check: check.tolerances_off)
-            rows.append(
-                dict(
-                    set=title,
-                    group=word("group", GROUPS, group),
-                    status=status,
-                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
-                    worst=say(worst.subject),
-                    difference=with_unit(_value(worst.difference, worst), worst.unit),
-                )
-            )
+            off = with_unit(_value(worst.difference, worst), worst.unit)
+            counts = counted["pass"], counted["fail"], counted["conflict"]
+            rows.append([title, word("group", GROUPS, group), status_word(status), *counts, say(worst.subject), off])
     return rows
+
+
+def _by_document(checks: Iterable[Judged]) -> Group:
+    """How many checks of each set of references pass, each with its bar."""
+    rows = []
+    for title, own in by_set(checks).items():
+        failed = sum(check.status == "fail" for check in own)
+        passed = tr("{passed} of {total}", passed=len(own) - failed, total=len(own))
+        parts = [Part(1 - failed / len(own), 1.0, "fail")] if failed else []
+        rows.append(ListRow("fail" if failed else "pass", title, passed, "#checks", length=1.0, parts=parts))
+    return Group(tr("Checks"), rows)
 
 
 def check_row(check: Judged) -> list[str]:
@@ -132,7 +139,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         study,
         stored,
         output,
-        _answer(stored.robot, summary, instead),
+        _answer(study, name, summary, instead),
         arms=_both_arms(
             robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}
         ),
@@ -145,6 +152,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
+        by_document=[_by_document(judged)],
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         all_failed=len(failed),
         columns=[tr(label) for label in COLUMNS],
@@ -159,27 +167,31 @@ def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale."""
     zero = np.zeros(robot.joints)
-    seen = [skeleton(each, zero) for each in (robot, other) if each is not None]
-    differs = len(seen) == 2 and (seen[0].shape != seen[1].shape or np.abs(seen[0] - seen[1]).max() > SEEN_M)
-    kind: Kind = "wrong" if differs else "right"
+    seen = [1000 * skeleton(each, zero)[:, ::2] for each in (robot, other) if each is not None]
+    differs = len(seen) == 2 and (seen[0].shape != seen[1].shape or np.abs(seen[0] - seen[1]).max() > SEEN_MM)
+    labels, kind = _entries_seen(robot, evidence), cast(Kind, "wrong" if differs else "right")
     arms = [seen_arm(robot, own_title(robot.title), tr("this table"), kind)]
     if other is not None and differs:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
-    return side_view(arms, ratio=UPRIGHT, labels=_doubts(robot, evidence))
+        off = with_unit(fixed(float(np.linalg.norm(seen[0][-1] - seen[1][-1])), 0), "mm")
+        labels.append(Label(tr("flange {off} off", off=off), seen[1][-1], "wrong", start=seen[0][-1]))
+    corners = np.concatenate([arm.points_mm for arm in arms])
+    beyond = float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
+    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond)
 
 
-def _doubts(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
-    """The entries of geometry that evidence contradicts or leaves open, each at the link or joint that it is of."""
+def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
+    """The lengths of the table, and the angles that evidence leaves open, each at the link or joint that it is of."""
     parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
     found = []
     for joint, cells in evidence.get("rows", ()):
         shown = [(column_of(cell["entry"]), cell) for cell in cells if cell]
         along = parts[joint, ALONG_Z, :3, 3]
         middles = {"d": along / 2, "a": along + parts[joint, TO_NEXT_AXIS, :3, 3] / 2}
-        texts: list[tuple[str, Reals, Literal["wrong", "open"]]] = [
-            (f"{cell['entry']}: {cell['value']} → {cell['gives']}", middles[kind], "wrong")
+        texts: list[tuple[str, Reals, LabelKind]] = [
+            (joined([f"{cell['entry']} = {cell['value']}", cell["gives"]], " → "), middles[kind], _kind(cell["status"]))
             for kind, cell in shown
-            if cell["status"] == "contradicted" and cell["gives"] and kind in middles and cell["value"] != "0"
+            if kind in middles and (cell["gives"] or cell["value"] != "0")
         ]
         if unsure := [cell["entry"] for kind, cell in shown if cell["status"] == "open" and kind in ANGLES]:
             texts.append((f"{joined(unsure, ', ')}: ?", along, "open"))
@@ -189,7 +201,11 @@ def _doubts(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
     return found
 
 
-def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
+def _kind(status: str) -> LabelKind:
+    return "wrong" if status == "contradicted" else "sound" if status in SETTLED else "open"
+
+
+def _answer(study: Study, robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
@@ -202,7 +218,7 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
     elif evidence:
         keys.append((str(unsure), tr("entries unconfirmed")))
     if instead:
-        fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
+        fix = Fix(tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)), f"../{instead}/validation.html")
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
