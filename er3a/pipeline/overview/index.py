@@ -14,24 +14,22 @@ from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
 from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
 from er3a.pipeline.stages.workspace.page.workspace_figures import void_label
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import SHORT_NAMES, Head, head_of
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, beyond, border_lines, seen_arm, side_view
 
-MOST_DRAWN = 2  # arms in the picture
-AWAY = 1.15  # of what they reach, where words begin
 MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
@@ -54,7 +52,6 @@ class RobotRow:
 
     Attributes
     ----------
-    table : status of its validation; ``not_examined`` before that was computed
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
     seen : the arm and what it reaches, small
@@ -63,7 +60,6 @@ class RobotRow:
 
     name: str
     title: str
-    table: str
     use: str
     decision: str
     cells: Sequence[StageCell | None]
@@ -83,21 +79,18 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     """
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
-    entries = [
-        _entry(study, name, stored[name], _changed_text(verdicts, name))
-        for name in study.robots
-    ]
+    entries = [_entry(study, name, stored[name], _changed_text(verdicts, name)) for name in study.robots]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
     chosen = next((entry for entry in entries if entry.use != "never"), entries[0])
+    drawn = [chosen, *[entry for entry in entries if entry.use == "never" and entry is not chosen][:1]]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
         places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
         entries=entries,
-        stages=[name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)],
-        questions={name: stage.question for name, stage in STAGES.items()},
-        arms=_picture(study, entries, stored),
-        keys=_keys(chosen, entries, stored),
+        stages=_asked(study),
+        arms=_picture(study, drawn, stored),
+        keys=_keys(drawn),
         steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
         outdated=_by_text(entries),
         tiles=[*_tiles(study, entries, stored)],
@@ -115,7 +108,7 @@ def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
     if not names:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
-    more = [sentence("more", count=len(names) - MAX_CHANGED)] if len(names) > MAX_CHANGED else []
+    more = ["…"] if len(names) > MAX_CHANGED else []
     text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
     return tr(text, names=joined([*named, *more], ", "))
 
@@ -135,6 +128,11 @@ def _computed(study: Study, name: str, folder: Path) -> Results:
     }
 
 
+def _asked(study: Study) -> list[str]:
+    """The stages that any robot is asked for."""
+    return [name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)]
+
+
 def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
     """What the index shows of a robot."""
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
@@ -145,10 +143,9 @@ def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     ]
     use, said = _use(table, heads.get("validation"), failed)
-    cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
-    asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
-    seen = side_view([_seen(study, name, stored, "wrong" if use == "never" else "right")], ratio=1.0)
-    return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, seen, outdated)
+    cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in _asked(study)]
+    seen = side_view([_seen(study, name, use, stored)], ratio=1.0)
+    return RobotRow(name, own_title(study.robot(name).title), use, said, cells, seen, outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -191,69 +188,42 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
     return StageCell(stage, head.status, value, note, head.text)
 
 
-def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
-    """The first arm that may not be relied on over the first that may, or the first two, with what they reach."""
-    wrong = [entry for entry in entries if entry.use == "never"][:1]
-    right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
-    drawn: list[tuple[RobotRow, Kind]] = [(entry, "other") for entry in right[:0:-1]]
-    drawn += [*((entry, "right") for entry in right[:1]), *((entry, "wrong") for entry in wrong)]
-    seen = [_seen(study, entry.name, stored[entry.name], kind) for entry, kind in drawn]
-    floor = floor_of(study.scene(right[0].name, "trajectory")) if right else None
+def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
+    """The arm that may be relied on, with its voids, and over it the wrong one."""
+    name = drawn[0].name
+    floor, known = floor_of(study.scene(name, "trajectory")), _reach(stored[name])
     floor_mm = None if floor is None else 1000 * floor
-    return side_view(seen, floor_mm, labels=_labels(drawn, seen, stored, floor_mm), column_mm=_beyond(seen))
-
-
-def _labels(
-    drawn: Sequence[tuple[RobotRow, Kind]], seen: Sequence[SeenArm], stored: Mapping[str, Results], floor_mm: float | None
-) -> list[Label]:
-    """The voids of the arm that may be relied on, and where a wrong one goes through the floor."""
-    found = []
-    for (entry, kind), arm in zip(drawn, seen):
-        results = stored[entry.name]["workspace"].results if "workspace" in stored[entry.name] else None
-        if kind == "right" and isinstance(results, WorkspaceResults):
-            voids = results.summary.enclosed_voids
-            found += [void_label(number, void) for number, void in enumerate(voids, 1)]
+    seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
+    labels = [void_label(number, void) for number, void in enumerate(known.enclosed_voids, 1)] if known else []
+    for arm in seen:
         lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
-        if kind == "wrong" and floor_mm is not None and lowest[1] < floor_mm:
-            found.append(Label(tr("through the floor"), lowest, "wrong"))
-    return found
+        if floor_mm is not None and lowest[1] < floor_mm:
+            labels.append(Label(tr("through the floor"), lowest, "wrong"))
+    return side_view(seen, floor_mm, labels=labels, column_mm=beyond(seen))
 
 
-def _beyond(seen: Sequence[SeenArm]) -> float:
-    """How far forward (mm) there is room for words: beyond what the arms that are not wrong reach."""
-    rings = [ring for arm in seen if arm.kind != "wrong" for ring in arm.reach_mm]
-    return max((float(ring[:, 0].max()) for ring in (*rings, *(arm.points_mm for arm in seen))), default=0.0) * AWAY
+def _reach(stored: Results) -> WorkspaceSummary | None:
+    results = stored["workspace"].results if "workspace" in stored else None
+    return results.summary if isinstance(results, WorkspaceResults) else None
 
 
-def _seen(study: Study, name: str, stored: Results, kind: Kind) -> SeenArm:
-    robot = study.robot(name)
-    found = stored["workspace"].results if "workspace" in stored else None
-    if not isinstance(found, WorkspaceResults):
+def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
+    kind: Kind
+    robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
+    if summary is None:
         return seen_arm(robot, own_title(robot.title), "", kind)
-    far = with_unit(fixed(1000 * found.summary.reach_m.furthest_from_axis, 0), "mm")
-    lines = border_lines(found.border.arc, found.border.rho_m, found.border.z_m)
+    far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
+    border = stored["workspace"].results.border
+    lines = border_lines(border.arc, border.rho_m, border.z_m)
     return seen_arm(robot, own_title(robot.title), tr("reaches {far}", far=far), kind, lines)
 
 
-def _keys(chosen: RobotRow, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[tuple[str, str, str]]:
-    """Reach, volume and checks of the arm that may be relied on; beside each that of the first that may not."""
-    wrong = next((entry for entry in entries if entry.use == "never"), None)
-    own = dict(_figures(stored[chosen.name]))
-    other = dict(_figures(stored[wrong.name])) if wrong else {}
-    return [(name, value, other.get(name, "")) for name, value in own.items()]
-
-
-def _figures(stored: Results) -> list[tuple[str, str]]:
-    found = [(stage, stored[stage].results) for stage in ("workspace", "validation") if stage in stored]
-    shown = []
-    for _, results in found:
-        if isinstance(results, WorkspaceResults):
-            volume = results.summary.volume_m3
-            shown.append((tr("reach"), with_unit(fixed(1000 * results.summary.reach_m.furthest_from_axis, 0), "mm")))
-            shown.append((tr("volume"), with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³")))
-        if isinstance(results, ValidationResults):
-            shown.append((tr("checks"), glance(results)[0]))
-    return shown
+def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
+    """Reach and checks of the arm that may be relied on; with each that of the wrong one."""
+    own, *other = ({cell.stage: cell.value for cell in row.cells if cell} for row in drawn)
+    named = {"workspace": tr("reach"), "validation": tr("checks")}
+    wrong = other[0] if other else {}
+    return [(name, own[stage], wrong.get(stage, "")) for stage, name in named.items() if stage in own]
 
 
 def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from er3a.pipeline.language import own_title, tr
@@ -13,11 +13,9 @@ from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs.model import ProgramsResults
 from er3a.pipeline.stages.programs.page.report import programs_answer
-from er3a.pipeline.stages.trajectory.model import TrajectoryResults
 from er3a.pipeline.stages.trajectory.page.report import paths_answer
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
@@ -25,7 +23,6 @@ from er3a.pipeline.viewing.answer import Group, Mark
 
 Results = Mapping[str, Stored[Any]]
 LETTERS = 0.14  # of the reach, in the small view from above
-MOST_LISTED = 13  # paths or programs, those that fail first
 
 
 @dataclass(frozen=True)
@@ -48,11 +45,7 @@ class Tile:
 
 def first_with(stage: str, names: Iterable[str], stored: Mapping[str, Results]) -> str | None:
     """The first of these robots whose stage was computed; None where none was."""
-    return next((name for name in names if stage in stored[name] and _is_there(stored[name][stage])), None)
-
-
-def _is_there(found: Stored[Any]) -> bool:
-    return isinstance(found.results, TrajectoryResults | ProgramsResults | WorkspaceResults)
+    return next((name for name in names if stage in stored[name] and glance(stored[name][stage].results)[0]), None)
 
 
 def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -89,12 +82,8 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     programs = isinstance(results, ProgramsResults)
     said = programs_answer(robot, results) if programs else paths_answer(robot, results)
     title = tr("Which programs may run?") if programs else tr("Which paths may run?")
-    groups, left = [], MOST_LISTED
-    for group in said.shown_groups:
-        groups.append(replace(group, rows=group.rows[: max(left, 0)]))
-        left -= len(group.rows)
     sound: Mark = "pass" if found.results.summary.verdict.status == "pass" else "caution"
-    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", groups=groups)
+    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", groups=said.shown_groups)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

@@ -108,7 +108,7 @@ def player(
     data["opened"] = known or _worst(robot, shown)
     first = next(motion for motion in shown if motion.name == data["opened"][0])
     places = [np.array(shape["T"])[:3, 3] for shape in added if not shape["frame"]]
-    _widened(data, [*places, *(np.array(mark.start) for mark in first.marks)])
+    _widened(data, [*places, *(np.array(mark.start) for each in shown for mark in each.marks)])
     return Markup(
         TEMPLATES.get_template("player.html.j2").render(
             words=words,

@@ -9,18 +9,22 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup
 
-from er3a.kinematics.forward import skeleton
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
-Kind = Literal["right", "wrong", "other"]
+Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 WIDE, UPRIGHT = 1.7, 0.86  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 GAP = 0.045  # of the height, between two labels
+COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
+SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 SCALES_MM = (100, 200, 500, 1000, 2000)
@@ -65,6 +69,33 @@ class Label:
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
     """An arm with all joints at 0, seen along y of the frame that its base is placed in."""
     return SeenArm(title, note, kind, skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000, reach_mm)
+
+
+def entry_places(robot: Robot) -> dict[str, Reals]:
+    """Where each entry of geometry is seen with all joints at 0 (2,), mm: a length at its middle, an angle at its
+    joint; by names such as ``d4``."""
+    parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
+    found = {}
+    for row in range(1, robot.rows + 1):
+        along, across = parts[row, ALONG_Z, :3, 3], parts[row, TO_NEXT_AXIS, :3, 3]
+        for name, local in {"d": along / 2, "a": along + across / 2, "": along}.items():
+            found[f"{name}{row}"] = 1000 * (T[row - 1] @ [*local, 1.0])[[0, 2]]
+    return found
+
+
+def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
+    """How far the flange of the last arm is off that of the first; nothing of arms whose flanges are the same."""
+    right, wrong = arms[0].points_mm[-1], arms[-1].points_mm[-1]
+    far = float(np.linalg.norm(right - wrong))
+    off = tr("flange {off} off", off=with_unit(fixed(far, 0), "mm"))
+    return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
+
+
+def beyond(arms: Sequence[SeenArm]) -> float:
+    """How far forward (mm) there is room for words: beyond the arms, and what those reach that are not wrong."""
+    right = [ring for arm in arms if arm.kind != "wrong" for ring in arm.reach_mm]
+    corners = np.concatenate([*(arm.points_mm for arm in arms), *right])
+    return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
 
 
 def side_view(
@@ -113,8 +144,7 @@ def side_view(
     parts += [outline.format("tray other" if k else "tray", _line(corners)) for k, corners in enumerate(trays)]
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
-    over = [arm.kind == "wrong" and len(arms) > 1 for arm in arms]
-    parts += [_arm(arm, BONE * tall * (THINNER if thin else 1.0)) for arm, thin in zip(arms, over)]
+    parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -56,8 +55,6 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
-        outcomes=_outcomes(summary.targets),
-        not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
@@ -140,8 +137,6 @@ def _section(
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(target.name, branches, cells),
-        residual_mm=rows.position_residual_mm.max() if len(rows) else None,
-        residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
 
 
@@ -192,18 +187,6 @@ def _move_rule(robot: Robot, sequence: model.VisitOrder | None) -> tuple[str, st
     if sequence is None:
         return "", ""
     return tr(RULES[sequence.rule].unit_of(robot)), word("rule.title", RULE_TITLES, sequence.rule)
-
-
-def _outcomes(targets: Iterable[model.TargetResult]) -> str:
-    """How many targets came to what."""
-    counts = Counter(target.outcome for target in targets)
-    return tr(", ").join(f"{outcome_word(outcome)} {number(count)}" for outcome, count in counts.most_common())
-
-
-def _not_advised(targets: Iterable[model.TargetResult]) -> int:
-    """How many targets without solution were not looked at for what would help, where others were."""
-    without = [target.neighbours for target in targets if target.obstacle]
-    return without.count(None) if any(without) else 0
 
 
 def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]]:

@@ -54,7 +54,6 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         stored,
         output,
         programs_answer(robot, results),
-        head_links={each.name: f"#{each.name}" for each in summary.programs},
         sections=sections,
         entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
         compared_with_tray=compared_with_tray,

@@ -78,7 +78,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         stored,
         output,
         answer_of(summary, wrong, played, met or {}),
-        head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,

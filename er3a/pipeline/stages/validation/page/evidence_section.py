@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import pi
 from typing import Any
@@ -57,16 +57,14 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(
-    robot: Robot, evidence: TableEvidence | None, shown: Collection[str] = tuple(COLUMNS)
-) -> dict[str, Any] | None:
+def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
     joints = sorted({int(name[len(kind) :]) for name in by_name if (kind := name.rstrip("0123456789")) in COLUMNS})
-    kinds = [kind for kind in COLUMNS if kind in shown and any(f"{kind}{joint}" in by_name for joint in joints)]
+    kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
