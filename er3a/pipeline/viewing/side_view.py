@@ -20,7 +20,7 @@ from er3a.robots.robot import Robot
 Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
-WIDE, UPRIGHT = 1.7, 0.86  # width of a drawing, of its height
+WIDE, UPRIGHT = 1.7, 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 GAP = 0.045  # of the height, between two labels
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
