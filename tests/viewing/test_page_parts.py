@@ -110,3 +110,18 @@ def test_the_search_has_all_text_of_a_page_by_heading():
         "Paths More": ["More", "bc", "de"],
         "Last": ["Last", "line 2"],
     }
+
+
+def test_the_index_draws_the_arm_that_its_headline_names(small_results, tmp_path):
+    study = load_study("config/small.yaml")
+    robots = {name: study.robots[name] for name in ("er3_600", "er3a_c60_article", "er3a_c60")}
+    study = study.model_copy(update={"robots": robots})
+    for robot in robots:
+        (tmp_path / robot).mkdir()
+        (tmp_path / robot / "validation").symlink_to(small_results("validation", robot, study).resolve())
+    write_index(study, tmp_path, tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "Plan with EFORT ER3A-C60." in page
+    assert (
+        re.search(r'<div class="shown"><div class="arms".*?<p class="right"><b>(.*?)</b>', page)[1] == "EFORT ER3A-C60"
+    )

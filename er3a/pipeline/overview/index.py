@@ -30,6 +30,7 @@ from er3a.pipeline.viewing.drawn import floor_of
 from er3a.pipeline.viewing.page import SHORT_NAMES, Head, head_of
 from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, beyond, border_lines, seen_arm, side_view
 
+USES = ("use", "plan", "measure", "never")  # from what may be relied on most
 MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
@@ -81,7 +82,8 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     stored = {name: _computed(study, name, results / name) for name in study.robots}
     entries = [_entry(study, name, stored[name], _changed_text(verdicts, name)) for name in study.robots]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
-    chosen = next((entry for entry in entries if entry.use != "never"), entries[0])
+    ranked = sorted(entries, key=lambda entry: USES.index(entry.use))
+    chosen = ranked[0]
     drawn = [chosen, *[entry for entry in entries if entry.use == "never" and entry is not chosen][:1]]
     page.render(
         Path(__file__).with_name("index.html.j2"),
@@ -93,7 +95,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         keys=_keys(drawn),
         steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
         outdated=_by_text(entries),
-        tiles=[*_tiles(study, entries, stored)],
+        tiles=_tiles(study, ranked, drawn[-1].name, stored),
         article=study.article is not None,
         command=page.run_command(study, "index.html"),
         provenance=Provenance(inputs=result_records(results, study.names), code=code_digest(), seed=study.seed),
@@ -250,12 +252,11 @@ def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, st
     return steps
 
 
-def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[Any]:
+def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
-    doubtful = [entry.name for entry in entries if entry.use == "never"] or [entries[0].name]
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
-        table_tile(study, doubtful[0], stored[doubtful[0]]),
+        table_tile(study, doubtful, stored[doubtful]),
         *(
             motions_tile(study, name, stored[name][stage])
             for stage in ("trajectory", "programs")
