@@ -178,8 +178,9 @@ def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
         for cell in filter(None, cells):
             entry, given = cell["entry"], cell["gives"] or cell["value"] != "0"
             if given if column_of(entry) in ("a", "d") else cell["status"] == "open" and column_of(entry) in ANGLES:
-                text = joined([f"{entry} = {cell['value']}", cell["gives"]], " → ")
-                found.append(Label(text, places.get(entry, places[str(joint)]), _kind(cell["status"])))
+                kind, gives = _kind(cell["status"]), cell["gives"]
+                text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
+                found.append(Label(text, places.get(entry, places[str(joint)]), kind))
     return found
 
 
