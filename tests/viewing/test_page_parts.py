@@ -8,16 +8,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence
 from er3a.pipeline.messages.pages import Caveat
 from er3a.pipeline.overview.index import write_index
 from er3a.pipeline.overview.search import TextOfPage
 from er3a.pipeline.results import read_stage
 from er3a.pipeline.stages.registry import STAGES
-from er3a.pipeline.stages.validation.page.evidence_section import OTHER_COLUMNS, rounded_within
+from er3a.pipeline.stages.validation.page.evidence_section import rounded_within
 from er3a.pipeline.study import load_study
-from er3a.pipeline.viewing.page import Head, Numbering, _tray_edges, linked
+from er3a.pipeline.viewing.page import Head, Numbering, _tray_edges
 from tests.conftest import ROOT
 
 CALL = re.compile(r"ui\.(picture|table)\((.*)\) \}\}")
@@ -37,14 +36,6 @@ def test_each_figure_and_table_of_a_template_has_a_name():
             assert named, f"{file.name}: {arguments}"
 
 
-def test_the_first_of_a_name_leads_on_and_texts_stay_texts():
-    text = "Not er3a_c60_article <b>: use er3a_c60, and er3a_c60 again."
-    html = linked(text, {"er3a_c60": "../er3a_c60/validation.html"})
-    assert html == (
-        'Not er3a_c60_article &lt;b&gt;: use <a href="../er3a_c60/validation.html">er3a_c60</a>, and er3a_c60 again.'
-    )
-
-
 @pytest.mark.parametrize(
     ("value", "interval", "shown"), [(269.999, (269.9, 270.1), 270), (321.48, (321.45, 321.55), 321.5)]
 )
@@ -54,7 +45,7 @@ def test_a_value_is_rounded_as_far_as_documents_leave_open(value, interval, show
 
 
 def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(small_results, tmp_path):
-    """By the summary alone: class, value and what the evidence gives instead; limits are left to the page."""
+    """By the summary alone: class, value where its source states one, and what the evidence gives instead."""
     study, name = load_study("config/small.yaml"), "er3a_c60_article"
     for robot in study.robots:
         (tmp_path / robot).mkdir()
@@ -62,21 +53,21 @@ def test_the_index_marks_each_entry_of_a_wrong_table_as_validation_found_it(smal
     write_index(study, tmp_path, tmp_path)
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     evidence = read_stage(tmp_path / name / "validation", STAGES["validation"]).results.summary.evidence
-    shown = [each for each in evidence.entries if column_of(each.entry) in OTHER_COLUMNS and each.value is not None]
-    for entry in shown:
-        link = re.escape(f'<a href="{name}/validation.html#entry-{entry.entry}">')
-        (status, value, rest) = re.search(
-            rf'<td class="n (\w+)" title="[^"]*">{link}(.*?)</a>(.*?)</td>', page
-        ).groups()
-        assert (status, float(value.replace("−", "-"))) == (entry.status, round(entry.value, 3)), entry
-        if status == "contradicted":
-            given = float(re.search("→ <strong>(.*?)</strong>", rest).group(1).replace("−", "-"))
-            assert entry.interval[0] <= given <= entry.interval[1], entry
-        else:
-            assert "→" not in rest
-    wrong = sum(each.status == "contradicted" for each in evidence.entries if each.value is not None)
-    count = sum(each.value is not None for each in evidence.entries)
-    assert f"<b>{name}: {wrong} of {count} contradicted, limits included.</b>" in page
+    stated = [each for each in evidence.entries if each.value is not None]
+    for entry in stated:
+        link = re.escape(f'href="{name}/validation.html#entry-{entry.entry}"')
+        status, shown = re.search(rf'<td class="(\w+)" title="[^"]*"><a {link}[^>]*>(.*?)</a></td>', page).groups()
+        assert status == entry.status, entry
+        if status != "contradicted":
+            assert "→" not in shown
+            continue
+        value, given = re.search(r"<s>(.*?)</s> <b><i>→</i>(.*?)</b>", shown.replace("−", "-")).groups()
+        unstated = study.robot(name).origins.get(entry.entry) == "none"
+        assert value == "–" if unstated else float(value) == round(entry.value, 3), entry
+        assert entry.interval[0] <= float(given) <= entry.interval[1], entry
+    assert any("direction" in each.entry and each.status == "contradicted" for each in stated)
+    wrong = sum(each.status == "contradicted" for each in stated)
+    assert f"{wrong} of {len(stated)} contradicted." in page
     assert json.loads((tmp_path / "marks.js").read_text().split(" = ")[1].rstrip(";\n"))[name]["validation"] == "fail"
 
 
@@ -119,3 +110,18 @@ def test_the_search_has_all_text_of_a_page_by_heading():
         "Paths More": ["More", "bc", "de"],
         "Last": ["Last", "line 2"],
     }
+
+
+def test_the_index_draws_the_arm_that_its_headline_names(small_results, tmp_path):
+    study = load_study("config/small.yaml")
+    robots = {name: study.robots[name] for name in ("er3_600", "er3a_c60_article", "er3a_c60")}
+    study = study.model_copy(update={"robots": robots})
+    for robot in robots:
+        (tmp_path / robot).mkdir()
+        (tmp_path / robot / "validation").symlink_to(small_results("validation", robot, study).resolve())
+    write_index(study, tmp_path, tmp_path)
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "Plan with EFORT ER3A-C60." in page
+    assert (
+        re.search(r'<div class="shown"><div class="arms".*?<p class="right"><b>(.*?)</b>', page)[1] == "EFORT ER3A-C60"
+    )

@@ -43,6 +43,18 @@ ROLES = words(("the article's table", "the same with offset 2 = −90°", "the r
 APART_M = 1.8  # between two arms that stand side by side
 PAGES = {"3.2": "teach", "4.2": "inverse", "5.1": "workspace", "5.2": "trajectory", "6.2": "workspace"}
 """The page of the printed table that shows more, by section of the article; for all others its validation page."""
+GLANCES = {
+    "zero_pose": "{p_upper_arm_deg:.0f}° → {c_upper_arm_deg:.0f}°",
+    "offset": "{p_statements_met}/{p_statements} → {c_statements_met}/{c_statements}",
+    "plot": "z {p_tool_z:.0f} → {c_tool_z:.0f} mm",
+    "unreachable": "{p_within_limits}/{p_solutions} → {c_within_limits}/{c_solutions}",
+    "void": "z {p_void_z} → {c_void_z} mm",
+    "line_singular": "t = {p_crossings} s",
+    "key_poses": "{p_checks_met}/{p_checks} → {c_checks_met}/{c_checks}",
+    "round_trip": "{round_trip_deg}°",
+    "hole": "{p_void} → {c_void} L",
+}
+"""What each item comes to, in numbers: as printed, and with offset 2."""
 BADGES: dict[str, Mark] = {"differs": "fail", "in_part": "caution", "agrees": "pass", "not_examined": "no_reference"}
 
 
@@ -86,7 +98,6 @@ def _write(study: Study, tables: ArticleTables, results: Path, found: ArticleNum
         rows=rows,
         compared=_compared(found),
         roles=[tr(word) for word in ROLES],
-        robots=[(name, study.pages(name)) for name in tables.names],
         player=_player(robots, results, tables),
         drawing_head=drawing_head(),
     )
@@ -94,7 +105,9 @@ def _write(study: Study, tables: ArticleTables, results: Path, found: ArticleNum
 
 def _answer(tables: ArticleTables, found: ArticleNumbers, rows: list[dict[str, Any]]) -> Answer:
     """What the page says first: whose table it is, which entry explains most, and where the article is right."""
-    groups = [Group(tr(AGREEMENT[status]), [_row(row) for row in rows if row["status"] == status]) for status in BADGES]
+    groups = [
+        Group(tr(AGREEMENT[status]), [row["shown"] for row in rows if row["status"] == status]) for status in BADGES
+    ]
     counts = (f"{table.statements_met} / {table.statements}" for table in (found.printed, found.corrected))
     return Answer(
         tr("Another arm's table."),
@@ -105,20 +118,16 @@ def _answer(tables: ArticleTables, found: ArticleNumbers, rows: list[dict[str, A
     )
 
 
-def _row(row: dict[str, Any]) -> ListRow:
-    return ListRow(row["badge"], row["title"], tr("section {section}", section=row["section"]), f"#item-{row['code']}")
-
-
 def _rows(tables: ArticleTables, found: ArticleNumbers) -> Iterator[dict[str, Any]]:
     agree, parts = agreements(found), _parts(found)
     for code, (title, says, finds, why) in ITEMS.items():
         status, section = agree[code], SECTION_OF[code]
         yield {
             "code": code,
-            "section": section,
-            "title": tr(title),
+            "title": f"{section} {tr(title)}",
             "says": tr(says),
             "finds": tr(finds, **parts),
+            "shown": ListRow(BADGES[status], tr(title), GLANCES[code].format(**parts), f"#item-{code}"),
             "why": tr(why, **parts) if status != "agrees" else "",
             "status": status,
             "word": tr(AGREEMENT[status]),
@@ -168,9 +177,7 @@ def _compared(found: ArticleNumbers) -> list[list[str]]:
         tr("Greatest reach of the tool from axis 1 (mm)"): "{reach_mm:.1f}",
         tr("Reached volume, proven (m³)"): "{volume}",
         tr("Largest enclosed void, proven (L)"): "{void}",
-        tr("Its centre: z (mm)"): "{void_z}",
         tr("The article's straight line"): "{line}",
-        tr("It is singular at t (s)"): "{crossings}",
     }
     parts = []
     for table in (found.printed, found.corrected, found.real):

@@ -1,4 +1,4 @@
-"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and three tiles."""
+"""The page over all robots: the arms, what to do with each, a number for each robot and stage, and the tiles."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, sentence
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
-from er3a.pipeline.overview.tiles import first_with, paths_tile, table_tile, tray_tile
+from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
 from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is_computed, read_stage, result_records
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
+from er3a.pipeline.stages.workspace.page.workspace_figures import void_label
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
 from er3a.pipeline.viewing.drawn import floor_of
-from er3a.pipeline.viewing.page import SHORT_NAMES, Head, alternative_table, head_of
-from er3a.pipeline.viewing.side_view import Kind, SeenArm, border_lines, seen_arm, side_view
+from er3a.pipeline.viewing.page import SHORT_NAMES, Head, head_of
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, beyond, border_lines, seen_arm, side_view
 
-MOST_DRAWN = 2  # arms in the picture
+USES = ("use", "plan", "measure", "never")  # from what may be relied on most
 MAX_CHANGED = 6  # files that have changed since, and are named
 Results = Mapping[str, Stored[Any]]
 """The results of a robot's stages that are there, by stage."""
@@ -52,20 +53,18 @@ class RobotRow:
 
     Attributes
     ----------
-    table : status of its validation; ``not_examined`` before that was computed
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    instead : the robot whose table is to be used; None where there is none
+    seen : the arm and what it reaches, small
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
     name: str
     title: str
-    table: str
     use: str
     decision: str
     cells: Sequence[StageCell | None]
-    instead: str | None
+    seen: str
     outdated: str
 
 
@@ -81,24 +80,22 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
     """
     verdicts = read_verdicts(study, results)
     stored = {name: _computed(study, name, results / name) for name in study.robots}
-    entries = [
-        _entry(study, name, stored[name], alternative_table(study, name, results), _changed_text(verdicts, name))
-        for name in study.robots
-    ]
+    entries = [_entry(study, name, stored[name], _changed_text(verdicts, name)) for name in study.robots]
     contradicted = {entry.name for entry in entries if entry.use == "never"}
-    chosen = next((entry for entry in entries if entry.use != "never"), entries[0])
+    ranked = sorted(entries, key=lambda entry: USES.index(entry.use))
+    chosen = ranked[0]
+    drawn = [chosen, *[entry for entry in entries if entry.use == "never" and entry is not chosen][:1]]
     page.render(
         Path(__file__).with_name("index.html.j2"),
         folder / "index.html",
         places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
         entries=entries,
-        stages=[name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)],
-        questions={name: stage.question for name, stage in STAGES.items()},
-        arms=_picture(study, entries, stored),
-        keys=_keys(chosen, entries, stored),
+        stages=_asked(study),
+        arms=_picture(study, drawn, stored),
+        keys=_keys(drawn),
         steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
         outdated=_by_text(entries),
-        tiles=[*_tiles(study, entries, stored)],
+        tiles=_tiles(study, ranked, drawn[-1].name, stored),
         article=study.article is not None,
         command=page.run_command(study, "index.html"),
         provenance=Provenance(inputs=result_records(results, study.names), code=code_digest(), seed=study.seed),
@@ -113,7 +110,7 @@ def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
     if not names:
         return ""
     named = [tr(each) if each in (THE_SETTINGS, THE_CODE) else each for each in names[:MAX_CHANGED]]
-    more = [sentence("more", count=len(names) - MAX_CHANGED)] if len(names) > MAX_CHANGED else []
+    more = ["…"] if len(names) > MAX_CHANGED else []
     text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
     return tr(text, names=joined([*named, *more], ", "))
 
@@ -133,8 +130,13 @@ def _computed(study: Study, name: str, folder: Path) -> Results:
     }
 
 
-def _entry(study: Study, name: str, stored: Results, instead: str | None, outdated: str) -> RobotRow:
-    """What the index shows of a robot; ``instead``: the robot whose table is to be used in place of its own."""
+def _asked(study: Study) -> list[str]:
+    """The stages that any robot is asked for."""
+    return [name for name in STAGES if any(name in study.stages(robot) for robot in study.robots)]
+
+
+def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
+    """What the index shows of a robot."""
     heads, expected = {stage: head_of(each) for stage, each in stored.items()}, study.entry(name).expect
     table = heads["validation"].status if "validation" in heads else "not_examined"
     failed = [
@@ -143,9 +145,9 @@ def _entry(study: Study, name: str, stored: Results, instead: str | None, outdat
         if StageVerdict(name, stage, head.status, head.finding.code, "", expected=expected.get(stage)).counts("fail")
     ]
     use, said = _use(table, heads.get("validation"), failed)
-    cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in STAGES]
-    asked = [cell for cell, stage in zip(cells, STAGES) if any(stage in study.stages(robot) for robot in study.robots)]
-    return RobotRow(name, own_title(study.robot(name).title), table, use, said, asked, instead, outdated)
+    cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in _asked(study)]
+    seen = side_view([_seen(study, name, use, stored)], ratio=1.0)
+    return RobotRow(name, own_title(study.robot(name).title), use, said, cells, seen, outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -188,44 +190,42 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
     return StageCell(stage, head.status, value, note, head.text)
 
 
-def _picture(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
-    """The first arm that may not be relied on over the first that may, or the first two, with what they reach."""
-    wrong = [entry for entry in entries if entry.use == "never"][:1]
-    right = [entry for entry in entries if entry.use != "never"][: MOST_DRAWN - len(wrong)]
-    drawn = [_seen(study, entry, stored[entry.name], first=entry in right[:1]) for entry in (*right[::-1], *wrong)]
-    floor = floor_of(study.scene(right[0].name, "trajectory")) if right else None
-    return side_view(drawn, None if floor is None else 1000 * floor)
+def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
+    """The arm that may be relied on, with its voids, and over it the wrong one."""
+    name = drawn[0].name
+    floor, known = floor_of(study.scene(name, "trajectory")), _reach(stored[name])
+    floor_mm = None if floor is None else 1000 * floor
+    seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
+    labels = [void_label(number, void) for number, void in enumerate(known.enclosed_voids, 1)] if known else []
+    for arm in seen:
+        lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
+        if floor_mm is not None and lowest[1] < floor_mm:
+            labels.append(Label(tr("through the floor"), lowest, "wrong"))
+    return side_view(seen, floor_mm, labels=labels, column_mm=beyond(seen))
 
 
-def _seen(study: Study, entry: RobotRow, stored: Results, *, first: bool) -> SeenArm:
-    kind: Kind = "wrong" if entry.use == "never" else "right" if first else "other"
-    found = stored["workspace"].results if "workspace" in stored else None
-    if not isinstance(found, WorkspaceResults):
-        return seen_arm(study.robot(entry.name), entry.title, "", kind)
-    far = with_unit(fixed(1000 * found.summary.reach_m.furthest_from_axis, 0), "mm")
-    lines = border_lines(found.border.arc, found.border.rho_m, found.border.z_m)
-    return seen_arm(study.robot(entry.name), entry.title, tr("reaches {far}", far=far), kind, lines)
+def _reach(stored: Results) -> WorkspaceSummary | None:
+    results = stored["workspace"].results if "workspace" in stored else None
+    return results.summary if isinstance(results, WorkspaceResults) else None
 
 
-def _keys(chosen: RobotRow, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[tuple[str, str, str]]:
-    """Reach, volume and checks of the arm that may be relied on; beside each that of the first that may not."""
-    wrong = next((entry for entry in entries if entry.use == "never"), None)
-    own = dict(_figures(stored[chosen.name]))
-    other = dict(_figures(stored[wrong.name])) if wrong else {}
-    return [(name, value, other.get(name, "")) for name, value in own.items()]
+def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
+    kind: Kind
+    robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
+    if summary is None:
+        return seen_arm(robot, own_title(robot.title), "", kind)
+    far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
+    border = stored["workspace"].results.border
+    lines = border_lines(border.arc, border.rho_m, border.z_m)
+    return seen_arm(robot, own_title(robot.title), tr("reaches {far}", far=far), kind, lines)
 
 
-def _figures(stored: Results) -> list[tuple[str, str]]:
-    found = [(stage, stored[stage].results) for stage in ("workspace", "validation") if stage in stored]
-    shown = []
-    for _, results in found:
-        if isinstance(results, WorkspaceResults):
-            volume = results.summary.volume_m3
-            shown.append((tr("reach"), with_unit(fixed(1000 * results.summary.reach_m.furthest_from_axis, 0), "mm")))
-            shown.append((tr("volume"), with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³")))
-        if isinstance(results, ValidationResults):
-            shown.append((tr("checks"), glance(results)[0]))
-    return shown
+def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
+    """Reach and checks of the arm that may be relied on; with each that of the wrong one."""
+    own, *other = ({cell.stage: cell.value for cell in row.cells if cell} for row in drawn)
+    named = {"workspace": tr("reach"), "validation": tr("checks")}
+    wrong = other[0] if other else {}
+    return [(name, own[stage], wrong.get(stage, "")) for stage, name in named.items() if stage in own]
 
 
 def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, str]]:
@@ -239,7 +239,7 @@ def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, st
     steps = []
     if not evidence or any(column_of(entry) == "direction" for entry in unsettled):
         panel = f"{chosen.name}/teach.html#q={','.join(['0'] * joints)}"
-        steps.append((tr("Jog each joint a few degrees: does it turn as drawn?"), panel))
+        steps.append((tr("Jog each joint: does it turn as drawn?"), panel))
     left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
     if left or not evidence:
         named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
@@ -252,13 +252,16 @@ def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, st
     return steps
 
 
-def _tiles(study: Study, entries: Sequence[RobotRow], stored: Mapping[str, Results]) -> list[Any]:
+def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:
     """Which numbers are wrong, which paths may run, where the tray goes: as far as the study asks."""
-    doubtful = [entry.name for entry in entries if entry.use == "never"] or [entries[0].name]
     trusted = [entry.name for entry in entries if entry.use != "never"]
     found = [
-        table_tile(study, doubtful[0], stored[doubtful[0]]),
-        paths_tile(study, name, stored[name]) if (name := first_with("trajectory", trusted, stored)) else None,
+        table_tile(study, doubtful, stored[doubtful]),
+        *(
+            motions_tile(study, name, stored[name][stage])
+            for stage in ("trajectory", "programs")
+            if (name := first_with(stage, trusted, stored))
+        ),
         tray_tile(study, name, stored[name]) if (name := first_with("workspace", trusted, stored)) else None,
     ]
     return [tile for tile in found if tile]

@@ -1,4 +1,4 @@
-"""The index's tiles: which numbers are wrong, which paths may run, where the tray goes."""
+"""The index's tiles: which numbers are wrong, which paths and programs may run, where the tray goes."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.dynamics import payload_key
 from er3a.pipeline.messages.workspace import millimetres
+from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.results import Stored
-from er3a.pipeline.stages.trajectory.model import TrajectoryResults
-from er3a.pipeline.stages.trajectory.page.report import path_groups
+from er3a.pipeline.stages.programs.model import ProgramsResults
+from er3a.pipeline.stages.programs.page.report import programs_answer
+from er3a.pipeline.stages.trajectory.page.report import paths_answer
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.validation.page.evidence_section import OTHER_COLUMNS, evidence_section
-from er3a.pipeline.stages.workspace.model import WorkspaceResults
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Group
+from er3a.pipeline.viewing.answer import Group, Mark
 
 Results = Mapping[str, Stored[Any]]
 LETTERS = 0.14  # of the reach, in the small view from above
@@ -28,13 +29,15 @@ LETTERS = 0.14  # of the reach, in the small view from above
 class Tile:
     """A question, its picture, and its answer, which leads to the page.
 
-    ``entries``, ``groups``, ``drawing``: what is shown, one of them.
+    ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``groups``, ``drawing``: what is
+    shown, one of them.
     """
 
     title: str
     answer: str
+    rest: str
+    mark: Mark
     address: str
-    robot: str
     entries: Mapping[str, Any] | None = None
     groups: Sequence[Group] = ()
     drawing: str = ""
@@ -42,11 +45,7 @@ class Tile:
 
 def first_with(stage: str, names: Iterable[str], stored: Mapping[str, Results]) -> str | None:
     """The first of these robots whose stage was computed; None where none was."""
-    return next((name for name in names if stage in stored[name] and _is_there(stored[name][stage])), None)
-
-
-def _is_there(found: Stored[Any]) -> bool:
-    return isinstance(found.results, TrajectoryResults | WorkspaceResults)
+    return next((name for name in names if stage in stored[name] and glance(stored[name][stage].results)[0]), None)
 
 
 def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -60,26 +59,31 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
     evidence = results.summary.evidence
-    entries, bad = evidence_section(study.robot(name), evidence, OTHER_COLUMNS), evidence.contradicted
+    robot, bad = study.robot(name), evidence.contradicted
     count = sum(each.value is not None for each in evidence.entries)
-    title = tr("Which numbers are wrong?")
     answer = (
-        tr("{robot}: {count} of {all} contradicted, limits included.", robot=name, count=bad, all=count)
+        tr("{count} of {all} contradicted.", count=bad, all=count)
         if bad
-        else tr("{robot}: none; {count} unconfirmed.", robot=name, count=len(evidence.unconfirmed))
+        else tr("{count} unconfirmed", count=len(evidence.unconfirmed))
     )
-    return Tile(title, answer, f"{name}/validation.html", name, entries=entries)
+    mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
+    title, entries = own_title(robot.title), evidence_section(robot, evidence)
+    return Tile(tr("Which numbers are wrong?"), answer, title, mark, f"{name}/validation.html", entries)
 
 
-def paths_tile(study: Study, name: str, stored: Results) -> Tile | None:
-    """Which paths of a robot may run."""
-    results = stored["trajectory"].results
-    if not isinstance(results, TrajectoryResults):
-        return None
-    groups = path_groups(study.robot(name), results)
-    bad, mended, sound = (len(group.rows) for group in groups)
-    answer = tr("{sound} run, {mended} repaired, {bad} don't.", sound=sound, mended=mended, bad=bad)
-    return Tile(tr("Which paths may run?"), answer, f"{name}/trajectory.html", name, groups=groups)
+def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
+    """Which paths or programs of a robot may run, each with its bar over time.
+
+    Parameters
+    ----------
+    found : of the stage trajectory or programs
+    """
+    robot, results = study.robot(name), found.results
+    programs = isinstance(results, ProgramsResults)
+    said = programs_answer(robot, results) if programs else paths_answer(robot, results)
+    title = tr("Which programs may run?") if programs else tr("Which paths may run?")
+    sound: Mark = "pass" if found.results.summary.verdict.status == "pass" else "caution"
+    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", groups=said.shown_groups)
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
@@ -92,4 +96,5 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
     answer = tr("At {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
-    return Tile(tr("Where does the tray go?"), answer, f"{name}/workspace.html", name, drawing=drawing)
+    title, hole = tr("Where does the tray go?"), glance(results)[1]
+    return Tile(title, answer, hole, "pass", f"{name}/workspace.html", drawing=drawing)

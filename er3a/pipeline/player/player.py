@@ -148,6 +148,7 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[Play
     points = [corners @ T[:3, :3].T + T[:3, 3] for corners, T in placed]
     for robot, *ways in zip(robots, *((motion.q, *motion.beside) for motion in motions)):
         points += [poses_at(robot, q[k])[:, :3, 3] for q in ways for k in (0, len(q) // 2, -1)]
+    points += [np.array([mark.start]) for motion in motions for mark in motion.marks]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
     axes = axes_of(AZIMUTH + (TURNED if len(robots) > 1 else 0.0), ELEVATION)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
+from typing import Literal
 
 from er3a.confirmation.confirm import Confirmation
 from er3a.files.kept_files import sha256
@@ -14,17 +13,14 @@ from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import own_title, with_unit
 from er3a.pipeline.messages.confirm import lines_of
 from er3a.pipeline.messages.numbers import number
-from er3a.pipeline.messages.say import bracketed
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.results import Input, Provenance
 from er3a.pipeline.viewing import page
-from er3a.pipeline.viewing.figures import house_style, new_figure
-from er3a.pipeline.viewing.page import Picture
-from er3a.pipeline.viewing.palette import VERDICTS
-from er3a.pipeline.viewing.side_view import seen_arm, side_view
+from er3a.pipeline.viewing.answer import Group, ListRow, Part, lengths
+from er3a.pipeline.viewing.side_view import UPRIGHT, beyond, flanges_off, seen_arm, side_view
 from er3a.robots.robot import Robot
 
 STATUS = {"agrees": "pass", "open": "fail"}
-LEAST_MM = 1e-4  # drawn, on a scale by powers of ten
 
 
 def write_confirmation(
@@ -42,21 +38,20 @@ def write_confirmation(
     _, headline, *lines = lines_of(found, robot, nearest=nearest)
     arms = [seen_arm(robot, own_title(robot.title), "model", "right" if found.verdict == "agrees" else "wrong")]
     if found.verdict not in ("agrees", "open"):
-        arms.append(seen_arm(found.corrected, "Controller", "", "right"))
-    with house_style():
-        page.render(
-            Path(__file__).with_name("confirmation.html.j2"),
-            output,
-            command=command,
-            provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
-            title=own_title(robot.title),
-            status=STATUS.get(found.verdict, "caution"),
-            headline=re.split("[;；]", headline)[0],  # the key figures say the rest
-            lines=[headline, *(line.strip() for line in lines)],
-            keys=_keys(found),
-            arms=side_view(arms),
-            bars=_bars(found),
-        )
+        arms.insert(0, seen_arm(found.corrected, "Controller", "", "right"))
+    page.render(
+        Path(__file__).with_name("confirmation.html.j2"),
+        output,
+        command=command,
+        provenance=Provenance(tuple(Input(str(file), sha256(file), {}) for file in files), code_digest()),
+        title=own_title(robot.title),
+        status=STATUS.get(found.verdict, "caution"),
+        headline=re.split("[;；]", headline)[0],  # the key figures say the rest
+        lines=[headline, *(line.strip() for line in lines)],
+        keys=_keys(found),
+        arms=side_view(arms, ratio=UPRIGHT, labels=flanges_off(arms), column_mm=beyond(arms)),
+        poses=[_poses(found)],
+    )
 
 
 def _keys(found: Confirmation) -> list[tuple[str, str]]:
@@ -65,18 +60,14 @@ def _keys(found: Confirmation) -> list[tuple[str, str]]:
     return [(with_unit(number(float(value), 3), "mm"), said) for value, said in zip(off, words)]
 
 
-def _bars(found: Confirmation) -> Picture:
-    """How far each pose is off, by the model as it is and with what was found."""
-    figure, ax = new_figure(width=8.5, height=5.4)
-    at = np.arange(len(found.lines))
-    rows = (found.before_mm, -0.2, "fail", "as it is"), (found.left_mm, 0.2, "pass", "explained")
-    for values, aside, colour, label in rows if found.layers else rows[1:]:
-        ax.bar(at + aside, np.maximum(values, LEAST_MM), 0.4, bottom=0.0, color=VERDICTS[colour], label=label)
-    ax.axhline(found.digits_mm, color="black", linewidth=0.8, linestyle="--", label="rounding explains")
-    ax.set_yscale("log")
-    ax.set_ylabel(bracketed("flange off", "mm"))
-    ax.set_xlabel("line of the file")
-    shown = at[:: max(1, len(at) // 20)]
-    ax.set_xticks(shown, [str(found.lines[k]) for k in shown])
-    figure.legend(loc="outside lower center", ncols=3)
-    return Picture(figure, "How far each pose is off, before and after", "Each pose before and after.")
+def _poses(found: Confirmation) -> Group:
+    """How far each pose is off, by the model as it is, with its bar, and with what was found."""
+    shares = lengths(found.before_mm.tolist())
+    rows = []
+    for line, before, left, share in zip(found.lines, found.before_mm, found.left_mm, shares):
+        off = [with_unit(number(float(value), 2), "mm") for value in ((before, left) if found.layers else (left,))]
+        mark: Literal["pass", "caution", "fail"] = (
+            "pass" if before <= found.digits_mm else "caution" if left <= found.digits_mm else "fail"
+        )
+        rows.append(ListRow(mark, f"line {line}", joined(off, " → "), length=share, parts=[Part(0.0, 1.0, mark)]))
+    return Group("flange off", rows)

@@ -759,7 +759,7 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
 }
 
 // The row of the list whose moment or picture is shown.
-const rows = [...document.querySelectorAll(".runs a")];
+const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
 const fix = rows.length && document.querySelector(".hero .fix[data-follows]");
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));

@@ -10,7 +10,7 @@ import shlex
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from importlib.metadata import version
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jinja2
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
@@ -215,7 +215,7 @@ class Head:
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
     to know first; ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document. ``numerics``: figures
-    of the computation, not of the arm. ``links``: addresses that words of the text lead to.
+    of the computation, not of the arm.
     """
 
     robot: str
@@ -230,7 +230,6 @@ class Head:
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
     numerics: tuple[ShownFigure, ...] = ()
-    links: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def no_verdict(self) -> bool:
@@ -277,12 +276,8 @@ class Head:
         return self.text.removesuffix(self.banner).rstrip()
 
 
-def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head:
+def head_of(stored: Stored[Any]) -> Head:
     """The head of a stage's page.
-
-    Parameters
-    ----------
-    links : addresses by words, as of :class:`Head`
 
     Returns
     -------
@@ -324,7 +319,6 @@ def head_of(stored: Stored[Any], links: Mapping[str, str] | None = None) -> Head
         checked,
         tuple(map(assumed_text, summary.assumed)),
         tuple(figure for figure in shown if figure.name in NUMERICS),
-        links or {},
     )
 
 
@@ -408,7 +402,6 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         "own": language.own_title,
         "sentence": whole_sentence,
         "first_sentence": language.first_sentence,
-        "linked": linked,
         "breakable": breakable,
         "grade": partial(word, "grade", GRADE_NAMES),
         "group": partial(word, "group", GROUP_NAMES),
@@ -423,7 +416,6 @@ def render_stage(
     answer: Answer | None = None,
     *,
     head: Head | None = None,
-    head_links: Mapping[str, str] | None = None,
     **context: Any,
 ) -> None:
     """Render the page of a stage of a robot, from the template beside its ``report.py``.
@@ -435,11 +427,10 @@ def render_stage(
     output : replaced whole, or left as it is
     answer : its first screen, but where evidence contradicts the table that all rests on; None for the verdict alone
     head : if it is another than the results give
-    head_links : addresses that words of the head lead to; of the head that the results give
     context : what the template needs besides, by name
     """
     name, stage = stored.robot, stored.stage
-    head = head or head_of(stored, head_links)
+    head = head or head_of(stored)
     first = answer or Answer(f"{status_word(head.status)}.", below=language.first_sentence(head.own_text)[0])
     shared: dict[str, Any] = {
         "head": head,
@@ -505,24 +496,6 @@ def closed_up(html: str) -> str:
     html : text within ``<code>`` keeps its brackets
     """
     return BRACKETS.sub(r"\1（\2）", BLANKS.sub("", STOPS.sub(r"\1。", html)))
-
-
-def linked(text: str, links: Mapping[str, str]) -> Markup:
-    """A text in which the first of each of some words leads to an address.
-
-    Parameters
-    ----------
-    text : plain; it is escaped here
-    links : addresses by word; of words that overlap the longer one counts
-    """
-    html, left = escape(text), {str(escape(name)): address for name, address in links.items()}
-    names = "|".join(map(re.escape, sorted(left, key=len, reverse=True)))
-
-    def link(found: re.Match[str]) -> str:
-        address = left.pop(found[0], None)
-        return found[0] if address is None else f'<a href="{escape(address)}">{found[0]}</a>'
-
-    return Markup(re.sub(rf"(?<![\w-])(?:{names})(?![\w-])", link, html)) if left else html
 
 
 def breakable(name: str) -> Markup:

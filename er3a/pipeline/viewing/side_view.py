@@ -9,17 +9,22 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup
 
-from er3a.kinematics.forward import skeleton
+from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
+from er3a.kinematics.forward import frames, skeleton
 from er3a.numerics.arrays import Integers, Reals
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
-Kind = Literal["right", "wrong", "other"]
+Kind = Literal["right", "wrong"]
+LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
-WIDE, UPRIGHT = 1.68, 0.82  # width of a drawing, of its height
-NAME, LABEL, SCALE = 0.06, 0.3, 0.05  # of the height: room for names above, labels at the right, the scale below
-GAP = 0.04  # of the height, between two labels
+WIDE, UPRIGHT = 1.7, 0.83  # width of a drawing, of its height
+LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
+GAP = 0.045  # of the height, between two labels
+COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
+SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
 SCALES_MM = (100, 200, 500, 1000, 2000)
@@ -46,17 +51,51 @@ class SeenArm:
 
 @dataclass(frozen=True, eq=False)
 class Label:
-    """A word at a place (2,), mm, in the colour of its kind; ``name``: by which an address on the page leads to it."""
+    """A word at a place (2,), mm, in the colour of its kind.
+
+    Attributes
+    ----------
+    name : by which an address on the page leads to it
+    start : (2,), mm, from where a dashed line leads to the place; None for none
+    """
 
     text: str
     at: Reals
-    kind: Literal["wrong", "open", "hole", "tray", "tray other", "right"]
+    kind: LabelKind
     name: str = ""
+    start: Reals | None = None
 
 
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
     """An arm with all joints at 0, seen along y of the frame that its base is placed in."""
     return SeenArm(title, note, kind, skeleton(robot, np.zeros(robot.joints))[:, ::2] * 1000, reach_mm)
+
+
+def entry_places(robot: Robot) -> dict[str, Reals]:
+    """Where each entry of geometry is seen with all joints at 0 (2,), mm: a length at its middle, an angle at its
+    joint; by names such as ``d4``."""
+    parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
+    found = {}
+    for row in range(1, robot.rows + 1):
+        along, across = parts[row, ALONG_Z, :3, 3], parts[row, TO_NEXT_AXIS, :3, 3]
+        for name, local in {"d": along / 2, "a": along + across / 2, "": along}.items():
+            found[f"{name}{row}"] = 1000 * (T[row - 1] @ [*local, 1.0])[[0, 2]]
+    return found
+
+
+def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
+    """How far the flange of the last arm is off that of the first; nothing of arms whose flanges are the same."""
+    right, wrong = arms[0].points_mm[-1], arms[-1].points_mm[-1]
+    far = float(np.linalg.norm(right - wrong))
+    off = tr("flange {off} off", off=with_unit(fixed(far, 0), "mm"))
+    return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
+
+
+def beyond(arms: Sequence[SeenArm]) -> float:
+    """How far forward (mm) there is room for words: beyond the arms, and what those reach that are not wrong."""
+    right = [ring for arm in arms if arm.kind != "wrong" for ring in arm.reach_mm]
+    corners = np.concatenate([*(arm.points_mm for arm in arms), *right])
+    return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
 
 
 def side_view(
@@ -65,6 +104,7 @@ def side_view(
     ratio: float = WIDE,
     labels: Sequence[Label] = (),
     trays: Sequence[Reals] = (),
+    column_mm: float | None = None,
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
@@ -75,6 +115,7 @@ def side_view(
     ratio : width of the drawing, of its height
     labels : moved up or down where they would be on each other
     trays : corners (k, 2), mm, of what is drawn behind the arms
+    column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
 
     Returns
     -------
@@ -87,8 +128,8 @@ def side_view(
     low, high = low - margin, high + margin
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
-    high[0] = max([high[0], *(label.at[0] + LABEL * tall for label in labels)])
-    high[1] += NAME * tall * len(arms)
+    starts = [label.at[0] if column_mm is None else column_mm for label in labels]
+    high[0] = max([high[0], *(start + LABEL * tall for start in starts)])
     wide, tall = high - low
     spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
     low, high = low - spare, high + spare
@@ -102,8 +143,9 @@ def side_view(
         )
     outline = Markup('<polygon class="{}" points="{}"/>')
     parts += [outline.format("tray other" if k else "tray", _line(corners)) for k, corners in enumerate(trays)]
-    over = [arm.kind == "wrong" and len(arms) > 1 for arm in arms]
-    parts += [_arm(arm, BONE * tall * (THINNER if thin else 1.0)) for arm, thin in zip(arms, over)]
+    placed = _placed(labels, low, high, column_mm)
+    parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
+    parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
@@ -112,9 +154,9 @@ def side_view(
     scale = Markup('<span class="scale" style="width: {:.2f}%">{}</span>').format(
         100 * length / wide, tr("{length} mm", length=length)
     )
-    words = [*map(_name, arms), *_labels(labels, low, np.array([wide, tall])), scale]
-    return Markup('<div class="arms" style="--ratio: {:.3f}">{}{}</div>').format(
-        wide / tall, drawn, Markup("").join(words)
+    words = [_word(label, (place - low) / [wide, tall], column_mm is None) for label, place in placed]
+    return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
+        wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
 
 
@@ -122,16 +164,32 @@ def _name(arm: SeenArm) -> Markup:
     return Markup('<p class="{}"><b>{}</b> {}</p>').format(arm.kind, arm.title, arm.note)
 
 
-def _labels(labels: Sequence[Label], low: Reals, size: Reals) -> list[Markup]:
-    """Words at their places, in parts of the drawing."""
-    shown, above = [], np.inf
-    for label in sorted(labels, key=lambda each: -each.at[1]):
-        left, up = (label.at - low) / size
-        above = min(up, above - GAP)
-        text = '<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">◂ {}</span>'
-        name = Markup(' id="{}"').format(label.name) if label.name else ""
-        shown.append(Markup(text).format(label.kind, name, 100 * left, 100 * above, label.text))
-    return shown
+def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
+    """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
+    order = sorted(labels, key=lambda each: -each.at[1])
+    gap, above = GAP * (high[1] - low[1]), high[1]
+    heights = [above := min(above - gap, float(label.at[1])) for label in order]
+    below = low[1]
+    for k in reversed(range(len(order))):
+        below = heights[k] = max(below + gap, heights[k])
+    across = [label.at[0] if column_mm is None else column_mm for label in order]
+    return list(zip(order, np.column_stack([across, heights])))
+
+
+def _lead(label: Label, place: Reals) -> Markup:
+    """The line of a label: to its place, or where it has a start from there."""
+    line = _line(np.stack([*([] if label.start is None else [label.start]), label.at, place]))
+    return Markup('<polyline class="lead {} {}" points="{}"/>').format(
+        label.kind, "dashed" if label.start is not None else "", line
+    )
+
+
+def _word(label: Label, share: Reals, pointing: bool) -> Markup:
+    """A label, at its place in parts of the drawing."""
+    name = Markup(' id="{}"').format(label.name) if label.name else ""
+    return Markup('<span class="label {} {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, "pointing" if pointing else "led", name, *(100 * share), label.text
+    )
 
 
 def _line(points: Reals) -> str:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from er3a.finding import is_one
-from er3a.pipeline.language import tr
+from er3a.geometry.transforms import transform
+from er3a.kinematics.inverse import inverse
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import limits_in_short
 from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
@@ -19,22 +20,29 @@ from er3a.robots.robot import Robot
 from er3a.selection.nearest import Refusal
 
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
+Position = tuple[float, float, float]
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
 
 
 def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> PlayedMotion:
-    """The arm in each branch that solves a target, among all of them, pale.
+    """The arm in each branch that solves a target, among all of them, pale; without one where it comes nearest.
 
     Parameters
     ----------
     rows : the best row of each branch, in the order in which they are shown
     """
     q = meant(robot, rows.q_deg if len(rows) else np.array([target.q_ref_deg]))
+    near = target.neighbours if not len(rows) else None
+    if near and near.shifted_to_mm:
+        pose = transform(np.array(near.shifted_to_mm) / 1000, np.radians(target.rpy_deg))
+        found = inverse(robot, pose, q[0])
+        q = found.q[found.within_limits][:1] if found.within_limits.any() else q
     events = [_solution_event(rows, k) for k in range(len(rows))]
     events = events or [PlayedEvent(0.0, SHOWN_S, outcome_word(target.outcome), "fail")]
-    marks = [_place(target.name, target.xyz_mm, len(q))]
-    if target.neighbours and target.neighbours.shifted_to_mm:
-        marks.append(_place(tr("nearest position with a solution"), target.neighbours.shifted_to_mm, len(q)))
+    marks = [_line(target.xyz_mm, target.xyz_mm, target.name, len(q))]
+    if near and near.shifted_to_mm and near.least_shift_mm:
+        short = tr("{far} short", far=with_unit(fixed(near.least_shift_mm, 0), "mm"))
+        marks.append(_line(near.shifted_to_mm, target.xyz_mm, short, len(q)))
     t = np.arange(len(q))[:, None] + [0.0, SHOWN_S]
     return PlayedMotion(target.name, "", t.ravel(), np.repeat(q, 2, axis=0), events, marks, ghosts=list(q[:MAX_GHOSTS]))
 
@@ -46,10 +54,10 @@ def _solution_event(rows: SolutionRows, k: int) -> PlayedEvent:
     return PlayedEvent(k, k + SHOWN_S, joined([name, said], ": "), "plain" if refusal is None else "fail")
 
 
-def _place(name: str, xyz_mm: Sequence[float], count: int) -> Mark:
-    """A dot at a place, as long as ``count`` solutions are shown."""
-    x, y, z = (value / 1000 for value in xyz_mm)
-    return Mark(0.0, float(count), (x, y, z), (x, y, z), name)
+def _line(start_mm: Position, end_mm: Position, name: str, count: int) -> Mark:
+    """A line between two places, a dot where they are one, as long as ``count`` solutions are shown."""
+    (a, b, c), (x, y, z) = start_mm, end_mm
+    return Mark(0.0, float(count), (a / 1000, b / 1000, c / 1000), (x / 1000, y / 1000, z / 1000), name)
 
 
 def refusal_in_short(refusal: Refusal | None) -> str:

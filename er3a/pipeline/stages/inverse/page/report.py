@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +25,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -56,8 +55,6 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
-        outcomes=_outcomes(summary.targets),
-        not_advised=_not_advised(summary.targets),
         units=_units(robot),
         slides=bool(robot.slides.any()),
         optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
@@ -68,12 +65,12 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached, or else the one that the fewest of its solutions serve; the best of these."""
+    """A target that is not reached and should be, or else the one that the most solutions serve; the best of these."""
 
-    def served(target: model.TargetResult) -> tuple[bool, float]:
-        return target.outcome == "reached", target.within_limits / max(target.solutions, 1)
+    def order(target: model.TargetResult) -> tuple[bool, int]:
+        return target.outcome in ("reached", target.expect), -target.within_limits
 
-    return min(shown, key=served).name, 0.0
+    return min(shown, key=order).name, 0.0
 
 
 def _answer(
@@ -98,6 +95,7 @@ def _answer(
             Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
             Group(tr("Reached"), [row for row in rows if row.mark == "pass"]),
         ),
+        next((row.fix for row in rows if row.fix), None),
     )
 
 
@@ -111,7 +109,9 @@ def _row(target: model.TargetResult, motion: PlayedMotion) -> ListRow:
     mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
     parts = bar_of(motion, float(motion.t[-1])) if target.solutions else ()
     length = 1.0 if target.solutions else 0.0
-    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts)
+    advice = listed(target.advice) if mark == "fail" else ()
+    fix = Fix(advice[-1], f"#{target.name}-solutions") if advice else None
+    return ListRow(mark, target.name, note, f"#{target.name}", (target.name, 0.0), length, parts, fix)
 
 
 def _section(
@@ -137,8 +137,6 @@ def _section(
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(target.name, branches, cells),
-        residual_mm=rows.position_residual_mm.max() if len(rows) else None,
-        residual_deg=rows.orientation_residual_deg.max() if len(rows) else None,
     )
 
 
@@ -189,18 +187,6 @@ def _move_rule(robot: Robot, sequence: model.VisitOrder | None) -> tuple[str, st
     if sequence is None:
         return "", ""
     return tr(RULES[sequence.rule].unit_of(robot)), word("rule.title", RULE_TITLES, sequence.rule)
-
-
-def _outcomes(targets: Iterable[model.TargetResult]) -> str:
-    """How many targets came to what."""
-    counts = Counter(target.outcome for target in targets)
-    return tr(", ").join(f"{outcome_word(outcome)} {number(count)}" for outcome, count in counts.most_common())
-
-
-def _not_advised(targets: Iterable[model.TargetResult]) -> int:
-    """How many targets without solution were not looked at for what would help, where others were."""
-    without = [target.neighbours for target in targets if target.obstacle]
-    return without.count(None) if any(without) else 0
 
 
 def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]]:

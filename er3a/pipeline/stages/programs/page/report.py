@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.player.motions import Fault, PlayedMotion, fix_of, opened, row_of
+from er3a.pipeline.player.motions import fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -37,6 +36,7 @@ from er3a.pipeline.viewing.answer import Answer, Group, ListRow, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
+from er3a.robots.robot import Robot
 
 SHORTEST_S = 0.005  # of a cycle: what is shorter was not followed
 MAX_LINES = 400  # of a listing that the page shows
@@ -53,8 +53,7 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
         study,
         stored,
         output,
-        _answer(summary, wrong, played),
-        head_links={each.name: f"#{each.name}" for each in summary.programs},
+        programs_answer(robot, results),
         sections=sections,
         entered=None if stored.rests_on.get("validation") == "fail" else in_tray(study, stored),
         compared_with_tray=compared_with_tray,
@@ -65,8 +64,9 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
     )
 
 
-def _answer(summary: model.ProgramsSummary, wrong: Sequence[Fault], played: Sequence[PlayedMotion]) -> Answer:
+def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
+    summary, wrong, played = results.summary, faults(results), motions(robot, results)
     shown = {motion.name: motion for motion in played if len(motion.t)}
     known = {each.name: each for each in summary.programs}
     ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}

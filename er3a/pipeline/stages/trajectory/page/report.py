@@ -78,7 +78,6 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         stored,
         output,
         answer_of(summary, wrong, played, met or {}),
-        head_links={path.name: f"#{path.name}" for path in summary.paths},
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
@@ -92,9 +91,9 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     )
 
 
-def path_groups(robot: Robot, results: model.TrajectoryResults) -> Sequence[Group]:
-    """The paths by whether they may be run, each with its bar over time."""
-    return answer_of(results.summary, _by_name(results), motions(robot, results)).groups
+def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
+    """How many paths may be run, and each with its bar over time."""
+    return answer_of(results.summary, _by_name(results), motions(robot, results))
 
 
 def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:

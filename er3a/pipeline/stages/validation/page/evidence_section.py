@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import pi
 from typing import Any
@@ -15,6 +15,7 @@ from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.references.quantities import MM
+from er3a.references.reference import NO_DOCUMENT
 from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
@@ -56,16 +57,14 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(
-    robot: Robot, evidence: TableEvidence | None, shown: Collection[str] = tuple(COLUMNS)
-) -> dict[str, Any] | None:
+def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
     joints = sorted({int(name[len(kind) :]) for name in by_name if (kind := name.rstrip("0123456789")) in COLUMNS})
-    kinds = [kind for kind in COLUMNS if kind in shown and any(f"{kind}{joint}" in by_name for joint in joints)]
+    kinds = [kind for kind in COLUMNS if any(f"{kind}{joint}" in by_name for joint in joints)]
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
@@ -73,7 +72,7 @@ def evidence_section(
     present = {each.status for each in numbers}
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -148,14 +147,15 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+def _cell(robot: Robot, each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+    """An entry in the table; where evidence contradicts one that its own source doesn't state there is no value."""
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     gives = _gives(each, evidence) or _alone(each)
-    return dict(
-        entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title, gives=gives
-    )
+    unstated = each.status == "contradicted" and robot.origins.get(each.entry) == NO_DOCUMENT
+    value = "–" if unstated else _value(each)
+    return dict(entry=each.entry, value=value, status=each.status, mark=MARKS[each.status], title=title, gives=gives)
 
 
 def _marked(status: Status) -> str:

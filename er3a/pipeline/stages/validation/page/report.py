@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
 from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
-from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, link_parts
-from er3a.kinematics.forward import frames, skeleton
-from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
-from er3a.pipeline.messages.numbers import fixed, measured, number
+from er3a.pipeline.messages.numbers import fixed, measured
 from er3a.pipeline.messages.pages import GRADE_NAMES
 from er3a.pipeline.messages.say import bracketed, joined, say, word
 from er3a.pipeline.messages.validation import GRADES, GROUPS
@@ -27,21 +24,31 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.validation import model
 from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
+    SETTLED,
     evidence_section,
     other_robot,
     plain_table,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
+    status_word,
     text_address,
 )
-from er3a.pipeline.viewing.side_view import UPRIGHT, Kind, Label, seen_arm, side_view
+from er3a.pipeline.viewing.side_view import (
+    UPRIGHT,
+    Label,
+    LabelKind,
+    beyond,
+    entry_places,
+    flanges_off,
+    seen_arm,
+    side_view,
+)
 from er3a.robots.robot import Robot
 
-SEEN_M = 2e-3  # by which two arms differ in a drawing
 ANGLES = ("alpha", "beta", "offset")
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -65,7 +72,7 @@ def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
     return found
 
 
-def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
+def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     """A row for each set and group."""
     rows = []
     for title, own in by_set(checks).items():
@@ -74,17 +81,21 @@ def group_rows(checks: Iterable[Judged]) -> list[dict[str, Any]]:
             counted = Counter(check.status for check in part)
             status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=lambda check: check.tolerances_off)
-            rows.append(
-                dict(
-                    set=title,
-                    group=word("group", GROUPS, group),
-                    status=status,
-                    counts=(counted["pass"], counted["fail"], counted["conflict"]),
-                    worst=say(worst.subject),
-                    difference=with_unit(_value(worst.difference, worst), worst.unit),
-                )
-            )
+            off = with_unit(_value(worst.difference, worst), worst.unit)
+            counts = counted["pass"], counted["fail"], counted["conflict"]
+            rows.append([title, word("group", GROUPS, group), status_word(status), *counts, say(worst.subject), off])
     return rows
+
+
+def _by_document(checks: Iterable[Judged]) -> Group:
+    """How many checks of each set of references pass, each with its bar."""
+    rows = []
+    for title, own in by_set(checks).items():
+        failed = sum(check.status == "fail" for check in own)
+        passed = tr("{passed} of {total}", passed=len(own) - failed, total=len(own))
+        parts = [Part(1 - failed / len(own), 1.0, "fail")] if failed else []
+        rows.append(ListRow("fail" if failed else "pass", title, passed, "#checks", length=1.0, parts=parts))
+    return Group(tr("Checks"), rows)
 
 
 def check_row(check: Judged) -> list[str]:
@@ -95,7 +106,7 @@ def check_row(check: Judged) -> list[str]:
         source = bracketed(own_title(check.source), grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, _tolerance(check), tr(check.unit), source]
+    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
 
 
 def _value(value: float, check: model.Check) -> str:
@@ -103,12 +114,6 @@ def _value(value: float, check: model.Check) -> str:
     if check.group == "round_trips" and 0 < abs(value) < 1e-3:
         return measured(value, None, check.unit)
     return fixed(value, DECIMALS[check.unit])
-
-
-def _tolerance(check: Judged) -> str:
-    """A check's tolerance as it is given."""
-    given = f"{check.tolerance:g}"
-    return number(check.tolerance, 1) if "e" in given else given
 
 
 SHOWN_FAILURES = 12
@@ -132,64 +137,58 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         study,
         stored,
         output,
-        _answer(stored.robot, summary, instead),
+        _answer(study, name, summary, instead),
         arms=_both_arms(
             robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}
         ),
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
-        head_links={instead: f"../{instead}/validation.html"} if instead else {},
         robot=robot,
         table_evidence=evidence,
         diagnoses=diagnosis_section.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
+        by_document=[_by_document(judged)],
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         all_failed=len(failed),
         columns=[tr(label) for label in COLUMNS],
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
-        grade_names={grade: word("grade", GRADE_NAMES, grade) for grade in GRADE_NAMES},
     )
 
 
 def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale."""
-    zero = np.zeros(robot.joints)
-    seen = [skeleton(each, zero) for each in (robot, other) if each is not None]
-    differs = len(seen) == 2 and (seen[0].shape != seen[1].shape or np.abs(seen[0] - seen[1]).max() > SEEN_M)
-    kind: Kind = "wrong" if differs else "right"
-    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), kind)]
-    if other is not None and differs:
+    arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "right")]
+    if other is not None:
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
-    return side_view(arms, ratio=UPRIGHT, labels=_doubts(robot, evidence))
+    off = flanges_off(arms)
+    arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
+    labels = [*_entries_seen(robot, evidence), *off]
+    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms))
 
 
-def _doubts(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
-    """The entries of geometry that evidence contradicts or leaves open, each at the link or joint that it is of."""
-    parts, T = link_parts(robot), frames(robot, np.zeros(robot.joints))
-    found = []
+def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
+    """The lengths of the table, and the angles that evidence leaves open, each at the link or joint that it is of."""
+    places, found = entry_places(robot), []
     for joint, cells in evidence.get("rows", ()):
-        shown = [(column_of(cell["entry"]), cell) for cell in cells if cell]
-        along = parts[joint, ALONG_Z, :3, 3]
-        middles = {"d": along / 2, "a": along + parts[joint, TO_NEXT_AXIS, :3, 3] / 2}
-        texts: list[tuple[str, Reals, Literal["wrong", "open"]]] = [
-            (f"{cell['entry']}: {cell['value']} → {cell['gives']}", middles[kind], "wrong")
-            for kind, cell in shown
-            if cell["status"] == "contradicted" and cell["gives"] and kind in middles and cell["value"] != "0"
-        ]
-        if unsure := [cell["entry"] for kind, cell in shown if cell["status"] == "open" and kind in ANGLES]:
-            texts.append((f"{joined(unsure, ', ')}: ?", along, "open"))
-        for text, local, kind in texts:
-            place = T[joint - 1, :3, :3] @ local + T[joint - 1, :3, 3]
-            found.append(Label(text, 1000 * place[::2], kind))
+        for cell in filter(None, cells):
+            entry, given = cell["entry"], cell["gives"] or cell["value"] != "0"
+            if given if column_of(entry) in ("a", "d") else cell["status"] == "open" and column_of(entry) in ANGLES:
+                kind, gives = _kind(cell["status"]), cell["gives"]
+                text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
+                found.append(Label(text, places.get(entry, places[str(joint)]), kind))
     return found
 
 
-def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
+def _kind(status: str) -> LabelKind:
+    return "wrong" if status == "contradicted" else "sound" if status in SETTLED else "open"
+
+
+def _answer(study: Study, robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
@@ -202,7 +201,10 @@ def _answer(robot: str, summary: model.ValidationSummary, instead: str | None) -
     elif evidence:
         keys.append((str(unsure), tr("entries unconfirmed")))
     if instead:
-        fix = Fix(tr("use the table of {robot}.", robot=instead), f"../{instead}/validation.html")
+        fix = Fix(
+            tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
+            f"../{instead}/validation.html",
+        )
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):

@@ -217,14 +217,15 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    labels = [_hole_label(number_, void) for number_, void in enumerate(summary.voids, 1) if void.kind == "enclosed"]
+    labels = [void_label(number_, void) for number_, void in enumerate(summary.voids, 1) if void.kind == "enclosed"]
     outlines = [_tray_corners(tray) for tray in trays]
     labels += [Label(tr("tray"), corners[1], "tray") for corners in outlines]
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
-def _hole_label(number_: int, void: model.VoidSummary) -> Label:
+def void_label(number_: int, void: model.VoidSummary) -> Label:
+    """The name of a void, at its place."""
     name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, "L"))
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
