@@ -545,7 +545,9 @@ class PaddedChain(ChainSolver):
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
             same = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
             x[:, first + 1 :][same] = np.nan
-            meet = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            meet = (
+                np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            )
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 

@@ -181,8 +181,8 @@ def all_rows(
     Parameters
     ----------
     arm : in units of its size
-    by_readings : takes arm, poses in units of its size, and memory, and fills rows (N, 16, 6), their number (N,) and certainty (N,), which
-        starts as CONTINUUM
+    by_readings : takes arm, poses in units of its size, and memory, and fills rows (N, 16, 6), their number (N,) and
+        certainty (N,), which starts as CONTINUUM
     T : (N, 4, 4), m
 
     Returns
