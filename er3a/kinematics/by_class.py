@@ -451,7 +451,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = _apart(robot, q[n], row), bool(within(robot, row))
+        away, fits = _moves_between(robot, q[n], row), bool(within(robot, row))
         if away.min() < SAME_ROW and not fits:
             continue
         slot = int(away.argmin())
@@ -524,7 +524,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and further solutions fill free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        far = _apart(robot, rows, row)
+        far = _moves_between(robot, rows, row)
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
             kept[slot] = row
@@ -539,7 +539,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     return kept
 
 
-def _apart(robot: Robot, rows: Reals, q: Reals) -> Reals:
+def _moves_between(robot: Robot, rows: Reals, q: Reals) -> Reals:
     """Largest joint moves (k,) from rows (k, n) to joint values (n,), whole turns off; infinite from rows of NaN."""
     away = np.abs(shortest_move(robot, rows - q)).max(axis=1)
     return np.where(np.isnan(away), np.inf, away)
@@ -559,7 +559,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    far = _apart(robot, rows, q)
+    far = _moves_between(robot, rows, q)
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 
 

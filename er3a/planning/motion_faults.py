@@ -17,7 +17,7 @@ from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from er3a.finding import AnyFinding, Finding, fact, is_one, turned_or_moved
+from er3a.finding import AnyFinding, Finding, fact, turned_or_moved
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
@@ -181,17 +181,18 @@ LimitCause = Finding
 
 
 def joints_of(cause: LimitCause) -> tuple[int, ...]:
-    """The joints whose limit is left; more than one for a limit of their sum.
+    """The joints whose limit is left; more than one for a limit of their sum, none for what is no joint's.
 
     Parameters
     ----------
-    cause : of an interval of :func:`limit_intervals`
+    cause : of an interval of :func:`limit_intervals`, or of another check
 
     Returns
     -------
     joints : numbers from 1
     """
-    return cause.joints if is_one(cause, "combination_exceeded") else (cause.joint,)
+    alone = cause.params.get("joint")
+    return cause.params.get("joints", () if alone is None else (alone,))
 
 
 @dataclass(frozen=True, eq=False)

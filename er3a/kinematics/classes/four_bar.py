@@ -125,11 +125,11 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
     return q, marked
 
 
-def _careful_rows(arm: ThreeParallel, T: Reals, apart: bool) -> Reals:
+def _careful_rows(arm: ThreeParallel, T: Reals, once: bool) -> Reals:
     """Rows (N, 8, 6) of poses near singular ones, polished as :func:`polish_rows` does."""
     rows = np.empty((len(T), SLOTS, 6))
     solve_parallel_blocks(arm.constants, T, arm.constants.near_m, rows, np.empty(len(T), dtype=bool))
-    polish_rows(arm.links, size_of(arm.links), T, rows, apart)
+    polish_rows(arm.links, size_of(arm.links), T, rows, once)
     return rows
 
 
