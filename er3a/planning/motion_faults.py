@@ -177,10 +177,7 @@ def rate_interval(
     return Interval(start, end, cause, worst)
 
 
-LimitCause = Finding
-
-
-def joints_of(cause: LimitCause) -> tuple[int, ...]:
+def joints_of(cause: Finding) -> tuple[int, ...]:
     """The joints whose limit is left; more than one for a limit of their sum, none for what is no joint's.
 
     Parameters
@@ -220,7 +217,7 @@ class LimitSide:
         value: Reals = self.sign * (q[..., used[0]] if alone else q @ self.factors)
         return value
 
-    def cause(self, most: float) -> LimitCause:
+    def cause(self, most: float) -> Finding:
         """The finding for a motion that gets beyond this side.
 
         Parameters
@@ -288,7 +285,7 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[Finding]]:
     return found
 
 
-def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[LimitCause]]:
+def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Finding]]:
     """Where joints, or sums of joints, leave their limits.
 
     Parameters

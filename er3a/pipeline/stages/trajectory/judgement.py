@@ -59,7 +59,7 @@ class Judgement:
     of_joints: PathVerdict
     outcomes: tuple[PathVerdict, ...]
     events: list[motion_faults.SingularEvent]
-    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
+    limits: list[motion_faults.Interval[Finding]]
     fast: list[motion_faults.Interval[motion_faults.RateCause]]
     undecided: list[motion_faults.Interval[Finding]]
     beyond: list[motion_faults.Interval[Finding]]

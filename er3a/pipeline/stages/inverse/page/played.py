@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from er3a.finding import is_one
+from er3a.finding import Finding, is_one
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import limits_in_short
@@ -16,7 +16,6 @@ from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import Refusal
 
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
@@ -52,7 +51,7 @@ def _place(name: str, xyz_mm: Sequence[float], count: int) -> Mark:
     return Mark(0.0, float(count), (x, y, z), (x, y, z), name)
 
 
-def refusal_in_short(refusal: Refusal | None) -> str:
+def refusal_in_short(refusal: Finding | None) -> str:
     """Why a solution is not taken, in few words; empty for one that is admissible."""
     if refusal is None:
         return ""
