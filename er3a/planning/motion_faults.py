@@ -189,7 +189,7 @@ def joints_of(cause: Finding) -> tuple[int, ...]:
     joints : numbers from 1
     """
     alone = cause.params.get("joint")
-    return cause.params.get("joints", () if alone is None else (alone,))
+    return tuple(cause.params.get("joints", () if alone is None else (alone,)))
 
 
 @dataclass(frozen=True, eq=False)
