@@ -47,13 +47,13 @@ format: $(VENV)/dev.stamp  ## format Python and Snakemake code
 	$(BIN)/ruff check --fix .
 	$(BIN)/snakefmt Snakefile workflow
 
-schema: $(VENV)/run.stamp  ## write the JSON schemas again from the pydantic models
-	$(BIN)/er3a schema
+schema: $(VENV)/dev.stamp  ## write the JSON schemas again from the pydantic models
+	$(BIN)/python -m testing.schemas
 
 LOCALE := er3a/pipeline/messages/locale
 
 words: $(VENV)/dev.stamp  ## collect the texts to be translated into er3a/pipeline/messages/locale/
-	$(BIN)/pybabel -q extract -F $(LOCALE)/babel.cfg -k tr --no-location --sort-by-file --omit-header \
+	$(BIN)/python -m babel.messages.frontend -q extract -F $(LOCALE)/babel.cfg -k tr --no-location --sort-by-file --omit-header \
 		--width=100000 -o $(LOCALE)/er3a.pot .
 	$(BIN)/pybabel -q update -D er3a -i $(LOCALE)/er3a.pot -d $(LOCALE) --width=100000 --ignore-obsolete \
 		--ignore-pot-creation-date

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from er3a.pipeline.dictionary import data_dictionary
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.tables import table_types
+from testing.schemas import data_dictionary
 
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "results"
 

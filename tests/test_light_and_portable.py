@@ -65,7 +65,6 @@ psutil pyarrow rerun snakemake snakemake_interface_logger_plugins xacro xacrodoc
 OF_STUDIES = (
     "er3a.numerics.machine_code",
     "er3a.pipeline.article",
-    "er3a.pipeline.messages.extract",
     "er3a.pipeline.overview",
     "er3a.pipeline.parquet",
     "er3a.pipeline.player.turning",

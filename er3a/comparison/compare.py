@@ -23,7 +23,7 @@ from er3a.comparison import mechanism
 from er3a.comparison.mechanism import TOLERANCE_DEG, TOLERANCE_MM
 from er3a.comparison.slips import Cause, CauseCode, Explained, explain
 from er3a.errors import RobotError
-from er3a.geometry.transforms import exp_rotation, posed, rot_x, rot_z, rotation_angle, sines_about_axes, translation
+from er3a.geometry.transforms import exp_rotation, posed, rot_x, rot_z, rotation_angle, skew_part, translation
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
@@ -428,7 +428,7 @@ def _placement(T: Reals, entries: tuple[Difference, ...], tolerances: mechanism.
         axis = np.linalg.eigh(T[:3, :3] + T[:3, :3].T)[1][:, 2]
         axis *= np.sign(axis[np.abs(axis).argmax()])
     elif angle > NO_TURN:
-        axis = sines_about_axes(T[:3, :3]) / (2 * math.sin(angle))
+        axis = skew_part(T[:3, :3]) / (2 * math.sin(angle))
     u, v, w = (axis + 0.0).tolist()
     turn = Turn(math.degrees(angle), (u, v, w))
     return PlacementLayer(mechanism.is_identity(T, tolerances), (x, y, z), turn, entries)

@@ -30,7 +30,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.dynamics.arm_model import PARAMETERS, ArmModel
-from er3a.dynamics.pose_bound import bounded_lever, bounded_moment, max_over_poses
+from er3a.dynamics.pose_bound import bounded_moment, max_over_poses
 from er3a.dynamics.torques import time_mean
 from er3a.kinematics.chain import constant_links
 from er3a.kinematics.forward import frames
@@ -339,9 +339,8 @@ def worst_levers(robot: Robot, point: Reals, rows: Sequence[int]) -> tuple[Reals
     -------
     found, bound : (r,), m, the largest found, and what no pose exceeds
     """
-    climbed = max_over_poses(robot, lambda q: levers(robot, q, point)[:, list(rows)])
-    found = [bounded_lever(robot, point, row, q) for row, q in zip(rows, climbed.q)]
-    return np.array([each.found for each in found]), np.array([each.bound for each in found])
+    x, y, z = point.tolist()
+    return worst_moments(robot, Load(1.0, (x, y, z)), 1.0, rows)
 
 
 def load_moments(robot: Robot, load: Load, gravity: float, q: Reals) -> Reals:

@@ -334,23 +334,6 @@ def bounded_torque(model: ArmModel, joint: int, size: Size, start: Bounded) -> B
     return Bounded(found.found, found.q, min(found.bound, most))
 
 
-def bounded_lever(robot: Robot, point: Reals, row: int, start: Reals) -> Bounded:
-    """The largest distance of a point of the flange from a row's axis over all poses, found and bounded.
-
-    Parameters
-    ----------
-    point : (3,), m, flange frame
-    row : from 0
-    start : (n,), rad or m, a pose to search from
-
-    Returns
-    -------
-    bounded : m
-    """
-    x, y, z = point.tolist()
-    return bounded_moment(robot, Load(1.0, (x, y, z)), 1.0, row, start)
-
-
 def bounded_moment(robot: Robot, load: Load, gravity: float, row: int, start: Reals) -> Bounded:
     """The largest moment of a load at rest about a row's axis over all poses, found and bounded.
 

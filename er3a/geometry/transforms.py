@@ -144,6 +144,20 @@ def rpy_of(T: Reals) -> Reals:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
+def skew_part(R: Reals) -> Reals:
+    """What makes matrices differ from their transposes, as vectors.
+
+    Parameters
+    ----------
+    R : (..., 3, 3)
+
+    Returns
+    -------
+    skew : (..., 3); of a rotation its axis, twice the sine of its angle long
+    """
+    return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+
+
 def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     """Angle of the rotation from R_a to R_b.
 
@@ -160,22 +174,8 @@ def rotation_angle(R_a: Reals, R_b: Reals) -> Reals:
     It comes from sine and cosine both, so that neither small turns nor half turns lose digits.
     """
     R = np.swapaxes(R_a, -1, -2) @ R_b
-    angle: Reals = np.arctan2(np.linalg.norm(sines_about_axes(R), axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    angle: Reals = np.arctan2(np.linalg.norm(skew_part(R), axis=-1), np.trace(R, axis1=-2, axis2=-1) - 1.0)
     return angle
-
-
-def sines_about_axes(R: Reals) -> Reals:
-    """The axes of rotations, as long as twice the sines of their angles.
-
-    Parameters
-    ----------
-    R : (..., 3, 3)
-
-    Returns
-    -------
-    v : (..., 3); 0 of no turn and of a half turn
-    """
-    return np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
 
 
 def nearest_rotations(M: Reals) -> Reals:

@@ -451,8 +451,7 @@ def _with_own(robot: Robot, T: Reals, q_ref: Reals, numbers: Integers, found: tu
     own = q_ref[numbers] if len(q_ref) == len(T) else np.broadcast_to(q_ref[0], (len(numbers), robot.joints))
     solves = np.abs(forward(robot, own) - T[numbers]).max(axis=(1, 2), initial=0.0) < OWN_SOLVES
     for n, row in zip(numbers[solves].tolist(), own[solves]):
-        away, fits = np.abs(shortest_move(robot, q[n] - row)).max(axis=1), bool(within(robot, row))
-        away = np.where(np.isnan(away), np.inf, away)
+        away, fits = _moves_between(robot, q[n], row), bool(within(robot, row))
         if away.min() < SAME_ROW and not fits:
             continue
         slot = int(away.argmin())
@@ -525,8 +524,7 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     reference, and further solutions fill free slots."""
     kept, left = np.full_like(rows, np.nan), []
     for row in settled.alone:
-        away = shortest_move(robot, rows - row)
-        far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+        far = _moves_between(robot, rows, row)
         slot = int(far.argmin())
         if far[slot] < SAME_ROW and np.isnan(kept[slot, 0]):
             kept[slot] = row
@@ -539,6 +537,12 @@ def _in_slots(robot: Robot, rows: Reals, settled: Settled) -> Reals:
     for slot, row in zip(order, left):
         kept[slot] = row
     return kept
+
+
+def _moves_between(robot: Robot, rows: Reals, q: Reals) -> Reals:
+    """Largest joint moves (k,) from rows (k, n) to joint values (n,), whole turns off; infinite from rows of NaN."""
+    away = np.abs(shortest_move(robot, rows - q)).max(axis=1)
+    return np.where(np.isnan(away), np.inf, away)
 
 
 def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
@@ -555,8 +559,7 @@ def slot_of(robot: Robot, T: Reals, q: Reals) -> int:
     """
     values = checked_parameters(robot, None, q[None], 1)
     rows = class_rows(robot, T[None], values).q[0]
-    away = shortest_move(robot, rows - q)
-    far = np.where(np.isnan(rows[:, 0]), np.inf, np.abs(away).max(axis=1))
+    far = _moves_between(robot, rows, q)
     return int(far.argmin()) if far.min() < SAME_ROW else 0
 
 

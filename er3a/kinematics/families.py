@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, shortly
+from er3a.geometry.transforms import skew_part
 from er3a.geometry.vectors import TURN, signed_angle, wrap_to_pi
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
@@ -174,8 +175,7 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
     best, smallest, before = None, SOLVES_M, np.inf
     for _ in range(MAX_STEPS):
         reached = forward(robot, q)
-        R = T[:3, :3] @ reached[:3, :3].T  # a small turn, so its sine will do
-        turn = [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]
+        turn = skew_part(T[:3, :3] @ reached[:3, :3].T)  # a small one, so its sine will do
         miss = np.append(T[:3, 3] - reached[:3, 3], np.multiply(turn, 0.5))
         far = float(max(np.linalg.norm(miss[:3]), np.linalg.norm(miss[3:])))
         if far < smallest:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from er3a.errors import PoseError, ShapeError
-from er3a.finding import fact, is_one
+from er3a.finding import Finding, fact, is_one
 from er3a.geometry.transforms import check_poses
 from er3a.geometry.vectors import max_joint_move, wrap_to_pi
 from er3a.kinematics import by_class, solutions
@@ -425,7 +425,7 @@ def _unsolved(robot: Robot, fault: NDArray[np.int8], gap: Reals) -> tuple[soluti
     return tuple(found)
 
 
-def _out_of_reach(robot: Robot, fault: int, gap: float) -> solutions.OutOfReach:
+def _out_of_reach(robot: Robot, fault: int, gap: float) -> Finding:
     """The reason behind a slot's fault, with its gap in mm or deg."""
     arm = wrist_partitioned_arm(robot)
     if fault == ORIENTATION:

@@ -125,7 +125,6 @@ def in_doubt(method: Method) -> Method:
     return method.but(certain=False) if is_one(method, "by_class") else method
 
 
-OutOfReach = Finding
 NotFound = Finding
 
 

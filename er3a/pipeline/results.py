@@ -265,8 +265,8 @@ def read_stage(folder: Path, stage: Stage) -> Stored[Any]:
     rests_on: dict[str, Foundation] = {
         name: read_foundation(folder.parent / name) for name in stage.rests_on if is_computed(folder.parent / name)
     }
-    if record["verdict"]["status"] == "not_computed":
-        absent = AbsentResults(Summary(Verdict("not_computed", Finding(**_stored_finding(record["verdict"]))), ()))
+    if (summary := _absent(record)) is not None:
+        absent = AbsentResults(summary)
         origin = adapter(Provenance).validate_python(record["provenance"])
         return Stored(record["robot"], stage.name, origin, absent, rests_on, folder)
     return replace(read_results(folder, stage.module("model").RESULTS), rests_on=rests_on, folder=folder)
@@ -326,6 +326,14 @@ def _record(folder: Path) -> dict[str, Any]:
         raise ResultError(path, "damaged (verdict without status)")
     _compare(path, content, checksums(folder))
     return stored
+
+
+def _absent(record: dict[str, Any]) -> Summary | None:
+    """The summary of a stage that could not be computed; None of one that was."""
+    verdict = record["verdict"]
+    if verdict["status"] != "not_computed":
+        return None
+    return Summary(Verdict("not_computed", Finding(**_stored_finding(verdict))), ())
 
 
 def read_status(folder: Path) -> Status:
@@ -394,10 +402,7 @@ def read_scope(folder: Path, stage: Stage) -> Summary:
         as :func:`read_stage`
     """
     record = _record(folder)
-    if record["verdict"]["status"] == "not_computed":
-        return Summary(Verdict("not_computed", Finding(**_stored_finding(record["verdict"]))), ())
-    summary: Summary = _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
-    return summary
+    return _absent(record) or _parsed(folder / SUMMARY, record, stage.module("model").RESULTS)[0]
 
 
 def check_results(folder: Path) -> None:

@@ -17,7 +17,7 @@ from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from er3a.finding import AnyFinding, Finding, fact, is_one, turned_or_moved
+from er3a.finding import AnyFinding, Finding, fact, turned_or_moved
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
@@ -177,21 +177,19 @@ def rate_interval(
     return Interval(start, end, cause, worst)
 
 
-LimitCause = Finding
-
-
-def joints_of(cause: LimitCause) -> tuple[int, ...]:
-    """The joints whose limit is left; more than one for a limit of their sum.
+def joints_of(cause: Finding) -> tuple[int, ...]:
+    """The joints whose limit is left; more than one for a limit of their sum, none for what is no joint's.
 
     Parameters
     ----------
-    cause : of an interval of :func:`limit_intervals`
+    cause : of an interval of :func:`limit_intervals`, or of another check
 
     Returns
     -------
     joints : numbers from 1
     """
-    return cause.joints if is_one(cause, "combination_exceeded") else (cause.joint,)
+    alone = cause.params.get("joint")
+    return tuple(cause.params.get("joints", () if alone is None else (alone,)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +217,7 @@ class LimitSide:
         value: Reals = self.sign * (q[..., used[0]] if alone else q @ self.factors)
         return value
 
-    def cause(self, most: float) -> LimitCause:
+    def cause(self, most: float) -> Finding:
         """The finding for a motion that gets beyond this side.
 
         Parameters
@@ -287,7 +285,7 @@ def unreachable(robot: Robot, followed: Followed) -> list[Interval[Finding]]:
     return found
 
 
-def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[LimitCause]]:
+def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Finding]]:
     """Where joints, or sums of joints, leave their limits.
 
     Parameters

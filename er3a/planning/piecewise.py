@@ -22,7 +22,7 @@ from numpy.polynomial import chebyshev
 
 from er3a.by_value import ByValue
 from er3a.numerics.arrays import Integers, Reals
-from er3a.planning.profiles import Rates, check_times
+from er3a.planning.profiles import Rates, pieces_at
 
 NEARLY_REAL = 1e-3  # imaginary part of a double root that rounding has split; more break points do no harm
 TRIMMED = 1e-15  # of the largest coefficient
@@ -197,9 +197,8 @@ class PiecewiseMotion(ByValue):
         Er3aError
             for times beyond start and end
         """
-        t = np.asarray(t, float)
-        check_times(t, self.times[0], self.times[-1])
-        i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
+        t, i = pieces_at(t, self.times)
+        i = i - 1
         span = self.times[i + 1] - self.times[i]
         x = np.divide(2 * (t - self.times[i]), span, out=np.zeros_like(t), where=span > 0) - 1
         q, velocity, acceleration = (

@@ -72,6 +72,29 @@ def check_times(t: Reals, start: float, end: float) -> None:
         raise Er3aError(f"t runs from {t.min():g} to {t.max():g} s; the motion lasts from {start:g} to {end:g} s")
 
 
+def pieces_at(t: Reals, times: Reals) -> tuple[Reals, Integers]:
+    """In which piece of a motion times lie.
+
+    Parameters
+    ----------
+    t : (...,), s
+    times : (m,), s, between which the pieces are; both rise
+
+    Returns
+    -------
+    t : the same as an array
+    pieces : (...,), numbers from 1
+
+    Raises
+    ------
+    Er3aError
+        for a time beyond them, as of :func:`check_times`
+    """
+    t = np.asarray(t, float)
+    check_times(t, times[0], times[-1])
+    return t, np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1)
+
+
 POWERS = 6  # of a quintic, 0 to 5
 
 
@@ -208,9 +231,7 @@ class FromRestToRest:
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
-        t = np.asarray(t, float)
-        check_times(t, self.times[0], self.times[-1])
-        i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
+        t, i = pieces_at(t, self.times)
         duration = self.times[i] - self.times[i - 1]
         tau = np.clip((t - self.times[i - 1]) / duration, 0.0, 1.0)
         one, zero = np.array(1.0), np.array(0.0)
@@ -250,10 +271,8 @@ class Timetable:
 
     def __call__(self, t: Reals) -> Rates:
         """See :class:`TimeLaw`."""
-        t = np.asarray(t, float)
-        check_times(t, self.times[0], self.times[-1])
+        t, i = pieces_at(t, self.times)
         t = np.clip(t, self.times[0], self.times[-1])
-        i = np.clip(np.searchsorted(self.times, t, side="right"), 1, len(self.times) - 1)
         h, start = self.times[i] - self.times[i - 1], self.progress[i - 1]
         step, v0, v1 = self.progress[i] - start, h * self._slopes[i - 1], h * self._slopes[i]
         u = (t - self.times[i - 1]) / h

@@ -40,13 +40,10 @@ STRAIGHT_NODES = 81  # of a joint move, evenly along it
 SPLINE_DEGREE = 6  # in time, of a cubic at an even acceleration
 
 
-NoTimeLaw = Finding
-
-
 class TimingError(Er3aError):
     """No time law under the limits; ``finding`` says why."""
 
-    def __init__(self, finding: NoTimeLaw):
+    def __init__(self, finding: Finding):
         self.finding = finding
         super().__init__(f"no time law ({finding.code})")
 

@@ -55,9 +55,6 @@ MAX_PAIRS = 4  # of start and end, the nearest: each failed search takes all its
 LIKELY = (0.5, 0.25, 0.75)  # shares of a move at which it is tried first
 
 
-NoWayAround = Finding
-
-
 @dataclass(frozen=True, eq=False)
 class WayAround:
     """A motion that keeps clear.
@@ -91,7 +88,7 @@ class PlanningTask:
     rounds: int = ROUNDS
 
 
-def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | NoWayAround:
+def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | Finding:
     """Find a motion between two joint vectors that is proven clear.
 
     Parameters
@@ -191,7 +188,7 @@ class PlannedMove:
         return self.curve
 
 
-def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | NoWayAround:
+def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | Finding:
     """The motion between the nearest start and end for which one is found.
 
     Parameters
@@ -207,7 +204,7 @@ def way_between(task: PlanningTask, starts: Reals, ends: Reals) -> WayAround | N
     )
     if not len(starts) or not len(ends):
         return fact("no_end", end="end" if len(starts) else "start", why=fact("none_within_limits"))
-    found: WayAround | NoWayAround = fact("none_found", rounds=0)
+    found: WayAround | Finding = fact("none_found", rounds=0)
     for _, i, j in pairs[:MAX_PAIRS]:
         found = way_around(task, starts[i], ends[j])
         if isinstance(found, WayAround):

@@ -18,6 +18,7 @@ from typing import ClassVar, Literal, cast
 import numpy as np
 import scipy
 
+from er3a.geometry.transforms import skew_part
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
@@ -770,7 +771,7 @@ def rotation_vectors_deg(R: Reals) -> Reals:
     The axis is the skew part of R, whose length is twice the sine. Near half a turn that vanishes, and SciPy takes
     over.
     """
-    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1)
+    skew = skew_part(R)
     cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0  # this and the sine twice
     sine = np.sqrt(_dot(skew, skew))
     per_sine = np.arctan2(sine, cosine) / np.where(sine > 0, sine, 1.0)

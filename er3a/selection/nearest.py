@@ -21,19 +21,9 @@ from er3a.robots.robot import Robot
 
 SAME_MOVE = 1e-9  # rad; moves closer than this differ by rounding only
 
-Refusal = Finding
-
-
-NextBest = Finding
-
-
-MaxMove = Finding
-
-
 WhyFirst = Finding
 """``only_admissible``, ``moves_less`` (largest joint move), ``moves_less_together`` (the root of all moves' squares) or
 ``lower_branch_number``."""
-WhyNone = Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +42,7 @@ class Choice:
     order: Integers
     max_joint_move: Reals
     distance: Reals
-    reason: WhyFirst | WhyNone
+    reason: WhyFirst | Finding
 
     @property
     def chosen(self) -> int | None:
@@ -61,7 +51,7 @@ class Choice:
 
 
 def nearest(
-    robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Refusal | None] | None = None
+    robot: Robot, solutions: Solutions, q_ref: Reals, refused: Sequence[Finding | None] | None = None
 ) -> Choice:
     """Order the admissible solutions of one pose by their distance from a reference, as the module says.
 
@@ -88,7 +78,7 @@ def nearest(
             alike += 1
         best = left.index(_first(left[:alike], distance, solutions.branch))
         ordered.append(left.pop(best))
-    why: WhyFirst | WhyNone
+    why: WhyFirst | Finding
     if ordered:
         why = _why_first(robot, solutions, q_ref, ordered, moves, distance)
     else:
@@ -110,7 +100,7 @@ def _why_first(
     joint = int(moves[chosen].argmax())
     most = moves[chosen, joint]
     value, slides = joint_shown(robot, joint, float(np.abs(solutions.q[chosen, joint] - q_ref[joint])))
-    move: MaxMove = fact("greatest_move", joint=joint + 1, move=turned_or_moved(value, slides))
+    move: Finding = fact("greatest_move", joint=joint + 1, move=turned_or_moved(value, slides))
     if len(order) == 1:
         return fact("only_admissible", move=move)
     second = order[1]
@@ -129,7 +119,7 @@ def _compared(robot: Robot, less: float) -> Amount:
     return Amount(float(np.degrees(less)), unit_compared(robot))
 
 
-def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
+def _difference(solutions: Solutions, chosen: int, other: int) -> Finding:
     """How another solution differs from the one chosen: its branch, its turns, or its free joint."""
     if solutions.branch[other] != solutions.branch[chosen]:
         return fact("other_branch", branch=int(solutions.branch[other]), label=solutions.label[other])
@@ -138,7 +128,7 @@ def _difference(solutions: Solutions, chosen: int, other: int) -> NextBest:
     return fact("other_turns", joints=turned)
 
 
-def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Refusal | None]) -> WhyNone:
+def why_none(robot: Robot, solutions: Solutions, refused: Sequence[Finding | None]) -> Finding:
     """Why no solution of a pose is taken, where each is refused.
 
     Parameters

@@ -34,7 +34,7 @@ from er3a.kinematics.solutions import Solutions
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.robots.joint_limits import comparable, joint_columns, limit_margin, shown, unit_compared
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import Refusal, WhyNone, nearest, why_none
+from er3a.selection.nearest import nearest, why_none
 from er3a.selection.rule_names import RuleName
 
 
@@ -249,8 +249,8 @@ class SolutionRanking(ByValue, Displayed):
     measured: Mapping[RuleName, Reals]
     units: Mapping[RuleName, str]
     cost: Reals
-    reason: tuple[Finding | Refusal, ...]
-    chosen_reason: Finding | WhyNone
+    reason: tuple[Finding, ...]
+    chosen_reason: Finding
 
     @property
     def chosen(self) -> int | None:
@@ -319,7 +319,7 @@ def select(
         for row in range(len(solutions.q))
     ]
     reason = tuple(why or fact("placed", place=place[row], measures=measures[row]) for row, why in enumerate(refused))
-    chosen_reason: Finding | WhyNone
+    chosen_reason: Finding
     if len(order):
         chosen_reason = fact(
             "best_by_rules", measures=measures[order[0]], next_best=measures[order[1]] if len(order) > 1 else ()
@@ -329,7 +329,7 @@ def select(
     return SolutionRanking(order, measured, units, cost, reason, chosen_reason)
 
 
-def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Refusal | None, ...]:
+def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[Finding | None, ...]:
     """Why each solution of a pose is refused: limits that it leaves, or bodies that overlap.
 
     Parameters
@@ -344,7 +344,7 @@ def refusals(robot: Robot, solutions: Solutions, scene: Scene | None) -> tuple[R
     return refusals_of(bodies_of(robot, scene), solutions)
 
 
-def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, ...]:
+def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Finding | None, ...]:
     """Why each solution of a pose is refused, with the bodies already made; see :func:`refusals`.
 
     Parameters
@@ -356,7 +356,7 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Refusal | None, .
     -------
     refused : N reasons, None for rows that may be taken; an overlap is the deepest pair's, in mm
     """
-    refused: list[Refusal | None] = list(solutions.reason)
+    refused: list[Finding | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
     distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
     overlaps: dict[tuple[int, float], Finding] = {}  # turns share theirs

@@ -19,7 +19,7 @@ import numpy as np
 from er3a.collision.along import RateBounds, clearance_along
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
-from er3a.finding import fact
+from er3a.finding import Finding, fact
 from er3a.kinematics.wrist_partitioned import parallel_axes_arm, wrist_partition_missing
 from er3a.numerics.arrays import Reals
 from er3a.planning.follow import follow
@@ -27,7 +27,7 @@ from er3a.planning.motion_faults import limit_intervals, rate_intervals
 from er3a.planning.moves import JointMove, line
 from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import follow_as_curve, open_stretches
-from er3a.planning.way_around import NoWayAround, PlanningTask, WayAround, way_around
+from er3a.planning.way_around import PlanningTask, WayAround, way_around
 from er3a.robots.joint_limits import limits_exceeded, within
 from er3a.robots.robot import Robot
 
@@ -98,7 +98,7 @@ def _joint_leg(part: Part, start: Reals, end: Reals, limits: JointLimits) -> Gra
     return GraspLeg(part, move.duration, lambda t: move.joints(t)[0], motion.rate_bounds, end)
 
 
-def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tuple[GraspLeg, ...] | NoWayAround:
+def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tuple[GraspLeg, ...] | Finding:
     """Legs from joints to joints on which nothing touches.
 
     Where the straight move comes too near to something, a way around is tried; of both the one is taken that keeps

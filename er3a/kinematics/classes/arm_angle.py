@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.transforms import frame_along
-from er3a.geometry.vectors import TURN, Vector, dot
+from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.fast_math import arctan2, cos_sin
@@ -144,55 +144,56 @@ def rows_of_vectors(array: Reals) -> Rows:
     return vector_of(array[0]), vector_of(array[1]), vector_of(array[2])
 
 
+BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
+
+
 @inner_kernel
-def three_angles(
-    k: SphericalConstants, zx: float, zy: float, zz: float, xx: float, xy: float, xz: float, sign: float
-) -> tuple[float, float, float, float, float]:
-    """Angles of three joints through one point, by one of the two roots of joint 2. Kernel.
+def spherical_triangles(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
+    """Geometric angles of three joints through one point for a block of turns, by one of two roots of joint 2. Kernel.
 
     Parameters
     ----------
     k : of :func:`spherical_constants`
-    zx, zy, zz : where axis 3 points, the last column of the turn
-    xx, xy, xz : the turn's first column
+    w : rows of a block; three from ``row`` on say where axis 3 points, the last column of the turn, three more its
+        first column
     sign : +1 or -1, which root
-
-    Returns
-    -------
-    x, y, z : rad, joint angles
-    valid : 1 if there is such a root, else 0
-    smallest : the minimum of the sine of axis 3 from axis 1 and the root's distances from where both roots meet;
-        negative if axis 3 can't point there
+    out : seven rows of a block, filled: cosine and sine of the first angle; the second and the third, rad; how far both
+        roots are from meeting: squares of sine and cosine of half the second angle, but for a factor, and the sine of
+        axis 3 from axis 1, negative if axis 3 can't point there
     """
     sum_s, sum_c = k.half_sum
     less_s, less_c = k.half_difference
-    tilt = np.sqrt(zx * zx + zy * zy)
-    total = np.sqrt(tilt * tilt + zz * zz) + abs(zz)
-    cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
-    per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
-    upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
-    lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
-    smallest = min(min(upper, lower), tilt)
-    upper, lower = max(upper, 0.0), max(lower, 0.0)
-    a, d = np.sqrt(upper), np.sqrt(lower)
-    per = 1.0 / (upper + lower)
-    middle = 2.0 * sign * arctan2(a, d)
-    cos_2, sin_2 = (lower - upper) * per, 2.0 * sign * a * d * per
-    px, py = -sin_2 * k.sin_23, k.cos_12 * cos_2 * k.sin_23 - k.sin_12 * k.cos_23
-    c, s = zx * px + zy * py, zy * px - zx * py
-    size = np.sqrt(c * c + s * s)
-    lost = size < 1e-30
-    per = 1.0 / (1.0 if lost else size)
-    c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
-    ux, uy = xx * c + xy * s, xy * c - xx * s
-    uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
-    ux, uy = ux * cos_2 + uy * sin_2, uy * cos_2 - ux * sin_2
-    last = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
-    return arctan2(s, c) - k.zero_1, middle - k.zero_2, last, 1.0 if smallest > -1e-12 else 0.0, smallest
+    z, x = row * BLOCK, (row + 3) * BLOCK
+    for i in range(BLOCK):
+        zx, zy, zz = w[z + i], w[z + BLOCK + i], w[z + 2 * BLOCK + i]
+        xx, xy, xz = w[x + i], w[x + BLOCK + i], w[x + 2 * BLOCK + i]
+        tilt = np.sqrt(zx * zx + zy * zy)
+        total = np.sqrt(tilt * tilt + zz * zz) + abs(zz)
+        cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
+        per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
+        upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
+        lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
+        out[4 * BLOCK + i], out[5 * BLOCK + i], out[6 * BLOCK + i] = upper, lower, tilt
+        upper, lower = max(upper, 0.0), max(lower, 0.0)
+        a, d = np.sqrt(upper), np.sqrt(lower)
+        per = 1.0 / (upper + lower)
+        out[2 * BLOCK + i] = 2.0 * sign * arctan2(a, d)
+        cos_2, sin_2 = (lower - upper) * per, 2.0 * sign * a * d * per
+        # axis 3 as seen with the first angle at 0, then that angle by one turn
+        px, py = -sin_2 * k.sin_23, k.cos_12 * cos_2 * k.sin_23 - k.sin_12 * k.cos_23
+        c, s = zx * px + zy * py, zy * px - zx * py
+        size = np.sqrt(c * c + s * s)
+        lost = size < 1e-30
+        per = 1.0 / (1.0 if lost else size)
+        c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
+        ux, uy = xx * c + xy * s, xy * c - xx * s
+        uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
+        ux, uy = ux * cos_2 + uy * sin_2, uy * cos_2 - ux * sin_2
+        out[i], out[BLOCK + i] = c, s
+        out[3 * BLOCK + i] = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
 
 
 SLOTS = 8
-BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 MEETS_M = 1e-9  # by which axes may miss a common point
 NEAR = 1e-9  # m, or about the square of half an angle: branches so near are taken to meet
 ALONG = 1e-6  # sine of the angle between S W and axis 1, below which rounding would move the arm angle by 1e-10 rad
@@ -370,7 +371,7 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
     q : (N, 8, 7), filled, rad, NaN where a slot has no solution
     singular : (N,), filled
     """
-    w, out = np.empty(44 * BLOCK), np.empty(8 * BLOCK)
+    w, out = np.empty(44 * BLOCK), np.empty(7 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
         size = min(BLOCK, T.shape[0] - start)
         _turned_about_line(k, T, psi, start, size, w)
@@ -379,8 +380,9 @@ def solve_arm_angle_blocks(k: ArmAngleConstants, T: Reals, psi: Reals, q: Reals,
             for root in range(4):
                 first = root < 2
                 sign = 1.0 - 2.0 * (root % 2)
-                _three(k.first_three if first else k.last_three, w, 24 if first else 30, sign, out)
+                three_angles(k.first_three if first else k.last_three, w, 24 if first else 30, sign, out)
                 for i in range(size):
+                    w[38 * BLOCK + i] = 1.0 if abs(out[6 * BLOCK + i]) < NEAR else w[38 * BLOCK + i]
                     for other in range(2):
                         slot = 4 * elbow + (2 * (root % 2) + other if first else 2 * other + root % 2)
                         base = 0 if first else 4
@@ -408,9 +410,8 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
     shortest = ONE_POINT * (k.upper_arm + k.lower_arm)
     for i in range(BLOCK):
         m = start + min(i, size - 1)
-        vx = T[m, 0, 0] * t[0] + T[m, 0, 1] * t[1] + T[m, 0, 2] * t[2] + T[m, 0, 3] - u[0]
-        vy = T[m, 1, 0] * t[0] + T[m, 1, 1] * t[1] + T[m, 1, 2] * t[2] + T[m, 1, 3] - u[1]
-        vz = T[m, 2, 0] * t[0] + T[m, 2, 1] * t[1] + T[m, 2, 2] * t[2] + T[m, 2, 3] - u[2]
+        vx, vy, vz = in_frame_of(T[m], t)
+        vx, vy, vz = vx + T[m, 0, 3] - u[0], vy + T[m, 1, 3] - u[1], vz + T[m, 2, 3] - u[2]
         distance = np.sqrt(vx * vx + vy * vy + vz * vz)
         one_point = distance < shortest
         per = 1.0 / (1.0 if one_point else distance)
@@ -434,16 +435,10 @@ def _turned_about_line(k: ArmAngleConstants, T: Reals, psi: Reals, start: int, s
             w[row * BLOCK + i] = dot(k.base[row], (nx, ny, nz))
             w[(3 + row) * BLOCK + i] = dot(k.base[row], (ex, ey, ez))
             w[(6 + row) * BLOCK + i] = dot(k.base[row], (fx, fy, fz))
-        a, b = k.axis_7_in_tool, k.beside_7_in_tool
-        zx = T[m, 0, 0] * a[0] + T[m, 0, 1] * a[1] + T[m, 0, 2] * a[2]
-        zy = T[m, 1, 0] * a[0] + T[m, 1, 1] * a[1] + T[m, 1, 2] * a[2]
-        zz = T[m, 2, 0] * a[0] + T[m, 2, 1] * a[1] + T[m, 2, 2] * a[2]
-        xx = T[m, 0, 0] * b[0] + T[m, 0, 1] * b[1] + T[m, 0, 2] * b[2]
-        xy = T[m, 1, 0] * b[0] + T[m, 1, 1] * b[1] + T[m, 1, 2] * b[2]
-        xz = T[m, 2, 0] * b[0] + T[m, 2, 1] * b[1] + T[m, 2, 2] * b[2]
-        w[9 * BLOCK + i], w[12 * BLOCK + i] = nx * zx + ny * zy + nz * zz, nx * xx + ny * xy + nz * xz
-        w[10 * BLOCK + i], w[13 * BLOCK + i] = ex * zx + ey * zy + ez * zz, ex * xx + ey * xy + ez * xz
-        w[11 * BLOCK + i], w[14 * BLOCK + i] = fx * zx + fy * zy + fz * zz, fx * xx + fy * xy + fz * xz
+        z, x = in_frame_of(T[m], k.axis_7_in_tool), in_frame_of(T[m], k.beside_7_in_tool)
+        w[9 * BLOCK + i], w[12 * BLOCK + i] = dot((nx, ny, nz), z), dot((nx, ny, nz), x)
+        w[10 * BLOCK + i], w[13 * BLOCK + i] = dot((ex, ey, ez), z), dot((ex, ey, ez), x)
+        w[11 * BLOCK + i], w[14 * BLOCK + i] = dot((fx, fy, fz), z), dot((fx, fy, fz), x)
         w[37 * BLOCK + i] = distance
         w[38 * BLOCK + i] = 1.0 if distance < NEAR else 0.0
 
@@ -501,15 +496,21 @@ def _elbow(k: ArmAngleConstants, w: Reals, sign: float) -> None:
 
 
 @inner_kernel
-def _three(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
-    """Three joints of a block by one root into ``out``, rad in (-pi, pi], NaN without a root; marks singular poses."""
+def three_angles(k: SphericalConstants, w: Reals, row: int, sign: float, out: Reals) -> None:
+    """Three joints through one point for a block of turns, by one root. Kernel.
+
+    Parameters
+    ----------
+    k, w, row, sign : as of :func:`spherical_triangles`
+    out : seven rows of a block; the first three are filled with angles, rad in (-pi, pi], NaN without a root; the
+        seventh with the least of the sine of axis 3 from axis 1 and the root's distances from where both roots meet
+    """
+    spherical_triangles(k, w, row, sign, out)
     for i in range(BLOCK):
-        z, x = row * BLOCK + i, (row + 3) * BLOCK + i
-        a, b, c, valid, smallest = three_angles(
-            k, w[z], w[z + BLOCK], w[z + 2 * BLOCK], w[x], w[x + BLOCK], w[x + 2 * BLOCK], sign
-        )
-        w[38 * BLOCK + i] = 1.0 if abs(smallest) < NEAR else w[38 * BLOCK + i]
-        one = 1.0 if valid > 0.0 else np.nan
+        smallest = min(min(out[4 * BLOCK + i], out[5 * BLOCK + i]), out[6 * BLOCK + i])
+        one = 1.0 if smallest > -1e-12 else np.nan
+        a, b = arctan2(out[BLOCK + i], out[i]) - k.zero_1, out[2 * BLOCK + i] - k.zero_2
         out[i] = (a - TURN * np.ceil(a * (1.0 / TURN) - 0.5)) * one
         out[BLOCK + i] = (b - TURN * np.ceil(b * (1.0 / TURN) - 0.5)) * one
-        out[2 * BLOCK + i] = c * one
+        out[2 * BLOCK + i] = out[3 * BLOCK + i] * one
+        out[6 * BLOCK + i] = smallest

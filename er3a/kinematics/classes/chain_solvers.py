@@ -31,7 +31,7 @@ PREFERENCE = tuple(class_solvers.ARM_CLASSES)
 
 
 @dataclass(frozen=True, eq=False)
-class LockedJoint(class_solvers.WithoutParameters):
+class LockedJoint(class_solvers.ChainSolver):
     """More than six joints, one of which is held at a value; ``rest`` solves the others. Self-motions are collected
     over the value."""
 
@@ -111,7 +111,7 @@ class LockedJoint(class_solvers.WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class Unsolved(class_solvers.WithoutParameters):
+class Unsolved(class_solvers.ChainSolver):
     """A chain for which nothing here knows all solutions."""
 
     joints: int

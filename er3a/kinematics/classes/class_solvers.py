@@ -6,14 +6,15 @@ coupling are the caller's.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from er3a.geometry.vectors import TURN, Vector
+from er3a.geometry.vectors import Vector, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
 from er3a.kinematics.classes.four_bar import four_bars, solve_three_parallel
@@ -133,27 +134,26 @@ class Redundancy:
     code: Literal["locked_joint", "arm_angle"]
 
 
-class ChainSolver(Protocol):
-    """What every class offers.
+class ChainSolver(ABC):
+    """What every class offers: by default no parameters, no seeds and no names.
 
     ``rows`` takes poses (N, 4, 4) in m and values (N, k) of the k parameters; it gives joint values (N, slots, n), NaN
     in empty slots, and how sure it is (N,): CERTAIN, UNCERTAIN, or CONTINUUM where branches meet or a joint is free.
     ``names`` are the slots' names, with joint values (n,) of the manufacturer's zero pose; none where no sign factors
     separate the solutions.
+
+    Attributes
+    ----------
+    code : class of the chain
+    slots : rows that a pose has place for
+    parameters : what a pose leaves open, k of them; empty for up to six joints
     """
 
-    @property
-    def code(self) -> ArmClassCode:
-        """The class of the chain."""
+    code: ArmClassCode
+    slots: int
+    parameters: tuple[Redundancy, ...] = ()
 
-    @property
-    def slots(self) -> int:
-        """Rows that a pose has place for."""
-
-    @property
-    def parameters(self) -> tuple[Redundancy, ...]:
-        """What a pose leaves open, k of them; empty for up to six joints."""
-
+    @abstractmethod
     def rows(self, T: Reals, values: Reals) -> tuple[Reals, Integers]:
         """All rows of poses.
 
@@ -167,48 +167,6 @@ class ChainSolver(Protocol):
         q : (N, slots, n), rad or m, NaN in empty slots
         certainty : (N,), CERTAIN, UNCERTAIN or CONTINUUM
         """
-
-    def values_of(self, x: Reals) -> Reals:
-        """Values of the parameters at joint values.
-
-        Parameters
-        ----------
-        x : (..., n), rad or m
-
-        Returns
-        -------
-        values : (..., k), rad or m
-        """
-
-    def seeds(self, T: Reals) -> list[Reals]:
-        """Members of continua of one pose that the class knows without a search.
-
-        Parameters
-        ----------
-        T : (4, 4), m
-
-        Returns
-        -------
-        seeds : arrays (j, n), rad or m
-        """
-
-    def names(self, x: Reals) -> tuple[SlotName, ...]:
-        """Names of the slots.
-
-        Parameters
-        ----------
-        x : (n,), rad or m, the manufacturer's zero pose
-
-        Returns
-        -------
-        names : in the order of the slots; empty where no sign factors separate the solutions
-        """
-
-
-class WithoutParameters:
-    """A class without parameters, or what one with parameters has of it: no seeds and no names."""
-
-    parameters: tuple[Redundancy, ...] = ()
 
     def values_of(self, x: Reals) -> Reals:
         """Values of the parameters at joint values: none.
@@ -251,7 +209,7 @@ class WithoutParameters:
 
 
 @dataclass(frozen=True, eq=False)
-class SphericalWristSolver(WithoutParameters):
+class SphericalWristSolver(ChainSolver):
     """Axes 2 and 3 parallel, and a spherical wrist."""
 
     links: Reals
@@ -318,7 +276,7 @@ class SphericalWristSolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ParallelAxes(WithoutParameters):
+class ParallelAxes(ChainSolver):
     """Axes 2, 3 and 4 parallel, 5 and 6 meet."""
 
     arm: ThreeParallel
@@ -400,7 +358,7 @@ BranchSolver = SphericalWristSolver | ParallelAxes
 
 
 @dataclass(frozen=True, eq=False)
-class EliminationSolver(WithoutParameters):
+class EliminationSolver(ChainSolver):
     """Any six joints of which at most two slide."""
 
     solve: Callable[[Reals], RowsFound]
@@ -425,7 +383,7 @@ class EliminationSolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ArmAngle(WithoutParameters):
+class ArmAngle(ChainSolver):
     """Seven joints with a spherical shoulder and wrist; self-motions are collected over the arm angle."""
 
     arm: ArmAngleArm
@@ -479,7 +437,7 @@ class ArmAngle(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class GantrySolver(WithoutParameters):
+class GantrySolver(ChainSolver):
     """Six joints, three of them prismatic."""
 
     arm: Gantry
@@ -517,7 +475,7 @@ class GantrySolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class ScaraSolver(WithoutParameters):
+class ScaraSolver(ChainSolver):
     """Four joints of one direction, one of them prismatic."""
 
     arm: Scara
@@ -538,7 +496,7 @@ class ScaraSolver(WithoutParameters):
         certainty : (N,), CONTINUUM where both meet, else CERTAIN
         """
         q, second = solve_scara(self.arm, T)[0], self.arm.turning[1]
-        meet = np.abs(_shortest(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
+        meet = np.abs(wrap_to_pi(q[:, 0, second] - q[:, 1, second])) < DOUBLE_ROOT
         return q, np.where(meet, CONTINUUM, CERTAIN)
 
     def names(self, x: Reals) -> tuple[SlotName, ...]:
@@ -556,7 +514,7 @@ class ScaraSolver(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class PaddedChain(WithoutParameters):
+class PaddedChain(ChainSolver):
     """Fewer than six joints, solved with joints that the chain lacks at these places (from 0, rising)."""
 
     rest: ChainSolver
@@ -582,12 +540,14 @@ class PaddedChain(WithoutParameters):
         """
         x, certainty = self.rest.rows(T, values)
         if self.code == "planar_wrist":  # what these joints would have to turn, the tool can't
-            x[np.abs(_shortest(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
+            x[np.abs(wrap_to_pi(x[:, :, list(self.lacking)])).max(axis=2) > LEFT_OVER] = np.nan
         x = np.delete(x, self.lacking, axis=2)
         for first in range(x.shape[1]):  # rows that differ in the joints that are not there
-            same = np.abs(_shortest(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
+            same = np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < 1e-9
             x[:, first + 1 :][same] = np.nan
-            meet = np.abs(_shortest(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            meet = (
+                np.abs(wrap_to_pi(x[:, first + 1 :] - x[:, first : first + 1])).max(axis=2, initial=0.0) < DOUBLE_ROOT
+            )
             certainty = np.where(meet.any(axis=1), CONTINUUM, certainty)
         return x, certainty
 
@@ -610,7 +570,7 @@ class PaddedChain(WithoutParameters):
 
 
 @dataclass(frozen=True, eq=False)
-class LinkedRows(WithoutParameters):
+class LinkedRows(ChainSolver):
     """A chain whose rows a linkage moves together (a levelling one, say): those of its solutions that keep to it.
 
     ``apart`` (m, m) takes rows, less ``start`` (m,), to how far they are from what the linkage makes.
@@ -638,7 +598,7 @@ class LinkedRows(WithoutParameters):
         """
         x, certainty = self.chain.rows(T, values)
         off = (x - self.start) @ self.apart.T
-        off = np.abs(np.where(self.sliding, off, _shortest(off))).max(axis=2)
+        off = np.abs(np.where(self.sliding, off, wrap_to_pi(off))).max(axis=2)
         x[off > LEFT_OVER] = np.nan
         return x, certainty
 
@@ -687,16 +647,11 @@ def _three_signs(w1: Reals, w2: Reals, zero_side: float) -> tuple[SlotName, ...]
     return tuple(names)
 
 
-def _shortest(x: Reals) -> Reals:
-    """Angles in [-pi, pi], whole turns taken off."""
-    return np.asarray(x - TURN * np.round(x / TURN))
-
-
 def _branches_meet(q: Reals, pairs: tuple[tuple[int, int], ...]) -> Flags:
     """Whether two rows that differ in one root (step in slots, joint that shows it) are within a small angle, (N,)."""
     meet = np.zeros(len(q), dtype=bool)
     for step, joint in pairs:
         for slot in range(8):
             if slot // step % 2 == 0:
-                meet |= np.abs(_shortest(q[:, slot, joint] - q[:, slot + step, joint])) < NEAR_SINGULAR
+                meet |= np.abs(wrap_to_pi(q[:, slot, joint] - q[:, slot + step, joint])) < NEAR_SINGULAR
     return meet

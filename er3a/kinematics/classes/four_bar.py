@@ -118,15 +118,19 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
     T = np.ascontiguousarray(T, dtype=float)
     q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
     solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
-    left = np.flatnonzero(marked)
-    if left.size:
-        rows = np.empty((left.size, SLOTS, 6))
-        solve_parallel_blocks(arm.constants, T[left], arm.constants.near_m, rows, np.empty(left.size, dtype=bool))
-        polish_rows(arm.links, size_of(arm.links), T[left], rows, True)
-        for row, n in zip(rows, left):
-            _put_members(row, four_bars(arm, T[n]))
-        q[left] = rows
+    if len(left := np.flatnonzero(marked)):
+        q[left] = _careful_rows(arm, T[left], True)
+        for n in left:
+            _put_members(q[n], four_bars(arm, T[n]))
     return q, marked
+
+
+def _careful_rows(arm: ThreeParallel, T: Reals, once: bool) -> Reals:
+    """Rows (N, 8, 6) of poses near singular ones, polished as :func:`polish_rows` does."""
+    rows = np.empty((len(T), SLOTS, 6))
+    solve_parallel_blocks(arm.constants, T, arm.constants.near_m, rows, np.empty(len(T), dtype=bool))
+    polish_rows(arm.links, size_of(arm.links), T, rows, once)
+    return rows
 
 
 def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Reals, Reals]:
@@ -148,13 +152,9 @@ def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Re
     q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
     solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
     for n in np.flatnonzero(marked):
-        found = four_bars(arm, T[n])
-        rows = np.empty((1, SLOTS, 6))
-        solve_parallel_blocks(arm.constants, T[n : n + 1], arm.constants.near_m, rows, np.empty(1, dtype=bool))
-        polish_rows(arm.links, size_of(arm.links), T[n : n + 1], rows, False)
-        q[n] = rows[0]
-        for family in found:
-            phi = turn_of_three(arm, x_ref[n])
+        q[n] = _careful_rows(arm, T[n : n + 1], False)[0]
+        phi = turn_of_three(arm, x_ref[n])
+        for family in four_bars(arm, T[n]):
             for elbow in (0, 1):
                 member = family.members(np.array(family.nearest(float(phi))), elbow)
                 for shoulder in family.shoulders:
@@ -181,8 +181,7 @@ def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
     """By how much (N, 8), m, slots without solution are out of reach."""
     k, gap = arm.constants, np.zeros(q.shape[:2])
     for n in np.flatnonzero(np.isnan(q[..., 0]).any(axis=1)):
-        p = (T[n, :3, :3] @ np.array(k.wrist_in_tool) + T[n, :3, 3] - np.array(k.place)) @ np.array(k.turn).T
-        across, wanted = float(np.hypot(p[0], p[1])), (k.height - k.cos_lean * p[2]) / k.sin_lean
+        p, across, wanted = _wrist_in_frame(k, T[n])
         root = np.sqrt(max(across**2 - wanted**2, 0.0))
         for shoulder, v in ((0, -root), (1, root)):
             W = np.array([k.cos_lean * wanted - k.sin_lean * p[2], v])
@@ -193,6 +192,12 @@ def _gaps(arm: ThreeParallel, T: Reals, q: Reals) -> Reals:
             part = slice(4 * shoulder, 4 * shoulder + 4)
             gap[n, part] = np.where(np.isnan(q[n, part, 0]), most, 0.0)
     return gap
+
+
+def _wrist_in_frame(k: ParallelConstants, T: Reals) -> tuple[Reals, float, float]:
+    """W of a pose (4, 4) in the arm's frame (3,), its distance from axis 1, and what the root of joint 1 takes (m)."""
+    p = (T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3] - np.array(k.place)) @ np.array(k.turn).T
+    return p, float(np.hypot(p[0], p[1])), (k.height - k.cos_lean * p[2]) / k.sin_lean
 
 
 def _put_members(rows: Reals, families: tuple[FourBar, ...]) -> None:
@@ -219,10 +224,9 @@ def four_bars(arm: ThreeParallel, T: Reals) -> tuple[FourBar, ...]:
     families : empty where axis 6 is not parallel to axes 2, 3 and 4, or joint 1 has no root
     """
     k = arm.constants
-    p = (T[:3, :3] @ np.array(k.wrist_in_tool) + T[:3, 3] - np.array(k.place)) @ np.array(k.turn).T
+    p, across, wanted = _wrist_in_frame(k, T)
     axis_6 = np.array(k.turn) @ T[:3, :3] @ np.array(k.axis_6_in_tool)
     beside = np.array(k.turn) @ T[:3, :3] @ np.array(k.beside_6_in_tool)
-    across, wanted = float(np.hypot(p[0], p[1])), (k.height - k.cos_lean * p[2]) / k.sin_lean
     if abs(wanted) > across + k.near_m:
         return ()
     spread = np.arctan2(np.sqrt(max((across - wanted) * (across + wanted), 0.0)), wanted)

@@ -25,12 +25,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.vectors import TURN, Vector
+from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import (
+    BLOCK,
     Rows,
     SphericalConstants,
     spherical_constants,
+    spherical_triangles,
     vector_of,
 )
 from er3a.kinematics.classes.polish import newton
@@ -39,7 +41,6 @@ from er3a.numerics.fast_math import arctan2
 from er3a.numerics.jit import inner_kernel, kernel
 
 SLOTS = 8
-BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
 NEAR = 1e-6  # rad or parts of the arm's size from where branches meet: left to the careful solver
 PARALLEL = 1e-9  # rad
 MEETS_M = 1e-9  # by which axes may miss a common point, and lengths that count as none
@@ -184,7 +185,7 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
         for shoulder in range(2):
             _first_joint(k, pose, side, 1.0 - 2.0 * shoulder, slack)
             for wrist in range(2):
-                _wrist(k.wrist, side, 1.0 - 2.0 * wrist, turn)
+                spherical_triangles(k.wrist, side, 5, 1.0 - 2.0 * wrist, turn)
                 _elbows(k, pose, side, turn, slack, out)
                 slot = 4 * shoulder + wrist
                 for i in range(size):
@@ -200,18 +201,20 @@ def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Rea
     """W, axis 6 and the vector across it in the arm's frame."""
     for i in range(BLOCK):
         n = start + min(i, size - 1)
+        z, x, wrist = (
+            in_frame_of(T[n], k.axis_6_in_tool),
+            in_frame_of(T[n], k.beside_6_in_tool),
+            in_frame_of(T[n], k.wrist_in_tool),
+        )
+        p = (
+            wrist[0] + T[n, 0, 3] - k.place[0],
+            wrist[1] + T[n, 1, 3] - k.place[1],
+            wrist[2] + T[n, 2, 3] - k.place[2],
+        )
         for row in range(3):
-            r0, r1, r2 = k.turn[row]
-            p, z, x = 0.0, 0.0, 0.0
-            for axis, r in ((0, r0), (1, r1), (2, r2)):
-                a, b, c = T[n, axis, 0], T[n, axis, 1], T[n, axis, 2]
-                u, v, e = k.wrist_in_tool, k.axis_6_in_tool, k.beside_6_in_tool
-                p += r * (a * u[0] + b * u[1] + c * u[2] + T[n, axis, 3] - k.place[axis])
-                z += r * (a * v[0] + b * v[1] + c * v[2])
-                x += r * (a * e[0] + b * e[1] + c * e[2])
-            pose[(_W + row) * BLOCK + i] = p
-            pose[(_Z6 + row) * BLOCK + i] = z
-            pose[(_X6 + row) * BLOCK + i] = x
+            pose[(_W + row) * BLOCK + i] = dot(k.turn[row], p)
+            pose[(_Z6 + row) * BLOCK + i] = dot(k.turn[row], z)
+            pose[(_X6 + row) * BLOCK + i] = dot(k.turn[row], x)
         pose[_MARK * BLOCK + i] = 0.0
 
 
@@ -240,46 +243,8 @@ def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, sl
 
 
 @inner_kernel
-def _wrist(k: SphericalConstants, side: Reals, sign: float, turn: Reals) -> None:
-    """Joints 5 and 6 by one root, as :func:`.arm_angle.three_angles` has them, written out so that lanes are vectors.
-
-    ``turn`` gets cosine and sine of phi, joint 5's geometric angle, joint 6, and how far both roots are from meeting:
-    squares of sine and cosine of half that angle, but for a factor, and the sine of axis 6 from w.
-    """
-    sum_s, sum_c = k.half_sum
-    less_s, less_c = k.half_difference
-    for i in range(BLOCK):
-        zx, zy, zz = side[5 * BLOCK + i], side[6 * BLOCK + i], side[7 * BLOCK + i]
-        xx, xy, xz = side[8 * BLOCK + i], side[9 * BLOCK + i], side[10 * BLOCK + i]
-        tilt = np.sqrt(zx * zx + zy * zy)
-        total = np.sqrt(tilt * tilt + zz * zz) + abs(zz)
-        cos_half, sin_half = tilt if zz < 0.0 else total, total if zz < 0.0 else tilt
-        per = 1.0 / (cos_half * cos_half + sin_half * sin_half)
-        upper = (cos_half * less_s + sin_half * less_c) * (sin_half * less_c - cos_half * less_s) * per
-        lower = (cos_half * sum_s + sin_half * sum_c) * (cos_half * sum_s - sin_half * sum_c) * per
-        turn[4 * BLOCK + i], turn[5 * BLOCK + i], turn[6 * BLOCK + i] = upper, lower, tilt
-        upper, lower = max(upper, 0.0), max(lower, 0.0)
-        a, d = np.sqrt(upper), np.sqrt(lower)
-        per = 1.0 / (upper + lower)
-        turn[2 * BLOCK + i] = 2.0 * sign * arctan2(a, d)
-        cos_5, sin_5 = (lower - upper) * per, 2.0 * sign * a * d * per
-        # axis 6 as seen with phi = 0, then phi by one angle
-        px, py = -sin_5 * k.sin_23, k.cos_12 * cos_5 * k.sin_23 - k.sin_12 * k.cos_23
-        c, s = zx * px + zy * py, zy * px - zx * py
-        size = np.sqrt(c * c + s * s)
-        lost = size < 1e-30
-        per = 1.0 / (1.0 if lost else size)
-        c, s = 1.0 if lost else c * per, 0.0 if lost else s * per
-        ux, uy = xx * c + xy * s, xy * c - xx * s
-        uy, uz = uy * k.cos_12 + xz * k.sin_12, xz * k.cos_12 - uy * k.sin_12
-        ux, uy = ux * cos_5 + uy * sin_5, uy * cos_5 - ux * sin_5
-        turn[i], turn[BLOCK + i] = c, s
-        turn[3 * BLOCK + i] = arctan2(uy * k.cos_23 - uz * k.sin_23, ux)
-
-
-@inner_kernel
 def _elbows(k: ParallelConstants, pose: Reals, side: Reals, turn: Reals, slack: float, out: Reals) -> None:
-    """All joints of both elbows, by what :func:`_wrist` has put into ``turn``."""
+    """All joints of both elbows, by what :func:`spherical_triangles` has put into ``turn``: phi, joint 5, joint 6."""
     per_turn, least = 1.0 / TURN, -slack * NEAR  # a miss of d beyond an edge is a value of order d^2 below 0
     reach, smallest = k.upper_arm + k.forearm, k.upper_arm - k.forearm
     edge = k.near_m * reach * NEAR

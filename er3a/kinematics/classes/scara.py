@@ -19,7 +19,7 @@ import numpy as np
 from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of
-from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants, three_angles
+from er3a.kinematics.classes.arm_angle import BLOCK, SphericalConstants, spherical_constants, three_angles
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.jit import kernel
 
@@ -202,11 +202,16 @@ def wrist_angles(k: SphericalConstants, turn: Reals, angles: Reals, smallest: Re
     angles : (N, 2, 3), filled, rad, NaN where there is no root
     smallest : (N,), filled with how far from singular, see :func:`.arm_angle.three_angles`
     """
-    for n in range(turn.shape[0]):
-        R = turn[n]
+    w, out = np.empty(6 * BLOCK), np.empty(7 * BLOCK)
+    for start in range(0, turn.shape[0], BLOCK):
+        size = min(BLOCK, turn.shape[0] - start)
+        for i in range(BLOCK):
+            for row in range(3):
+                R = turn[start + min(i, size - 1), row]
+                w[row * BLOCK + i], w[(3 + row) * BLOCK + i] = R[2], R[0]
         for slot in range(SLOTS):
-            sign = 1.0 - 2.0 * slot
-            a, b, c, valid, near = three_angles(k, R[0, 2], R[1, 2], R[2, 2], R[0, 0], R[1, 0], R[2, 0], sign)
-            one = 1.0 if valid > 0.0 else np.nan
-            angles[n, slot, 0], angles[n, slot, 1], angles[n, slot, 2] = a * one, b * one, c * one
-            smallest[n] = near
+            three_angles(k, w, 0, 1.0 - 2.0 * slot, out)
+            for i in range(size):
+                for joint in range(3):
+                    angles[start + i, slot, joint] = out[joint * BLOCK + i]
+                smallest[start + i] = out[6 * BLOCK + i]

@@ -179,6 +179,21 @@ def null_share(J: Reals, v: Reals, out: Reals) -> int:
 
 
 @inner_kernel
+def _add_step(J: Reals, e: Reals, least: float, most: float, x: Reals) -> None:
+    """Add the shortest step that takes an error (6,) off to joint values (n,): in directions whose singular value is
+    above ``least`` times the first, by at most ``most`` in each."""
+    U, s, Vt = np.linalg.svd(J, False)
+    for r in range(s.shape[0]):
+        if s[r] > least * s[0]:
+            along = 0.0
+            for i in range(6):
+                along += U[i, r] * e[i]
+            along = max(min(along / s[r], most), -most)
+            for k in range(x.shape[0]):
+                x[k] += along * Vt[r, k]
+
+
+@inner_kernel
 def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     """Bring joint values back onto the pose by minimum-norm Newton steps [1]_. Kernel.
 
@@ -204,15 +219,7 @@ def onto_curve(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
             for k in range(x.shape[0]):
                 x[k] += step[k]
             continue
-        U, s, Vt = np.linalg.svd(J, False)
-        for r in range(s.shape[0]):
-            if s[r] > TRUNCATED * s[0]:
-                along = 0.0
-                for i in range(6):
-                    along += U[i, r] * e[i]
-                along /= s[r]
-                for k in range(x.shape[0]):
-                    x[k] += along * Vt[r, k]
+        _add_step(J, e, TRUNCATED, np.inf, x)
     return error_and_jacobian(posed, x, e, J)
 
 
@@ -351,15 +358,7 @@ def _to_rounding(posed: Posed, x: Reals, e: Reals, J: Reals) -> float:
     for _ in range(40):
         if smallest < SOLVES_AS_ROOT * 1e-2:
             break
-        U, s, Vt = np.linalg.svd(J, False)
-        for r in range(s.shape[0]):
-            if s[r] > 1e-12 * s[0]:
-                along = 0.0
-                for i in range(6):
-                    along += U[i, r] * e[i]
-                along = max(min(along / s[r], 1e-2), -1e-2)
-                for k in range(x.shape[0]):
-                    x[k] += along * Vt[r, k]
+        _add_step(J, e, 1e-12, 1e-2, x)
         error = error_and_jacobian(posed, x, e, J)
         if error < smallest:
             best[:] = x

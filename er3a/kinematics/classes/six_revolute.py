@@ -166,7 +166,7 @@ def _by_readings(
     moving = np.zeros(len(T), dtype=bool)
     for reading in arm.readings:
         verdicts = np.empty(len(left), dtype=np.int64)
-        rows_by_reading(reading, arm.links, arm.size, T, left, memory, q, count, verdicts, moving)
+        rows_by_reading(reading, arm.links, T, left, memory, q, count, verdicts, moving)
         certainty[left] = np.minimum(certainty[left], verdicts)
         readings_used[left] += verdicts != CONTINUUM
         left = left[(verdicts != CERTAIN) & (readings_used[left] < MAX_READINGS)]
@@ -181,29 +181,30 @@ def all_rows(
     Parameters
     ----------
     arm : in units of its size
-    by_readings : takes arm, poses and memory, and fills rows (N, 16, 6), their number (N,) and certainty (N,), which
-        starts as CONTINUUM
+    by_readings : takes arm, poses in units of its size, and memory, and fills rows (N, 16, 6), their number (N,) and
+        certainty (N,), which starts as CONTINUUM
     T : (N, 4, 4), m
 
     Returns
     -------
     found : (N, 16, 6), rad or m, in order of the first joint
     """
-    T = np.ascontiguousarray(T, dtype=float)
+    T = np.array(T, dtype=float, order="C")
+    T[:, :3, 3] /= arm.size
     q, count = np.full((len(T), SLOTS, 6), np.nan), np.zeros(len(T), dtype=np.int64)
     certainty = np.full(len(T), CONTINUUM)
     memory = new_memory(arm.sliding)
     by_readings(arm, T, memory, q, count, certainty)
-    for numbers, beside in _beside(certainty, T, count, arm.size):
+    for numbers, beside in _beside(certainty, T, count):
         near = np.full((len(numbers), SLOTS, 6), np.nan), np.zeros(len(numbers), dtype=np.int64)
         by_readings(arm, beside, memory, *near, np.full(len(numbers), CONTINUUM))
-        followed_back(arm.links, arm.size, T, numbers, memory, *near, q, count)
+        followed_back(arm.links, T, numbers, memory, *near, q, count)
     in_order(q, count)
     q[:, :, arm.sliding] *= arm.size
     return RowsFound(q, count, certainty)
 
 
-def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iterator[tuple[Integers, Reals]]:
+def _beside(certainty: Integers, T: Reals, count: Integers) -> Iterator[tuple[Integers, Reals]]:
     """Numbers (k,) of poses in doubt, and poses (k, 4, 4) next to them, until nothing new is counted."""
     random, in_doubt = np.random.default_rng(3), np.flatnonzero(certainty == UNCERTAIN)
     idle = np.zeros(len(in_doubt), dtype=np.int64)
@@ -214,7 +215,7 @@ def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iter
         offset = random.normal(size=6) * ASIDE[k % len(ASIDE)]
         beside = np.eye(4)
         beside[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(offset[:3]).as_matrix()
-        beside[:3, 3] = offset[3:] * size
+        beside[:3, 3] = offset[3:]
         before = count[in_doubt]
         yield in_doubt, T[in_doubt] @ beside
         idle = np.where(count[in_doubt] > before, 0, idle + 1)
@@ -224,7 +225,6 @@ def _beside(certainty: Integers, T: Reals, count: Integers, size: float) -> Iter
 def rows_by_reading(
     reading: Reading,
     links: Reals,
-    size: float,
     T: Reals,
     numbers: Integers,
     m: LoopMemory,
@@ -239,32 +239,27 @@ def rows_by_reading(
     ----------
     reading : of the loop
     links : (7, 4, 4), in units of the chain's size
-    size : m
-    T : (N, 4, 4), m
+    T : (N, 4, 4), in these units
     numbers : (k,), of the poses to look at
     m : memory
     q, count : (N, 16, 6), rad, or parts of the size, and (N,); rows are added
     verdicts : (k,), filled with the reading's verdict
     moving : (N,), set where some row may move with the tool at rest
     """
-    pose, rest, pose_link = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
+    rest, pose_link = np.empty((4, 4)), np.empty((4, 4))
     for i in range(numbers.shape[0]):
         n = numbers[i]
-        pose[:, :] = T[n]
-        for j in range(3):
-            pose[j, 3] /= size
         # K_6 = L_6 T^-1 L_0
-        invert_rigid(pose, rest)
+        invert_rigid(T[n], rest)
         multiply_rigid(rest, links[0], pose_link)
         multiply_rigid(links[6], pose_link, rest)
-        verdicts[i], count[n], smallest = _by_reading(reading, links, pose, rest, m, q[n], count[n])
+        verdicts[i], count[n], smallest = _by_reading(reading, links, T[n], rest, m, q[n], count[n])
         moving[n] |= smallest < STUCK
 
 
 @kernel
 def followed_back(
     links: Reals,
-    size: float,
     T: Reals,
     numbers: Integers,
     m: LoopMemory,
@@ -278,24 +273,19 @@ def followed_back(
     Parameters
     ----------
     links : (7, 4, 4), in units of the chain's size
-    size : m
-    T : (N, 4, 4), m
+    T : (N, 4, 4), in these units
     numbers : (k,), of the poses
     m : memory
     near, near_count : (k, 16, 6), rad, or parts of the size, and (k,), solutions of a pose next to each of these
     q, count : (N, 16, 6) and (N,); rows are added
     """
-    pose = np.empty((4, 4))
     for i in range(numbers.shape[0]):
         n = numbers[i]
-        pose[:, :] = T[n]
-        for j in range(3):
-            pose[j, 3] /= size
         for r in range(near_count[i]):
             m.candidate[:] = near[i, r]
-            residual, pivot = newton(links, m.sliding, pose, m.candidate, 20, m.frames, m.J, m.dq, m.columns)
+            residual, pivot = newton(links, m.sliding, T[n], m.candidate, 20, m.frames, m.J, m.dq, m.columns)
             if residual < SOLVES:
-                count[n] = add_row(links, pose, m, m.candidate, pivot, q[n], count[n])
+                count[n] = add_row(links, T[n], m, m.candidate, pivot, q[n], count[n])
 
 
 @kernel

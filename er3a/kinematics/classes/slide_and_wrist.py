@@ -22,7 +22,7 @@ import numpy as np
 
 from er3a.geometry.transforms import frame_along
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.chain import axes_of, inverse_rigid, poses_of, size_of
+from er3a.kinematics.chain import axes_of, inverse_rigid, meeting_point, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants
 from er3a.kinematics.classes.scara import wrist_angles
 from er3a.kinematics.classes.six_revolute import CERTAIN, SLOTS, UNCERTAIN, RowsFound, in_order
@@ -89,9 +89,8 @@ def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
     axes, points = axes_of(L)
     if min(np.linalg.norm(np.cross(axes[k], axes[k + 1])) for k in (3, 4)) < MEETS:
         return None
-    across = np.eye(3) - axes[3:, :, None] * axes[3:, None, :]
-    centre = np.linalg.lstsq(across.reshape(-1, 3), (across @ points[3:, :, None]).reshape(-1), rcond=None)[0]
-    if np.linalg.norm((across @ (centre - points[3:])[:, :, None])[..., 0], axis=1).max() > MEETS:
+    centre, miss = meeting_point(axes[3:], points[3:])
+    if miss > MEETS:
         return None
     before_3 = poses_of(L[:3], np.zeros(2))  # frame of joint 3 with all at 0
     c = inverse_rigid(before_3)[:3, :3] @ centre + inverse_rigid(before_3)[:3, 3]

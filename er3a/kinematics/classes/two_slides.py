@@ -150,9 +150,7 @@ def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
 
 def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers) -> None:
     """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM."""
-    scaled = T.copy()
-    scaled[:, :3, 3] /= arm.size
-    loops = arm.links[6] @ inverse_rigid(scaled) @ arm.links[0]
+    loops = arm.links[6] @ inverse_rigid(T) @ arm.links[0]
     far = _reach(loops) ** 2
     readings_used, left, moving = np.zeros(len(T), dtype=np.int64), np.arange(len(T)), np.zeros(len(T), dtype=bool)
     for reading in arm.readings:
@@ -165,7 +163,7 @@ def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: 
         known = left[clear]
         verdicts = np.empty(len(known), dtype=np.int64)
         zeros = _zeros(terms[clear], reading.degree)
-        _rows(reading, arm.links, scaled, loops, known, zeros, memory, q, count, verdicts)
+        _rows(reading, arm.links, T, loops, known, zeros, memory, q, count, verdicts)
         certainty[known] = np.minimum(certainty[known], verdicts)
         moving[known] |= verdicts == CONTINUUM
         readings_used[known] += 1

@@ -78,7 +78,6 @@ COMMANDS = {
         ROBOT_FILES,
         "Estimate the pose of a camera, with 95 % intervals; name samples and conventions that can't be right.",
     ),
-    "schema": ("robot_files", ROBOT_FILES, "Write the JSON schemas of input files, and the data dictionary."),
     "teach": (
         "single_jobs",
         ROBOT_FILES,

@@ -1,8 +1,7 @@
-"""Commands for robot files: URDF import and export, calibration, hand-eye, schemas."""
+"""Commands for robot files: URDF import and export, calibration, hand-eye."""
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from collections.abc import Sequence
@@ -337,19 +336,3 @@ def hand_eye(
     touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)
-
-
-@options.app.command(rich_help_panel=options.ROBOT_FILES)
-def schema(
-    folder: Annotated[Path, typer.Option(help="folder for the schemas of input files")] = Path("config"),
-    docs: Annotated[Path, typer.Option(help="folder for the documents about results")] = Path("docs/results"),
-):
-    """Write the JSON schemas of input files, and the data dictionary."""
-    from er3a.files.kept_files import write_text
-    from er3a.pipeline.check import SCHEMAS
-    from er3a.pipeline.dictionary import data_dictionary
-
-    schemas = {folder / f"{kind}.schema.json": model.model_json_schema() for kind, model in SCHEMAS.items()}
-    for file, content in schemas.items():
-        write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
-    write_text(docs / "dictionary.md", data_dictionary())

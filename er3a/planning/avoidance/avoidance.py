@@ -15,14 +15,8 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
 from er3a.planning.motion_faults import SingularEvent
-from er3a.planning.timing import JointLimits, NoTimeLaw, Timed, fastest, nodes_along, straight
+from er3a.planning.timing import JointLimits, Timed, fastest, nodes_along, straight
 from er3a.robots.robot import Robot
-
-PathUnfit = Finding
-RegionUnfit = Finding
-NoWay = Finding | NoTimeLaw
-NotPossible = PathUnfit | RegionUnfit | NoWay
-
 
 AT_REST = 1e-6  # rad
 POINTS = 501  # grid points of a stretch that its timing passes through at most
@@ -118,7 +112,7 @@ class SingularSegment:
         return fastest(q, self.limits, t if programmed else None)
 
 
-Strategy = Callable[[SingularSegment], Avoidance | NotPossible]
+Strategy = Callable[[SingularSegment], Avoidance | Finding]
 
 
 def coarse(t: Reals) -> Reals:

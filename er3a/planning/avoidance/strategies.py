@@ -32,7 +32,6 @@ from er3a.planning.moves import ToolPath
 from er3a.planning.names import StrategyName
 from er3a.planning.profiles import quintic
 from er3a.planning.timing import Timed, TimingError, joined, straight
-from er3a.planning.way_around import NoWayAround
 from er3a.robots.joint_limits import limits_exceeded, within
 
 Kind = Literal["shift", "tilt"]
@@ -133,7 +132,7 @@ class BentPath:
         return T
 
 
-def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Bend the path by the smallest shift of the tool point, its orientation kept.
 
     Parameters
@@ -147,7 +146,7 @@ def shifted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avo
     return _via(segment, "shift")
 
 
-def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Bend the path by the smallest tilt of the tool, the tool point kept on its path.
 
     Parameters
@@ -161,7 +160,7 @@ def tilted_via(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoi
     return _via(segment, "tilt")
 
 
-def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance | avoidance.NotPossible:
+def _via(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.Avoidance | Finding:
     if not segment.regions:
         return fact("nothing_to_avoid")
     if segment.regions[0][0] == 0:
@@ -318,18 +317,18 @@ def _smallest_bend(
     return bend(high)
 
 
-def no_end(end: str, why: str) -> avoidance.NotPossible:
+def no_end(end: str, why: str) -> Finding:
     """That the start or the end of a path can't be one, and why."""
     return fact("no_end", end=end, why=fact(why))
 
 
-def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> avoidance.NotPossible:
+def _none_far_enough(segment: avoidance.SingularSegment, kind: Kind) -> Finding:
     shift = 1000 * MAX_BEND["shift"] * characteristic_length(segment.robot)
     most = shift if kind == "shift" else float(np.degrees(MAX_BEND["tilt"]))
     return fact("no_bend_keeps_distance", up_to=turned_or_moved(most, kind == "shift"))
 
 
-def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Follow the path up to the last good pose, move the joints to the next good one, and go on, at every region.
 
     Where the path begins or ends inside a region, its first or last joints take the place of the good pose.
@@ -365,7 +364,7 @@ def detour(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidanc
 COARSE = 201  # times at which other branches are looked at before one is followed in full
 
 
-def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def branch(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Change to another branch by a joint move at rest, and follow the rest of the path on it.
 
     A change before the path begins is preferred: where only the tool's pose is given there, the arm may as well begin
@@ -424,7 +423,7 @@ def _changed(segment: avoidance.SingularSegment, followed: Followed, index: int,
     return avoidance.Avoidance(joined([*before, *change, other.along(at, len(other.t) - 1)]), crosses_by_joints=True)
 
 
-def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Follow the path exactly, as programmed wherever the joints can, slower where they can't.
 
     Parameters
@@ -443,7 +442,7 @@ def slow(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.
     return avoidance.Avoidance(joined([*segment.begin(), segment.along(0, len(segment.t) - 1)]))
 
 
-def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | avoidance.NotPossible:
+def stop(segment: avoidance.SingularSegment) -> avoidance.Avoidance | Finding:
     """Follow the path exactly, and stop at the last pose that keeps its distance.
 
     Parameters
@@ -525,8 +524,6 @@ ARRIVED = 1e-3, np.radians(0.1)  # m and rad from the path's end
 ON_PATH = 1e-6, np.radians(1e-4)
 OVER = 1e-6  # relative, by which rounding may exceed a limit
 
-NotUsable = avoidance.NotPossible | Finding | NoWayAround
-
 
 @dataclass(frozen=True, eq=False)
 class StrategyCost:
@@ -563,7 +560,7 @@ class StrategyResult:
 
     name: StrategyName
     cost: StrategyCost | None
-    reasons: tuple[NotUsable, ...] = ()
+    reasons: tuple[Finding, ...] = ()
 
 
 def compare_strategies(segment: avoidance.SingularSegment, chosen: StrategyName | None = None) -> list[StrategyResult]:
@@ -620,7 +617,7 @@ def _tried(segment: avoidance.SingularSegment, name: StrategyName) -> StrategyRe
     T = forward(robot, motion.q)
     distance, angle, _ = deviation(line, T)
     speed, acceleration = motion.ratios(segment.allowed or segment.limits)
-    reasons: list[NotUsable] = []
+    reasons: list[Finding] = []
     last = line.poses(np.array(1.0))
     left = float(np.linalg.norm(T[-1, :3, 3] - last[:3, 3]))
     twisted = 2 * np.arcsin(min(1.0, float(np.linalg.norm(T[-1, :3, :3] - last[:3, :3])) / np.sqrt(8.0)))

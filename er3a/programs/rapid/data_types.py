@@ -20,6 +20,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from er3a.numerics.arrays import Reals
+from er3a.programs import evaluation
 from er3a.programs.instructions import MeantSolution, numbers_of, pose_of
 from er3a.programs.syntax import Record, Unclear, Value, finite, number, numbers
 from er3a.robots.masses import MassBody, moved
@@ -283,5 +284,5 @@ def external_axes(value: Value | None) -> tuple[tuple[str, float], ...]:
         return (("extax", math.nan),)
     if not isinstance(value, Record):
         return ()
-    given = ((name.lower(), math.nan if isinstance(each, Unclear) else number(each)) for name, each in value.items)
-    return tuple((name, each) for name, each in given if each and not abs(each) >= NO_AXIS / 10)
+    given = evaluation.external_axes(value, [name for name, _ in value.items])
+    return tuple((name.lower(), each) for name, each in given if not abs(each) >= NO_AXIS / 10)

@@ -46,7 +46,7 @@ from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import Choice, Refusal, nearest
+from er3a.selection.nearest import Choice, nearest
 from er3a.selection.rule_names import RuleName
 from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
 
@@ -145,7 +145,7 @@ def collides(rows: model.SolutionRows) -> Flags:
 
 
 def _rows(
-    robot: Robot, target: Target, solutions: Solutions, choice: Choice, refused: tuple[Refusal | None, ...]
+    robot: Robot, target: Target, solutions: Solutions, choice: Choice, refused: tuple[Finding | None, ...]
 ) -> model.SolutionRows:
     q, count = solutions.q, len(solutions.q)
     position, orientation, freed = misses(robot, target.T, q)

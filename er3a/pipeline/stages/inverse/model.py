@@ -14,7 +14,7 @@ from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.selection.nearest import WhyFirst, WhyNone
+from er3a.selection.nearest import WhyFirst
 from er3a.selection.rule_names import RuleName
 
 Obstacle = Finding
@@ -91,7 +91,7 @@ class TargetResult:
     collide: int
     chosen_deg: tuple[float, ...] | None
     chosen_branch: int | None
-    reason: WhyFirst | WhyNone
+    reason: WhyFirst | Finding
     obstacle: Obstacle | None
     outcome: TargetOutcome
     expect: TargetOutcome | None

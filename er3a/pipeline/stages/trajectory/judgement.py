@@ -59,7 +59,7 @@ class Judgement:
     of_joints: PathVerdict
     outcomes: tuple[PathVerdict, ...]
     events: list[motion_faults.SingularEvent]
-    limits: list[motion_faults.Interval[motion_faults.LimitCause]]
+    limits: list[motion_faults.Interval[Finding]]
     fast: list[motion_faults.Interval[motion_faults.RateCause]]
     undecided: list[motion_faults.Interval[Finding]]
     beyond: list[motion_faults.Interval[Finding]]
@@ -151,7 +151,7 @@ class MotionJudge:
             q=q,
             velocity=velocity,
             acceleration=acceleration,
-            speed_bounded=bool(bounded),
+            speed_bounded=bounded,
         )
 
 
@@ -363,7 +363,8 @@ def advised_end(path: model.PathSummary, rows: model.PathChecks, limits: model.L
     kept = rows.reachable & (rows.t_s + STOPS * stop <= first) & (np.nan_to_num(rows.speed_ratio) <= SPEED_MARGIN)
     for part in path.out_of_limits:
         joints, at = [j - 1 for j in motion_faults.joints_of(part.cause)], int(np.argmin(np.abs(rows.t_s - part.t0_s)))
-        kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
+        if joints:
+            kept &= np.abs(rows.q_deg[:, joints] - rows.q_deg[at, joints]).max(axis=1) >= LIMIT_MARGIN
     for lost in path.unreachable:
         kept &= rows.s_m <= lost.s0_m - REACH_MARGIN
     if until and (np.isinf(first) or kept[rows.t_s <= until.t_s][-1:].any()):

@@ -19,9 +19,7 @@ from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.scope import OF_MOTIONS
 from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
-from er3a.planning.avoidance.strategies import NotUsable
 from er3a.planning.names import FAULTS, PathVerdict, StrategyName
-from er3a.planning.way_around import NoWayAround
 
 PathKind = Literal["joint", "joint_sequence", "line", "arc", "sequence", "table", "plan"]
 TimesIn = Literal["path_file", "table", "program"]
@@ -192,7 +190,7 @@ class TriedStrategy:
 
     name: StrategyName
     usable: bool
-    reasons: tuple[NotUsable | Finding, ...]
+    reasons: tuple[Finding, ...]
     motion: StrategyMotion | None
 
 
@@ -251,7 +249,7 @@ class PathSummary:
     joint_speed_bounded: bool
     collisions: tuple[Stretch, ...]
     clearance: MinClearance | None
-    not_planned: NoWayAround | None
+    not_planned: Finding | None
     fastest_s: float | None
     avoidance: tuple[TriedStrategy, ...]
     strategy: StrategyName | None

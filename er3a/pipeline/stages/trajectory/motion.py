@@ -15,6 +15,7 @@ from er3a.collision.bodies import Bodies
 from er3a.errors import InputError, NotWristPartitionedError, PoseError
 from er3a.files.path_file import PathEntry, ProgramPath, TablePath, load_paths
 from er3a.files.units import joint_values
+from er3a.finding import Finding
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
@@ -35,7 +36,7 @@ from er3a.planning.sequences import TURN_LENGTH, JointSequence, SegmentPath
 from er3a.planning.stated_rates import StatedMotion
 from er3a.planning.timing import JointLimits, joint_limits, standing, straight
 from er3a.planning.tool_curve import follow_as_curve
-from er3a.planning.way_around import NoWayAround, PlannedMove, PlanningTask, WayAround, way_between
+from er3a.planning.way_around import PlannedMove, PlanningTask, WayAround, way_between
 from er3a.program_check.check_program import CheckOptions, LocatedFinding, ProgramPart, check_program, parts_of
 from er3a.programs.languages import read_program
 from er3a.robots.joint_limits import meant, shown
@@ -216,7 +217,7 @@ class Motion:
     way: Callable[[Reals], Reals]
     followed: Followed | None
     curve: PiecewiseMotion
-    not_planned: NoWayAround | None = None
+    not_planned: Finding | None = None
 
     @property
     def rate_bounds(self) -> RateBounds:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.finding import is_one
+from er3a.finding import Finding, is_one
 from er3a.geometry.transforms import transform
 from er3a.kinematics.inverse import inverse
 from er3a.pipeline.language import tr, with_unit
@@ -17,7 +17,6 @@ from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
-from er3a.selection.nearest import Refusal
 
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
 Position = tuple[float, float, float]
@@ -60,7 +59,7 @@ def _line(start_mm: Position, end_mm: Position, name: str, count: int) -> Mark:
     return Mark(0.0, float(count), (a / 1000, b / 1000, c / 1000), (x / 1000, y / 1000, z / 1000), name)
 
 
-def refusal_in_short(refusal: Refusal | None) -> str:
+def refusal_in_short(refusal: Finding | None) -> str:
     """Why a solution is not taken, in few words; empty for one that is admissible."""
     if refusal is None:
         return ""

@@ -1,10 +1,13 @@
-"""The dictionary of all tables of results."""
+"""The JSON schemas of input files, and the dictionary of all tables of results: `make schema` writes them."""
 
 from __future__ import annotations
 
 import inspect
+import json
 from importlib import import_module
+from pathlib import Path
 
+from er3a.pipeline.check import SCHEMAS
 from er3a.pipeline.results import CHECKSUMS, FORMAT_VERSION
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.stage import Stage
@@ -56,3 +59,15 @@ def _names(column: Column) -> str:
     if column.parts:
         return ", ".join(f"`{name}`" for name in column.names(0))
     return f"`{column.pattern.format(1)}` … `{column.pattern.format('n')}`"
+
+
+def main() -> None:
+    """Write the schemas and the dictionary where they are kept."""
+    for kind, model in SCHEMAS.items():
+        text = json.dumps(model.model_json_schema(), indent=2, ensure_ascii=False) + "\n"
+        Path("config", f"{kind}.schema.json").write_text(text, encoding="utf-8")
+    Path("docs/results/dictionary.md").write_text(data_dictionary(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
