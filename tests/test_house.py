@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FUNCTION = 60  # lines without its docstring
 MAX_POSITIONAL = 6
-KERNELS = {"kernel", "inner_kernel"}
+KERNELS = {"kernel", "inner_kernel", "inlined_kernel"}
 
 
 @cache

@@ -29,7 +29,7 @@ except ModuleNotFoundError:  # no numba
     machine_code = None  # type: ignore[assignment]
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
+_KERNEL = b"kernel\ndef "  # @kernel, @inner_kernel or @inlined_kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -118,6 +118,21 @@ def inner_kernel(function: Function) -> Function:
     if not is_compiled():
         return function
     return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True)
+
+
+def inlined_kernel(function: Function) -> Function:
+    """Compile a function into each kernel that calls it: for what is called so often that handing over its arrays takes
+    longer than its work.
+
+    Parameters
+    ----------
+    function : as for :func:`inner_kernel`; short, as each call compiles it again
+
+    Returns
+    -------
+    function : must not be called from Python, unless numba is switched off (``NUMBA_DISABLE_JIT``)
+    """
+    return machine_code.compiled(function, kernels_folder(), inline="always") if is_compiled() else function
 
 
 def _in_python(function: Function) -> Function:
