@@ -376,7 +376,7 @@ def _root(tree: Tree) -> str:
 
 def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
     """Joints from a link on, as long as there is only one way."""
-    chain: list[UrdfJoint] = []
+    chain, passive = list[UrdfJoint](), list[UrdfJoint]()
     while link in tree.by_parent:
         onward = tree.by_parent[link]
         moving, active = tree.onward(link)
@@ -391,13 +391,14 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         if not active and len(moving) > 1:
             break
         if active and len(active) < len(moving):
-            passive = [joint for joint in moving if joint not in active]
-            notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
+            passive += [joint for joint in moving if joint not in active]
         if not moving and len(onward) > 1:
             notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
+    if passive:
+        notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
     return chain
 
 
