@@ -42,7 +42,16 @@ from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import mean_pose, park, shah
-from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
+from er3a.vision.likelihood import (
+    GROUPS,
+    START_DEVIATIONS,
+    UNKNOWNS,
+    PoseObservations,
+    Refined,
+    half_width,
+    refine,
+    residuals,
+)
 from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distances, wrong_zero
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
@@ -403,11 +412,6 @@ class HandEye(ByValue, Displayed):
         """Names of samples left out as equal to an earlier one in both poses."""
         return tuple(name for name, copy in zip(self.samples.names, _copies(self.samples)) if copy)
 
-    @property
-    def rejected(self) -> tuple[str, ...]:
-        """Names of the samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects)
-
     def sheet(self) -> Sheet:
         """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
 
@@ -518,23 +522,9 @@ EXPLAINED_BY_A_ZERO = {
 }
 
 
-def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
-    """The closed-form answer with the smallest residuals, of Park's and Shah's.
-
-    Parameters
-    ----------
-    F, B : (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
-    deviations : (2,), m and rad, by which residuals are divided
-
-    Returns
-    -------
-    X, Y : (4, 4), m
-
-    Raises
-    ------
-    HandEyeError
-        if no method has one
-    """
+def _best_closed_form(F: Reals, B: Reals) -> tuple[Reals, Reals]:
+    """The closed-form answer with the smallest residuals, of Park's and Shah's: X and Y (4, 4), m, from F and B
+    (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`."""
     best: tuple[float, Reals, Reals] | None = None
     for solve in (park, shah):
         try:
@@ -542,7 +532,7 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(X).all() and np.isfinite(Y).all():
-            cost = float(np.sum((residuals(F, B, X, Y)[0] / np.repeat(deviations, 3)) ** 2))
+            cost = float(((residuals(F, B, X, Y)[0] / START_DEVIATIONS[GROUPS]) ** 2).sum())
             best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
     if best is None:
         raise HandEyeError(fact("nothing_fits"))
@@ -552,7 +542,7 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
 def _fitted(samples: CalibrationSet) -> Refined:
     seen = PoseObservations.of(samples)
     try:
-        found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
+        found = refine(seen, *_best_closed_form(samples.hand, samples.target))
     except np.linalg.LinAlgError:
         raise HandEyeError(fact("nothing_fits")) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
@@ -657,21 +647,6 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     return TouchCheck(difference, half_width, probability)
 
 
-def board_poses(found: HandEye) -> Reals:
-    """Where each sample puts the board: F X B, all equal to Y without errors.
-
-    Parameters
-    ----------
-    found : a calibration of N samples
-
-    Returns
-    -------
-    T : (N, 4, 4), m, T_base_board for a camera on the flange, else T_flange_board
-    """
-    poses: Reals = found.samples.hand @ found.X @ found.samples.target
-    return poses
-
-
 def spread_of(found: HandEye) -> tuple[float, float]:
     """How much the used samples' board poses scatter about their mean.
 
@@ -683,7 +658,7 @@ def spread_of(found: HandEye) -> tuple[float, float]:
     -------
     distance, angle : root mean squares, m and rad
     """
-    poses = board_poses(found)[found.used]
+    poses = (found.samples.hand @ found.X @ found.samples.target)[found.used]  # all equal to Y without errors
     step = step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]
     return float(np.sqrt((size[0] ** 2).mean())), float(np.sqrt((size[1] ** 2).mean()))
