@@ -27,7 +27,7 @@ from er3a.by_value import ByValue
 from er3a.collision.convex import ROOM, TOUCHING, cores_distance
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.numerics.arrays import Integers, Reals
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
 FIRST = 14  # corners, with which the choice of few of a hull begins
@@ -211,7 +211,7 @@ def _turned(T: Reals, S: Reals, R: Reals, t: Reals) -> None:
             R[r, c] = T[0, r] * S[0, c] + T[1, r] * S[1, c] + T[2, r] * S[2, c]
 
 
-@inner_kernel
+@inlined_kernel
 def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals, axis: Reals, limit: float) -> float:
     """A lower bound of the squared distance of a box of ``first`` (M, 2, 3) and one of ``second``, seen from the first
     by R (3, 3) and t (3,); one that reaches ``limit`` will do.
@@ -245,7 +245,7 @@ def _boxes_apart(first: Reals, n: int, second: Reals, m: int, R: Reals, t: Reals
     return float(max(found, apart))
 
 
-@inner_kernel
+@inlined_kernel
 def _keep_axis(near: Reals, R: Reals, axis: Reals) -> None:
     """The direction from one nearest point to the other (2, 3), in the axes of both bodies."""
     size = 0.0
@@ -258,7 +258,7 @@ def _keep_axis(near: Reals, R: Reals, axis: Reals) -> None:
         axis[1, c] = R[0, c] * axis[0, 0] + R[1, c] * axis[0, 1] + R[2, c] * axis[0, 2]
 
 
-@inner_kernel
+@inlined_kernel
 def _apart_along(points: Reals, count: int, axis: Reals) -> float:
     """How far the points from row 3 on, ``count`` of them, are beyond the first three along an axis."""
     last, first = -np.inf, np.inf
@@ -271,17 +271,17 @@ def _apart_along(points: Reals, count: int, axis: Reals) -> float:
     return float(first - last)
 
 
-@inner_kernel
-def _beyond_plane(points: Reals, count: int, by: float) -> bool:
-    """Whether the points from row 3 on, ``count`` of them, are all beyond the plane of the first three, on one side, by
-    so much (m)."""
-    ux, uy, uz = points[1, 0] - points[0, 0], points[1, 1] - points[0, 1], points[1, 2] - points[0, 2]
-    vx, vy, vz = points[2, 0] - points[0, 0], points[2, 1] - points[0, 1], points[2, 2] - points[0, 2]
+@inlined_kernel
+def _beyond_plane(points: Reals, i: int, first: int, last: int, by: float) -> bool:
+    """Whether the points from row ``first`` on, ``last`` excluded, are all beyond the plane of three from row i on, on
+    one side, by so much (m)."""
+    ux, uy, uz = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1], points[i + 1, 2] - points[i, 2]
+    vx, vy, vz = points[i + 2, 0] - points[i, 0], points[i + 2, 1] - points[i, 1], points[i + 2, 2] - points[i, 2]
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     least = by * np.sqrt(x * x + y * y + z * z)
     low, high = np.inf, -np.inf
-    for p in range(3, 3 + count):
-        away = x * (points[p, 0] - points[0, 0]) + y * (points[p, 1] - points[0, 1]) + z * (points[p, 2] - points[0, 2])
+    for p in range(first, last):
+        away = x * (points[p, 0] - points[i, 0]) + y * (points[p, 1] - points[i, 1]) + z * (points[p, 2] - points[i, 2])
         low, high = min(low, away), max(high, away)
     return bool(low > least or high < -least)
 
@@ -427,7 +427,9 @@ def surface_distance(  # noqa: C901, PLR0912
                 if not convex:
                     c = trees.corner[trees.child[m, 1], k]
                     points[3 + k, r] = R[r, 0] * c[0] + R[r, 1] * c[1] + R[r, 2] * c[2] + t[r]
-        if _apart_along(points, count, axis) - disc >= best or _beyond_plane(points, count, disc + best):
+        if _apart_along(points, count, axis) - disc >= best or _beyond_plane(points, 0, 3, 3 + count, disc + best):
+            continue
+        if not convex and _beyond_plane(points, 3, 0, 3, best):
             continue
         distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close)
         if distance < best:
@@ -460,13 +462,13 @@ def _core_in_frame(T: Reals, core: tuple[Reals, int, int, float], R: Reals, poin
         box[0, r], box[1, r] = (low + high) / 2, (high - low) / 2 + disc
 
 
-@inner_kernel
+@inlined_kernel
 def _girth(box: Reals) -> float:
     """Half the sum of a box's edges."""
     return float(box[1, 0] + box[1, 1] + box[1, 2])
 
 
-@inner_kernel
+@inlined_kernel
 def _open_boxes(
     trees: Trees,
     boxes: Reals,

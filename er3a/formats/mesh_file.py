@@ -134,7 +134,8 @@ def _loaded(path: Path) -> Any:
         raise InputError(path, None, f"'{path.suffix}' is not a mesh format", f"Save it as {', '.join(FORMATS)}")
     if not path.is_file():
         raise InputError(path, None, "there is no such file", "Check the path")
-    _refuse_large(path)
+    if path.stat().st_size > MAX_MESH_BYTES:
+        raise InputError(path, None, f"larger than {MAX_MESH_BYTES // 1_000_000} MB", "Simplify the mesh")
     if path.suffix.lower() == ".dae" and find_spec("collada") is None:
         raise InputError(path, None, "can't be read without pycollada", "Install it: pip install 'er3a[meshes]'")
     import trimesh  # takes a while
@@ -146,28 +147,12 @@ def _loaded(path: Path) -> Any:
         raise InputError(path, None, f"can't be read as a mesh ({reason})", "Save the mesh again") from None
     if not isinstance(loaded, trimesh.Trimesh) or not len(loaded.faces):
         raise InputError(path, None, "holds no triangles", "Save the surface as triangles")
-    if len(loaded.faces) > MAX_TRIANGLES:
-        raise _too_many(path, len(loaded.faces))
+    if (count := len(loaded.faces)) > MAX_TRIANGLES:
+        remedy = "Simplify it: links are known to millimetres"
+        raise InputError(path, None, f"has {count} triangles; at most {MAX_TRIANGLES} are read", remedy)
     if not np.isfinite(loaded.vertices).all():
         raise InputError(path, None, "has corners that are not numbers", "Save the mesh again")
     return loaded
-
-
-def _refuse_large(path: Path) -> None:
-    """A file that is too large to be opened at all; a binary STL says how many triangles it has."""
-    size = path.stat().st_size
-    if path.suffix.lower() == ".stl" and size >= 84:
-        with path.open("rb") as file:
-            count = struct.unpack("<I", file.read(84)[80:])[0]
-        if size == 84 + 50 * count and count > MAX_TRIANGLES:
-            raise _too_many(path, count)
-    if size > MAX_MESH_BYTES:
-        raise InputError(path, None, f"larger than {MAX_MESH_BYTES // 1_000_000} MB", "Simplify the mesh")
-
-
-def _too_many(path: Path, count: int) -> InputError:
-    remedy = "Simplify it: links are known to millimetres"
-    return InputError(path, None, f"has {count} triangles; at most {MAX_TRIANGLES} are read", remedy)
 
 
 def _check_size(path: Path, size: float, unit: Unit) -> None:

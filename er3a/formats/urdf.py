@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -44,6 +44,7 @@ MANY_TURNS = 4 * math.pi + 0.01
 FOLLOWS = 1e-6  # rad or m
 DRAWN_TRIANGLES = 4000  # of an arm: what a page paints at each step of a motion
 WRITTEN_RAD = 1e-9  # angles that differ by less are the same, written in all digits of a double
+SHOWN_MM = 1e-4  # that a point of the flange moves by; no controller shows less
 FASTEST = 100.0  # rad/s or m/s; what URDFs give above stands for a speed that no one knows
 
 
@@ -114,7 +115,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
     root, placed = urdf_tree.urdf_root(path), link_places(found, shift)
-    shapes, shaped, lost = link_shapes(path, root, robot, placed)
+    shapes, shaped, lost = link_shapes(path, root, robot, placed, _hanging(found))
     visuals, unseen = link_visuals(path, root, robot, placed)
     names = tuple(joint.name for joint in sources)
     masses, weighed, changed = urdf_tree.masses_from_urdf(root, robot, placed, [joint.name for joint in moving], names)
@@ -126,7 +127,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     }
     but, guessed = dict[str, str](), ("envelopes",) if lost else ()
     if lost:
-        but["envelopes"] = f", but for shapes of {', '.join(lost)} that could not be read"
+        but["envelopes"] = f", but for shapes of {', '.join(lost)}, which are left out"
     if changed:
         which = f"{len(changed)} links" if len(changed) > 1 else f"link {changed[0]}"
         but["inertia"] = f", but for the inertia of {which}, for which the nearest possible one was taken"
@@ -253,8 +254,16 @@ def link_places(found: urdf_tree.UrdfChain, shift: Reals) -> urdf_tree.LinkPlace
     return placed
 
 
+def _hanging(found: urdf_tree.UrdfChain) -> set[str]:
+    """The links of the chain, and all that hang on them, such as levers and fingers."""
+    links, joints = {found.joints[0].parent, *(joint.child for joint in found.joints)}, found.all.values()
+    while more := {joint.child for joint in joints if joint.parent in links} - links:
+        links |= more
+    return links
+
+
 def link_shapes(
-    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces
+    path: Path, root: ElementTree.Element, robot: Robot, placed: urdf_tree.LinkPlaces, hanging: Collection[str]
 ) -> tuple[dict[str, Any], tuple[str, ...], tuple[str, ...]]:
     """The collision geometry of a URDF, in the frames of the links of the robot made from it.
 
@@ -263,17 +272,18 @@ def link_shapes(
     path : of the URDF, from which meshes are looked for
     robot : made from the URDF, without shapes
     placed : where the links are with all joints of the robot at 0
+    hanging : links on the chain, whose shapes count as lost if they move by themselves
 
     Returns
     -------
     fields : ``envelopes``, ``hulls`` and ``meshes`` of :class:`Robot`, in m
-    notes : what was left out or changed, in words
-    lost : links of which a shape could not be read
+    notes : what was left out or changed, in words: one for shapes that could not be read, one for links off the chain
+    lost : links of which a shape could not be read, or is not moved with the arm
     """
-    shapes, notes, lost = list[urdf_tree.Shape](), list[str](), list[str]()
+    shapes, unread, astray = list[urdf_tree.Shape](), dict[str, str](), list[str]()
     for name, collisions, place in urdf_tree.in_links(root, robot, placed, "collision"):
         if place is None:
-            notes.append(f"link {name} does not move with the arm's chain; its shape is left out")
+            astray.append(name)
             continue
         made = list[urdf_tree.Shape | urdf_tree.CylinderOfLink]()
         for collision in collisions:
@@ -283,8 +293,7 @@ def link_shapes(
                 said = str(error)
                 if isinstance(error, InputError) and error.file == str(path):  # of xacro a file that is gone by now
                     said = f"{error.field}: {error.problem}. {error.remedy}"
-                notes.append(f"link {name} has a shape that is left out ({said})")
-                lost += [] if name in lost else [name]
+                unread.setdefault(name, said)
         shapes += urdf_tree.with_capsules(made)
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
@@ -296,7 +305,10 @@ def link_shapes(
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
-    return fields, tuple(notes), tuple(lost)
+    notes = [f"shapes of {', '.join(unread)} are left out ({why})" for why in unread.values()][:1]
+    if astray:
+        notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
+    return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
 
 
 def link_visuals(
@@ -531,7 +543,9 @@ def _unrounded(
         return ()
     away = (_chain_forward(written, values) - _chain_forward(taken, values))[:, :3, 3]
     moved = 1000 * float(np.linalg.norm(away, axis=1).max())
-    taken_as = f"rounded angles of {count} joints were taken as multiples of 45 deg"
+    if moved < SHOWN_MM:
+        return ()
+    taken_as = f"rounded angles of {count} joint{'s' if count > 1 else ''} were taken as multiples of 45 deg"
     return (f"{taken_as}: that moves the flange by up to {moved:.2g} mm",)
 
 

@@ -376,7 +376,7 @@ def _root(tree: Tree) -> str:
 
 def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
     """Joints from a link on, as long as there is only one way."""
-    chain: list[UrdfJoint] = []
+    chain, passive = list[UrdfJoint](), list[UrdfJoint]()
     while link in tree.by_parent:
         onward = tree.by_parent[link]
         moving, active = tree.onward(link)
@@ -391,13 +391,14 @@ def _downwards(tree: Tree, link: str, notes: list[str]) -> list[UrdfJoint]:
         if not active and len(moving) > 1:
             break
         if active and len(active) < len(moving):
-            passive = [joint for joint in moving if joint not in active]
-            notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
+            passive += [joint for joint in moving if joint not in active]
         if not moving and len(onward) > 1:
             notes.append(f"several fixed frames follow {link}; it was taken as the flange")
             break
         chain.append((active or moving or onward)[0])
         link = chain[-1].child
+    if passive:
+        notes.append(f"joints beside the chain that only follow others were left out: {_some(_names(passive))}")
     return chain
 
 
@@ -974,7 +975,8 @@ MACRO, EXPRESSION = re.compile(r"<xacro:(?!property\b|arg\b)"), re.compile(r"\$[
 """What of xacro has to be expanded; definitions alone are left over in many URDFs and change nothing."""
 EXPANDING_S = 30  # the largest public ones take two
 UNBOUNDED = "Look for an expression without end, such as 9**9**9"
-ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE; keep its packages in folders beside it"
+ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE"
+NO_PACKAGE, PACKAGES = re.compile(r"Package not found: (\S+)"), "Keep that package in a folder beside the file's own"
 EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
 
 
@@ -1034,6 +1036,8 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
         raise InputError(path, None, f"is not expanded after {EXPANDING_S} s", UNBOUNDED) from None
     text, reason = (words.decode("utf-8", "replace") for words in (done.stdout, done.stderr))
     if done.returncode:
+        if missing := NO_PACKAGE.search(reason):
+            raise InputError(path, None, f"needs the package {missing[1]}, which was not found", PACKAGES)
         reason = reason.strip().rpartition("\n")[2][:200] or f"its expansion ended with {done.returncode}"
         raise InputError(path, None, f"can't be expanded ({reason})", ARGUMENTS)
     root = ElementTree.fromstring(text)

@@ -34,7 +34,7 @@ except ModuleNotFoundError:  # no numba
     machine_code = None
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_KERNEL = b"kernel\ndef "  # @kernel or @inner_kernel
+_KERNEL = b"kernel\ndef "  # @kernel, @inner_kernel or @inlined_kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -122,6 +122,21 @@ def inner_kernel(function: Function) -> Function:
     function once more for that number; ``int(0)`` does not.
     """
     return machine_code.compiled(function, kernels_folder(), no_cpython_wrapper=True) if machine_code else function
+
+
+def inlined_kernel(function: Function) -> Function:
+    """Compile a function into each kernel that calls it: for what is called so often that handing over its arrays takes
+    longer than its work.
+
+    Parameters
+    ----------
+    function : as for :func:`inner_kernel`; short, as each call compiles it again
+
+    Returns
+    -------
+    function : must not be called from Python, unless numba is switched off (``NUMBA_DISABLE_JIT``)
+    """
+    return machine_code.compiled(function, kernels_folder(), inline="always") if machine_code else function
 
 
 # Enough parts that a thread on a busy processor is outrun by the others, few enough that handing out costs nothing.

@@ -68,18 +68,18 @@ waiting = _Waiting()
 event.register("numba:compiler_lock", waiting)  # type: ignore[no-untyped-call]
 
 
-def compiled(function: Function, folder: Path, **wrappers: bool) -> Function:
+def compiled(function: Function, folder: Path, **asked: bool | str) -> Function:
     """A function compiled by numba on its first call, its machine code kept in a folder.
 
     Parameters
     ----------
     function : of numbers and arrays
     folder : of this version's kernels; need not exist
-    wrappers : which entries numba leaves out
+    asked : further options of numba: entries to leave out, whether to inline
     """
     config: Any = numba.config
     compiling: Any = numba.njit
-    options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **wrappers}
+    options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **asked}
     before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
     config.CACHE_DIR = str(folder)
     config.CACHE_LOCATOR_CLASSES = f"{__name__}.{SharedByCopies.__name__}"

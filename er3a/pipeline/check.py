@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import chdir
 from pathlib import Path
 
@@ -147,10 +147,10 @@ _CHECKS: dict[str, tuple[str, Callable[[Path], object]]] = {
 PROGRAM = "a robot program"
 
 
-def check_file(path: Path) -> str:
+def check_file(path: Path, xacro: Sequence[str] = ()) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    A folder means the study in it.
+    A folder means the study in it. ``xacro``: arguments of a xacro file, ``NAME:=VALUE``.
 
     Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
     where it stands, stands in, or else the working folder.
@@ -169,7 +169,7 @@ def check_file(path: Path) -> str:
         read_dh_table(path, "arm")
         return "a D-H table"
     if path.suffix in URDF and path.exists():
-        load_robot(path)
+        load_robot(path, xacro=xacro)
         return URDF_FILE
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():

@@ -468,13 +468,15 @@ def robot_name(path: Path) -> str:
 
     Parameters
     ----------
-    path : only its stem matters
+    path : only its stem matters, of ``arm.urdf.xacro`` the ``arm``
 
     Returns
     -------
     name : small letters, digits and underscores, 64 at most; ``imported`` if nothing is left
     """
-    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower()).strip("_")[:64]
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower().removesuffix(".urdf")).strip(
+        "_"
+    )[:64]
     return name or "imported"
 
 

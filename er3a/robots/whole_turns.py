@@ -441,15 +441,6 @@ def _room(q: Reals, lattice: Lattice, limits: Limits) -> tuple[Reals, Reals, Rea
 
 
 @inner_kernel
-def _some(least: Reals, most: Reals) -> bool:
-    """Whether there is a turn of each row between the two."""
-    some = True
-    for i in range(least.shape[0]):
-        some &= least[i] <= most[i]
-    return some
-
-
-@inner_kernel
 def _combine(combinations: Reals, q: Reals, out: Reals) -> None:
     """Fill out (k,) with combinations (k, n) of joints (n,)."""
     for i in range(combinations.shape[0]):
@@ -466,7 +457,7 @@ def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int
     m, rows = G.shape
     least, most, low, high = _room(q, lattice, limits)
     value, at, count, i = np.empty((rows + 1, m)), least - 1.0, 0, 0
-    if not _some(least, most):
+    if (least > most).any():
         return 0
     _combine(lines, q, value[0])
     while i >= 0:
@@ -518,7 +509,7 @@ def _nearest(Q: Reals, refs: Reals, lattice: Lattice, limits: Limits, out: tuple
         q, ref, lower, upper = Q[pose], refs[pose], lowers[pose], uppers[pose]
         left[pose], max_move, total = np.inf, np.inf, np.inf
         least, most, low, high = _room(q, lattice, (lower, upper, away))
-        if not _some(least, most):
+        if (least > most).any():
             continue
         _combine(counts, ref - q, middle)
         for i in range(rows):

@@ -17,10 +17,8 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
 from er3a.collision.pairs import Pair
-from er3a.collision.scene import Scene
 from er3a.finding import Amount, Finding, fact
 from er3a.geometry.transforms import rot_z, skew, translation
 from er3a.kinematics.inverse import inverse
@@ -91,7 +89,6 @@ class GraspNeeds:
     probability: float = 0.0
 
 
-GraspRefusal = Finding
 _FAR = (
     *("grasp_out_of_reach", "grasp_near_limits", "grasp_singular", "grasp_collides"),
     *("line_leaves", "line_unproven", "way_collides", "no_transfer", "grasp_unlikely"),
@@ -134,7 +131,7 @@ class GraspPlan:
     """What becomes of an object: a grasp, or why none; counts of poses, solutions, and those followed."""
 
     chosen: ChosenGrasp | None
-    refusal: GraspRefusal | None
+    refusal: Finding | None
     poses: int
     solutions: int
     followed: int
@@ -159,8 +156,7 @@ class GraspTask:
     """
 
     robot: Robot
-    scene: Scene | None
-    bodies: Bodies | None
+    bodies: Bodies
     home: Reals
     needs: GraspNeeds
     limits: JointLimits
@@ -219,7 +215,7 @@ def _poses(target: DetectedObject, T_base_object: Reals) -> list[tuple[str, floa
     ]
 
 
-def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[list[_Candidate], GraspRefusal | None]:
+def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[list[_Candidate], Finding | None]:
     """Candidates that pass at the grasp, the one with the largest margin first; else what the best of them lacks."""
     needs, robot = task.needs, task.robot
     if not candidates:
@@ -239,23 +235,19 @@ def _judged(task: GraspTask, candidates: list[_Candidate], poses: int) -> tuple[
         )
     value = value[value >= needs.singular_value]
     margins = np.minimum(_ratio(limit[regular], needs.limit_margin), _ratio(value, needs.singular_value))
-    if task.bodies is not None:
-        clear = clearance(robot, q[regular], task.scene)
-        margins = np.minimum(margins, _ratio(clear.distance, needs.clearance))
-        free = clear.distance >= needs.clearance
-        if not free.any():
-            best = clear.distance.argmax()
-            pair = clear.pair[best]
-            if pair is not None:
-                return [], fact(
-                    "grasp_collides",
-                    part=None,
-                    solutions=len(regular),
-                    pair=pair,
-                    clearance_mm=float(1000 * clear.distance[best]),
-                    needed_mm=1000 * needs.clearance,
-                )
-        regular, margins = regular[free], margins[free]
+    distance, pair = task.bodies.min_distance(q[regular])
+    free = distance >= needs.clearance
+    if not free.any():
+        best = int(distance.argmax())
+        return [], fact(
+            "grasp_collides",
+            part=None,
+            solutions=len(regular),
+            pair=task.bodies.pairs[pair[best]],
+            clearance_mm=float(1000 * distance[best]),
+            needed_mm=1000 * needs.clearance,
+        )
+    regular, margins = regular[free], np.minimum(margins, _ratio(distance, needs.clearance))[free]
     far = np.abs(q[regular] - task.home).max(axis=1)
     order = np.lexsort([far.round(TIE), -np.minimum(margins, 3.0).round(TIE)])
     return [candidates[regular[k]] for k in order], None
@@ -266,7 +258,7 @@ def _ratio(value: Reals, needed: float) -> Reals:
     return np.asarray(value) / needed if needed > 0 else np.full(np.shape(value), np.inf)
 
 
-def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) -> ChosenGrasp | GraspRefusal:
+def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) -> ChosenGrasp | Finding:
     robot, T, needs = task.robot, candidate.T, task.needs
     before = T @ translation(0, 0, -target.approach)
     after = translation(0, 0, target.retreat) @ T
@@ -297,7 +289,7 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
     value = float(conditioning(robot, every).smallest_singular_value.min())
     if (refusal := _too_near(task, "move", moves)) is not None:
         return refusal
-    smallest = min_clearance(task.bodies, (*moves, *lines)) if task.bodies is not None else None
+    smallest = min_clearance(task.bodies, (*moves, *lines))
     asked = (
         (limit, needs.limit_margin),
         (value, needs.singular_value),
@@ -322,7 +314,7 @@ def _followed(task: GraspTask, candidate: _Candidate, target: DetectedObject) ->
 
 
 def _too_near(task: GraspTask, part: Part, legs: tuple[GraspLeg, ...]) -> Finding | None:
-    smallest = min_clearance(task.bodies, legs) if task.bodies is not None else None
+    smallest = min_clearance(task.bodies, legs)
     if smallest is None or smallest[0] >= task.needs.clearance:
         return None
     return fact(

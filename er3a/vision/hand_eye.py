@@ -40,10 +40,20 @@ from er3a.geometry.transforms import (
 )
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
-from er3a.vision import calibration_set, vision_findings
+from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import mean_pose, park, shah
-from er3a.vision.likelihood import UNKNOWNS, PoseObservations, Refined, half_width, refine, residuals
+from er3a.vision.likelihood import (
+    GROUPS,
+    START_DEVIATIONS,
+    UNKNOWNS,
+    PoseObservations,
+    Refined,
+    half_width,
+    refine,
+    residuals,
+)
 from er3a.vision.typical_causes import DistanceFit, moved_between, wrong_distances, wrong_zero
+from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 DEVIATIONS = 20.0  # of the angle between two samples; beyond, a pair is in conflict. Tilts seen head-on are as vague
 MAX_DEVIATION = np.radians(2.0)  # of a camera that is of any use
@@ -51,13 +61,13 @@ ROUNDING = 1e-6  # rad
 MOSTLY_APART = 0.8  # of samples that stand apart, so that their residuals are judged as independent
 COPY_DECIMALS = 9  # of m and of rotation matrices
 FALSE_ALARMS = 1e-3  # of sound sets in which a sample is called far from the fit
-BOARD_TURNS: dict[vision_findings.SuspectKind, tuple[str, tuple[float, ...]]] = {  # axis of the board, and deg
+BOARD_TURNS = {  # axis of the board, and deg
     "half_turn_x": ("x", (180.0,)),
     "half_turn_y": ("y", (180.0,)),
     "half_turn_z": ("z", (180.0,)),
     "quarter_turn_z": ("z", (90.0, -90.0)),
 }
-MEND_KINDS: tuple[vision_findings.SuspectKind, ...] = (*BOARD_TURNS, "mirrored_tilt")
+MEND_KINDS = (*BOARD_TURNS, "mirrored_tilt")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +102,7 @@ def angles_between(R: Reals) -> Reals:
     return rotation_angle(R[:, None], R[None])
 
 
-def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
+def check_angles(samples: CalibrationSet) -> AngleCheck:
     """Find samples whose turning angles contradict the others': hand and board turn by equal angles [1]_.
 
     Parameters
@@ -131,7 +141,7 @@ def check_angles(samples: calibration_set.CalibrationSet) -> AngleCheck:
     return AngleCheck(mismatch, tolerance, used, found, None)
 
 
-def _tolerance(samples: calibration_set.CalibrationSet, mismatch: Reals) -> float:
+def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
     """Half of the mismatches of sound pairs lie below 0.674 standard deviations."""
     deviation = min(float(np.median(mismatch)) / 0.674, MAX_DEVIATION)
     if samples.camera_covariance is not None:
@@ -154,9 +164,8 @@ def _agreeing(conflict: Flags) -> Flags:
         used[int(count.argmax())] = False
 
 
-def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> vision_findings.SuspectKind:
-    best = tolerance
-    mending: vision_findings.SuspectKind = "rotation"
+def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: float) -> str:
+    best, mending = tolerance, "rotation"
     for kind in MEND_KINDS:
         for R in _rotation_candidates(target[i], kind):
             angle = rotation_angle(transposed(R)[None], transposed(target[used, :3, :3]))
@@ -166,7 +175,7 @@ def _mending_turn(target: Reals, turned: Reals, i: int, used: Flags, tolerance: 
     return mending
 
 
-def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Reals]:
+def _rotation_candidates(T: Reals, kind: str) -> list[Reals]:
     """The rotations (3, 3) that a detection may have been mistaken for."""
     R = T[:3, :3]
     if kind == "mirrored_tilt":
@@ -177,7 +186,7 @@ def _rotation_candidates(T: Reals, kind: vision_findings.SuspectKind) -> list[Re
     return [R @ Rotation.from_euler(axis, turn, degrees=True).as_matrix() for turn in turns]
 
 
-def worst_sample(samples: calibration_set.CalibrationSet, refined: Refined) -> tuple[int, Finding] | None:
+def worst_sample(samples: CalibrationSet, refined: Refined) -> tuple[int, Finding] | None:
     """The sample whose residuals are too large compared with those of all others.
 
     The share by which a sample pulls the fit towards itself is taken back from its six residuals. Over the others'
@@ -215,7 +224,7 @@ def worst_sample(samples: calibration_set.CalibrationSet, refined: Refined) -> t
     )
 
 
-def _copies(samples: calibration_set.CalibrationSet) -> Flags:
+def _copies(samples: CalibrationSet) -> Flags:
     """Samples (N,) equal to an earlier one in both poses, which measure nothing and would narrow intervals."""
     rows = np.concatenate([samples.flange, samples.target], axis=1).reshape(len(samples), -1).round(COPY_DECIMALS)
     copies = np.ones(len(samples), bool)
@@ -227,7 +236,7 @@ MUCH_DISTANCE, MUCH_ROTATION = 0.01, np.radians(3)  # m, rad
 MISREAD = 0.3  # of these, below which no wrong convention leaves residuals
 MUCH_BETTER = 5
 AS_GOOD = 1.5  # ratio of residuals, within which two conventions explain the samples equally well
-STREAMS: tuple[vision_findings.Streams, ...] = ("flange", "target", "both")
+STREAMS = ("flange", "target", "both")
 
 
 def _rotations(read: Callable[[Reals], Reals]) -> Callable[[Reals], Reals]:
@@ -252,7 +261,7 @@ def _axes(rows: list[list[int]]) -> Callable[[Reals], Reals]:
     return lambda T: posed(T[:, :3, :3], T[:, :3, 3] @ np.array(rows).T)
 
 
-CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
+CONVENTIONS: dict[str, Callable[[Reals], Reals]] = {
     "inverted": inverted,
     "transposed": _rotations(lambda T: transposed(T[:, :3, :3])),
     "real_part_first": _quaternions(2),
@@ -267,7 +276,7 @@ CONVENTIONS: dict[vision_findings.Convention, Callable[[Reals], Reals]] = {
 """How poses may have been meant, from how they are read."""
 
 
-def other_conventions(samples: calibration_set.CalibrationSet, residual: Reals) -> tuple[Finding, ...]:
+def other_conventions(samples: CalibrationSet, residual: Reals) -> tuple[Finding, ...]:
     """Conventions by which the samples fit much better than as they were read, all that fit equally well.
 
     Parameters
@@ -381,7 +390,7 @@ class HandEye(ByValue, Displayed):
     without_suspects : (2,), m and rad: how far X moves if the samples taken out are left in; None if there are none
     """
 
-    samples: calibration_set.CalibrationSet
+    samples: CalibrationSet
     used: Flags
     X: Reals
     Y: Reals
@@ -392,8 +401,8 @@ class HandEye(ByValue, Displayed):
     deviations: Reals
     greatest_turn: float
     axes_apart: float
-    suspects: tuple[vision_findings.Suspect, ...]
-    warnings: tuple[vision_findings.CalibrationWarning, ...]
+    suspects: tuple[Finding, ...]
+    warnings: tuple[Finding, ...]
     without_suspects: Reals | None
     touch: TouchCheck | None
     mismatch: Reals
@@ -402,11 +411,6 @@ class HandEye(ByValue, Displayed):
     def copies(self) -> tuple[str, ...]:
         """Names of samples left out as equal to an earlier one in both poses."""
         return tuple(name for name, copy in zip(self.samples.names, _copies(self.samples)) if copy)
-
-    @property
-    def rejected(self) -> tuple[str, ...]:
-        """Names of the samples that contradict the others, so that the calibration does not use them."""
-        return tuple(each.sample for each in self.suspects)
 
     def sheet(self) -> Sheet:
         """What the notebook shows: the twelve numbers in mm and deg, with half their 95 % intervals.
@@ -429,7 +433,7 @@ class HandEye(ByValue, Displayed):
         return Sheet.of_table(heading, columns, rows, len(rows), facts)
 
 
-def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
+def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     """Estimate the poses of camera and board, with 95 % intervals, and check every sample.
 
     Parameters
@@ -449,7 +453,7 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
     angles = check_angles(samples)
     once = ~_copies(samples)
     used = angles.used & once
-    suspects: list[vision_findings.Suspect] = list(angles.found)
+    suspects: list[Finding] = list(angles.found)
     greatest, apart = _check_determined(samples.take(used))
     refined = _fitted(samples.take(used))
     while used.sum() > FEW_SAMPLES and (worst := worst_sample(samples.take(used), refined)):
@@ -458,11 +462,11 @@ def calibrate_hand_eye(samples: calibration_set.CalibrationSet) -> HandEye:
         greatest, apart = _check_determined(samples.take(used))
         refined = _fitted(samples.take(used))
     kept = samples.take(used)
-    warnings: list[vision_findings.CalibrationWarning] = [angles.warning] if angles.warning else []
+    warnings: list[Finding] = [angles.warning] if angles.warning else []
     distances = wrong_distances(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, distances)
     share = len(set(kept.places.tolist())) / len(kept)
-    named = {each.code for each in vision_findings.grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
+    named = {each.code for each in grave_warnings(warnings)} - {"unexplained_residuals", "more_scatter"}
     if not named and share > MOSTLY_APART:
         every = samples.take(once)
         step = moved_between(every, refined if used[once].all() else _fitted(every))
@@ -504,10 +508,10 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     """
     used = found.samples.take(found.used)
     tried = wrong_zero(found.samples, used, refine(PoseObservations.of(used), found.X, found.Y), robot)
-    explained = {each.code for each in vision_findings.grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
+    explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if tried.zero and tried.mended and explained:
-        with suppress(vision_findings.HandEyeError):
-            if not vision_findings.grave_warnings(calibrate_hand_eye(tried.mended).warnings):
+        with suppress(HandEyeError):
+            if not grave_warnings(calibrate_hand_eye(tried.mended).warnings):
                 others = tuple(each for each in found.warnings if each.code not in EXPLAINED_BY_A_ZERO)
                 found = replace(found, warnings=(tried.zero, *others))
     return found, tried.unseen, tried.smallest
@@ -518,23 +522,9 @@ EXPLAINED_BY_A_ZERO = {
 }
 
 
-def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Reals]:
-    """The closed-form answer with the smallest residuals, of Park's and Shah's.
-
-    Parameters
-    ----------
-    F, B : (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`
-    deviations : (2,), m and rad, by which residuals are divided
-
-    Returns
-    -------
-    X, Y : (4, 4), m
-
-    Raises
-    ------
-    HandEyeError
-        if no method has one
-    """
+def _best_closed_form(F: Reals, B: Reals) -> tuple[Reals, Reals]:
+    """The closed-form answer with the smallest residuals, of Park's and Shah's: X and Y (4, 4), m, from F and B
+    (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`."""
     best: tuple[float, Reals, Reals] | None = None
     for solve in (park, shah):
         try:
@@ -542,25 +532,25 @@ def best_closed_form(F: Reals, B: Reals, deviations: Reals) -> tuple[Reals, Real
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(X).all() and np.isfinite(Y).all():
-            cost = float(np.sum((residuals(F, B, X, Y)[0] / np.repeat(deviations, 3)) ** 2))
+            cost = float(((residuals(F, B, X, Y)[0] / START_DEVIATIONS[GROUPS]) ** 2).sum())
             best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
     if best is None:
-        raise vision_findings.HandEyeError(fact("nothing_fits"))
+        raise HandEyeError(fact("nothing_fits"))
     return best[1], best[2]
 
 
-def _fitted(samples: calibration_set.CalibrationSet) -> Refined:
+def _fitted(samples: CalibrationSet) -> Refined:
     seen = PoseObservations.of(samples)
     try:
-        found = refine(seen, *best_closed_form(samples.hand, samples.target, np.array([1e-3, 5e-3])))
+        found = refine(seen, *_best_closed_form(samples.hand, samples.target))
     except np.linalg.LinAlgError:
-        raise vision_findings.HandEyeError(fact("nothing_fits")) from None
+        raise HandEyeError(fact("nothing_fits")) from None
     if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
-        raise vision_findings.HandEyeError(fact("nothing_fits"))
+        raise HandEyeError(fact("nothing_fits"))
     return found
 
 
-def _shared_covariance(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:
+def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
     """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
     if samples.shared is None:
         return np.zeros((UNKNOWNS, UNKNOWNS))
@@ -579,37 +569,37 @@ def _wider(half: Reals, refined: Refined, distances: tuple[DistanceFit, ...]) ->
     return half
 
 
-def _check_determined(samples: calibration_set.CalibrationSet) -> tuple[float, float]:
+def _check_determined(samples: CalibrationSet) -> tuple[float, float]:
     """The largest turn between two samples and how far the rotation axes leave one direction, rad."""
     if len(samples) < MIN_SAMPLES:
-        raise vision_findings.HandEyeError(fact("too_few_samples", samples=len(samples), needed=MIN_SAMPLES))
+        raise HandEyeError(fact("too_few_samples", samples=len(samples), needed=MIN_SAMPLES))
     for stream in ("flange", "target"):
         poses = getattr(samples, stream)
         if np.abs(step_between(poses[:1], poses)).max() < EQUAL:
-            raise vision_findings.HandEyeError(fact("all_samples_equal", stream=stream))  # type: ignore[arg-type]
+            raise HandEyeError(fact("all_samples_equal", stream=stream))
     R = samples.hand[:, :3, :3]
     greatest = float(angles_between(R).max())
     if greatest < MIN_TURN:
-        raise vision_findings.HandEyeError(fact("no_rotation", greatest_turn_deg=float(np.degrees(greatest))))
+        raise HandEyeError(fact("no_rotation", greatest_turn_deg=float(np.degrees(greatest))))
     i, j = np.triu_indices(len(samples), 1)
     turns = log_rotation(transposed(R[j]) @ R[i])
     _, size, axes = np.linalg.svd(turns, full_matrices=False)
     apart = float(np.arctan2(size[1], size[0]))
     if apart < MIN_SPREAD:
-        raise vision_findings.HandEyeError(
+        raise HandEyeError(
             fact("parallel_axes", axis=tuple(axes[0].round(2).tolist()), spread_deg=float(np.degrees(apart)))
         )
     return greatest, apart
 
 
 def _warnings(
-    samples: calibration_set.CalibrationSet,
+    samples: CalibrationSet,
     refined: Refined,
     greatest: float,
     apart: float,
     distances: tuple[DistanceFit, ...],
-) -> list[vision_findings.CalibrationWarning]:
-    found: list[vision_findings.CalibrationWarning] = []
+) -> list[Finding]:
+    found: list[Finding] = []
     if not refined.converged:
         found.append(fact("not_converged", samples=len(samples)))
     if greatest < LITTLE_TURN or apart < LITTLE_SPREAD:
@@ -628,7 +618,7 @@ def _warnings(
         return [*found, *read]
     found += [each.finding for each in distances if each.sure]
     size, distance, turn = _misfit(refined.residual)
-    if size > 1 and not vision_findings.grave_warnings(found):
+    if size > 1 and not grave_warnings(found):
         found.append(fact("unexplained_residuals", rms_mm=distance, rms_deg=turn))
     return found
 
@@ -636,7 +626,7 @@ def _warnings(
 _PARTS = (slice(3), slice(3, 6))
 
 
-def _shift_with_all(samples: calibration_set.CalibrationSet, refined: Refined) -> Reals:
+def _shift_with_all(samples: CalibrationSet, refined: Refined) -> Reals:
     step = step_between(refined.X, _fitted(samples).X)
     return np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])])
 
@@ -657,21 +647,6 @@ def _touch(found: HandEye, touched: Reals) -> TouchCheck:
     return TouchCheck(difference, half_width, probability)
 
 
-def board_poses(found: HandEye) -> Reals:
-    """Where each sample puts the board: F X B, all equal to Y without errors.
-
-    Parameters
-    ----------
-    found : a calibration of N samples
-
-    Returns
-    -------
-    T : (N, 4, 4), m, T_base_board for a camera on the flange, else T_flange_board
-    """
-    poses: Reals = found.samples.hand @ found.X @ found.samples.target
-    return poses
-
-
 def spread_of(found: HandEye) -> tuple[float, float]:
     """How much the used samples' board poses scatter about their mean.
 
@@ -683,7 +658,7 @@ def spread_of(found: HandEye) -> tuple[float, float]:
     -------
     distance, angle : root mean squares, m and rad
     """
-    poses = board_poses(found)[found.used]
+    poses = (found.samples.hand @ found.X @ found.samples.target)[found.used]  # all equal to Y without errors
     step = step_between(mean_pose(poses), poses)
     size = [np.linalg.norm(step[:, part], axis=1) for part in _PARTS]
     return float(np.sqrt((size[0] ** 2).mean())), float(np.sqrt((size[1] ** 2).mean()))

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 import scipy
@@ -30,7 +29,6 @@ from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.robots.joint_limits import joint_names
 from er3a.robots.robot import Robot
-from er3a.vision import vision_findings
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.likelihood import (
     CONFIDENCE,
@@ -56,8 +54,6 @@ MIN_BLOCK = 2  # samples on either side of a step
 MIN_STEP = 1e-9  # m, rad; less is rounding, of poses that a simulation gives without errors
 ZERO_CHANCE = 1e-4  # of sound sets in which a zero is called wrong
 MIN_ZERO = np.radians(0.5)  # below which a joint's zero is not named
-
-DistanceError = Literal["board", "focal_length", "principal_point_x", "principal_point_y"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +157,9 @@ def _matrix(*entries: tuple[int, int]) -> Reals:
     return D
 
 
-MATRICES: dict[DistanceError, Reals] = {
-    "board": np.eye(3),
+FACTORS = "board_scale", "focal_length"
+MATRICES: dict[str, Reals] = {
+    "board_scale": np.eye(3),
     "focal_length": _matrix((2, 2)),
     "principal_point_x": _matrix((0, 2)),
     "principal_point_y": _matrix((1, 2)),
@@ -179,7 +176,7 @@ class DistanceFit:
     sure : whether chance does not explain it, so that it is named
     """
 
-    finding: vision_findings.WrongDistances
+    finding: Finding
     refined: Refined
     sure: bool
 
@@ -214,21 +211,18 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
     return tuple(replace(each, sure=each.sure and each.refined.squares <= most) for each in found)
 
 
-def _finding(name: DistanceError, value: float, half_width: float) -> vision_findings.WrongDistances:
-    if name == "board":
-        return fact("board_scale", factor=1 + value, half_width=half_width)
-    if name == "focal_length":
-        return fact("focal_length", factor=1 + value, half_width=half_width)
-    axis: Literal["x", "y"] = "x" if name == "principal_point_x" else "y"
-    return fact("principal_point", axis=axis, percent=100 * value, half_width_percent=100 * half_width)
+def _finding(name: str, value: float, half_width: float) -> Finding:
+    if name in FACTORS:
+        return fact(name, factor=1 + value, half_width=half_width)
+    return fact("principal_point", axis=name[-1], percent=100 * value, half_width_percent=100 * half_width)
 
 
-def _is_large(value: float, half_width: float, name: DistanceError) -> bool:
-    factor, least = (1 + value, MIN_SCALE_ERROR) if name in ("board", "focal_length") else (1.0, MIN_SHIFT)
+def _is_large(value: float, half_width: float, name: str) -> bool:
+    factor, least = (1 + value, MIN_SCALE_ERROR) if name in FACTORS else (1.0, MIN_SHIFT)
     return abs(value) > least and factor > SURE_SCALE * half_width
 
 
-def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
+def half_widths(name: str, samples: CalibrationSet, refined: Refined, fit: Refined) -> tuple[float, float]:
     """Half the 95 % intervals of a distance error, by its two sources.
 
     Parameters
@@ -248,7 +242,7 @@ def half_widths(name: DistanceError, samples: CalibrationSet, refined: Refined, 
     return own, float(scipy.special.ndtri((1 + CONFIDENCE) / 2) * np.linalg.norm(shifts))
 
 
-def fitted_distances(name: DistanceError, samples: CalibrationSet, refined: Refined) -> Refined:
+def fitted_distances(name: str, samples: CalibrationSet, refined: Refined) -> Refined:
     """The fit of both poses with an error of distances.
 
     Parameters
@@ -311,7 +305,7 @@ def moved_between(samples: CalibrationSet, refined: Refined) -> Finding | None:
         moved_mm=float(distance),
         moved_deg=float(turn),
         probability=chance,
-    )  # type: ignore[arg-type]
+    )
 
 
 def _step_at(samples: CalibrationSet, what: str, at: int) -> TypicalCause:

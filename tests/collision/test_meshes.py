@@ -151,7 +151,7 @@ def write_stl_head(path, triangles: int) -> None:
 
 BAD = {
     "in metres": ("can only be metres", "unit: m"),
-    "ten million triangles": ("has 10000000 triangles", "Simplify"),
+    "ten million triangles": ("larger than 200 MB", "Simplify"),
     "no format": ("is not a mesh format", "Save it as"),
     "empty": ("holds no triangles", "as triangles"),
     "nowhere": ("there is no such file", "Check"),

@@ -405,8 +405,8 @@ def test_without_xacrodoc_the_extra_is_named(xacro, monkeypatch):
 @pytest.mark.parametrize(
     ("mesh", "told"),
     [
-        ("gone.stl", r"shape that is left out \(.*gone\.stl is no file of a mesh"),
-        ("torn.stl", r"shape that is left out \(.*torn\.stl: holds no triangles"),
+        ("gone.stl", r"are left out \(.*gone\.stl is no file of a mesh"),
+        ("torn.stl", r"are left out \(.*torn\.stl: holds no triangles"),
         ("box.dae", r"box\.dae: can't be read without pycollada\. Install it: pip install 'er3a\[meshes\]'"),
     ],
 )

@@ -304,8 +304,21 @@ def test_shapes_of_which_one_could_not_be_read_are_assumed(tmp_path, more, grade
     found = import_urdf(written(tmp_path, urdf(extra=text)))
     source = found.robot.sources["envelopes"]
     assert source.grade == grade
-    assert ("but for shapes of l6 that could not be read" in source.source) == bool(more)
+    assert ("but for shapes of l6, which are left out" in source.source) == bool(more)
     assert arm_shapes(found.robot).assumed or not more
+
+
+def test_shapes_of_levers_that_are_left_out_make_the_arm_s_assumed(tmp_path):
+    box = shaped('<box size="0.1 0.1 0.1"/>')
+    levers = "".join(
+        f'{box.replace("l6", name)}<joint name="to_{name}" type="revolute"><parent link="l1"/><child link="{name}"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1"/><mimic joint="j2"/></joint>'
+        for name in ("lever", "rod")
+    )
+    found = import_urdf(written(tmp_path, urdf(extra=box + levers)))
+    assert arm_shapes(found.robot).assumed
+    assert "lever, rod" in found.robot.sources["envelopes"].source
+    assert len([note for note in found.notes if "rod" in note]) == 2  # the joints, and the shapes
 
 
 @pytest.mark.parametrize(("unit", "side"), [("", 0.12), ('<unit name="mm" meter="0.001"/>', 0.12), ("", 120.0)])

@@ -207,8 +207,8 @@ def test_a_focal_length_that_its_images_leave_open_is_no_wrong_board():
             "eye_to_hand", flange, views.target, camera_covariance=views.covariance, shared=views.shared
         )
         refined = refine(PoseObservations.of(samples), X, Y)
-        fit = fitted_distances("board", samples, refined)
-        factor, (alone, shared) = 1 + fit.values[0], half_widths("board", samples, refined, fit)
+        fit = fitted_distances("board_scale", samples, refined)
+        factor, (alone, shared) = 1 + fit.values[0], half_widths("board_scale", samples, refined, fit)
         half_width = np.hypot(alone, shared)
         scales.append([abs(factor - 1) / half_width, abs(factor - 1) / alone])
     beyond, beyond_alone = (np.array(scales) > 1).sum(axis=0)

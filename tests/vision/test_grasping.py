@@ -54,7 +54,7 @@ def task_of(cell, robot):
     file = load_vision(FOLDER / f"{cell.robot}.yaml", robot)
     scene = load_scene(SCENE)
     picture = None if file.picture_deg is None else np.radians(file.picture_deg)
-    task = GraspTask(robot, scene, Bodies(robot, scene), np.radians(file.home_deg), NEEDS, limits_of(robot), SPEED, 1)
+    task = GraspTask(robot, Bodies(robot, scene), np.radians(file.home_deg), NEEDS, limits_of(robot), SPEED, 1)
     return file, task, picture
 
 
@@ -200,9 +200,9 @@ def test_grasps_are_what_the_arm_can_carry_out(cell):
         np.testing.assert_allclose(away[-1] - away[0], [0, 0, target.retreat], atol=1e-6)
         every = np.concatenate([approach, retreat])
         assert within(robot, every).all()
-        assert clearance(robot, every, task.scene).distance.min() >= NEEDS.clearance
+        assert clearance(robot, every, task.bodies.scene).distance.min() >= NEEDS.clearance
         whole = np.concatenate([along(chosen, part, 301) for part in PARTS])
-        assert clearance(robot, whole, task.scene).distance.min() >= chosen.clearance
+        assert clearance(robot, whole, task.bodies.scene).distance.min() >= chosen.clearance
 
 
 def chosen_from(home, name="fixed_camera"):
@@ -227,9 +227,9 @@ def test_the_planner_leads_round_what_the_straight_move_meets(round_the_post):
     moves = [leg for leg in chosen.legs if leg.part == "move"]
     assert len(moves) > 1
     straight = np.linspace(BEHIND_THE_POST, chosen.q_before, 301)
-    assert clearance(robot, straight, task.scene).distance.min() < 0
+    assert clearance(robot, straight, task.bodies.scene).distance.min() < 0
     every = np.concatenate([leg.sampled(301)[1] for leg in chosen.legs])
-    assert clearance(robot, every, task.scene).distance.min() >= chosen.clearance > 0
+    assert clearance(robot, every, task.bodies.scene).distance.min() >= chosen.clearance > 0
     assert within(robot, every).all()
     np.testing.assert_allclose(moves[0].joints(np.zeros(1))[0], BEHIND_THE_POST)
     for leg, behind in pairwise(chosen.legs):
@@ -258,12 +258,12 @@ def test_the_move_to_the_approach_keeps_the_clearance_asked_for(monkeypatch):
     middle = forward(robot, (home + plan.chosen.q_before)[None] / 2)[0, :3, 3]
     outward = middle * [1, 1, 0] / np.hypot(*middle[:2])
     bump = Sphere("bump", transform(middle + 0.057 * outward, np.zeros(3)), 0.02)
-    scene = replace(task.scene, solids=(*task.scene.solids, bump))
+    scene = replace(task.bodies.scene, solids=(*task.bodies.scene.solids, bump))
     passed = clearance(robot, np.linspace(home, plan.chosen.q_before, 201), scene).distance.min()
     assert 0 < passed < NEEDS.clearance
     monkeypatch.setattr("er3a.vision.grasp_motion.way_around", lambda *given: fact("none_found", rounds=1))
     file, task, _ = task_of(FIXED, robot)
-    near = replace(task, home=home, scene=scene, bodies=Bodies(robot, scene))
+    near = replace(task, home=home, bodies=Bodies(robot, scene))
     target = file.objects[0].detected()
     found = calibrate_hand_eye(load_hand_eye(FOLDER / "fixed_camera.yaml", robot))
     T = seen_pose(found, target.T_camera_object)
@@ -328,7 +328,7 @@ def test_other_arms_grasp_along_straight_lines(name, home):
     """A UR by its own closed form, seven joints by short moves of the joints: the tool stays on the line."""
     robot = load_robot(name)
     limits = joint_limits(robot, np.full(len(robot.lower), np.pi), 0.25)
-    task = GraspTask(robot, None, Bodies(robot, None), np.radians(home), NEEDS, limits, SPEED, 1)
+    task = GraspTask(robot, Bodies(robot, None), np.radians(home), NEEDS, limits, SPEED, 1)
     T, certain = pose([0, 0, 10], [0.45, 0.1, 0.2]), np.eye(6) * 1e-10
     target = DetectedObject("thing", T, certain, 4, (Grasp("top", pose([180, 0, 0], [0, 0, 0.1])),), 0.08, 0.08)
     chosen = plan_grasp(task, target, T, lambda q: certain).chosen
@@ -347,7 +347,7 @@ def test_a_margin_asked_for_in_degrees_is_millimetres_of_a_slide():
     robot = scara()
     needs = GraspNeeds(0.0, np.radians(2), 0.0, (1.0,) * 6)
     limits = joint_limits(robot, np.array([3.0, 3, 0.5, 6]), 0.25)
-    task = GraspTask(robot, None, None, np.array([0.2, 0.4, 0.1, 0]), needs, limits, SPEED, 1)
+    task = GraspTask(robot, Bodies(robot, None), np.array([0.2, 0.4, 0.1, 0]), needs, limits, SPEED, 1)
     for slide, margin in ((0.150, 30), (0.179, 1)):
         T = forward(robot, np.array([0.3, 0.5, slide, 0.1]))
         target = DetectedObject("t", T, 1e-12 * np.eye(6), 1, (Grasp("g", np.eye(4)),), 0.02, 0.02)

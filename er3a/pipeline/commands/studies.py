@@ -76,6 +76,7 @@ def check(
         list[Path],
         typer.Argument(callback=options.given_files, help="robot, study, target, path, scene or reference files"),
     ],
+    xacro: options.Xacro = None,
     sarif: Annotated[Path | None, typer.Option(help="write the rules that URDFs break as SARIF 2.1.0")] = None,
     as_json: options.AsJson = False,
 ):
@@ -91,7 +92,7 @@ def check(
     for file in files:
         try:
             with noted_doubts() as doubts:
-                kind = check_file(file)
+                kind = check_file(file, xacro or ())
         except Er3aError as error:
             options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}

@@ -15,7 +15,6 @@ from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.language import as_text, words
 from er3a.pipeline.messages.say import WORDS, same_text, say, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
-from er3a.vision.vision_findings import Convention, Suspect
 
 PARTS = words({"move": "move to the approach", "approach": "approach", "retreat": "retreat"})
 MENDING = words(
@@ -37,7 +36,7 @@ STREAMS = words(
         "both": "flange and board",
     }
 )
-CONVENTIONS: dict[Convention, str] = words(
+CONVENTIONS: dict[str, str] = words(
     {
         "inverted": "its poses are inverted",
         "transposed": "its rotations are transposed",
@@ -226,7 +225,7 @@ def hand_eye_record(
     ``boardless``: images that it leaves out; ``open_tilts``: those that leave open which way the board is tilted.
     """
 
-    def named(findings: Sequence[Suspect | Finding]) -> list[dict[str, str]]:
+    def named(findings: Sequence[Finding]) -> list[dict[str, str]]:
         return [{"code": each.code, "sample": each.sample, "text": say(each)} for each in findings]
 
     def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:

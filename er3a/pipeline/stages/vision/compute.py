@@ -161,8 +161,6 @@ def corner_rows(found: HandEye, images: SeenImages | None) -> model.CornerRows:
 STAGE_NAME = "vision"
 LEG_ROWS = 13
 
-Found = Finding
-
 
 def compute(study: Study, name: str) -> model.VisionResults:
     """Calibrate the camera, place the detected objects, and plan grasps for a robot of the study.
@@ -381,9 +379,10 @@ def _planned(
         tuple(map(float, tolerance)),  # type: ignore[arg-type]
         settings.least_success,
     )
-    bodies = Bodies(robot, scene)
     speed = settings.line_speed_mm_s / 1000
-    task = GraspTask(robot, scene, bodies, meant(robot, np.array(task_file.home_deg)), needs, limits, speed, seed)
+    task = GraspTask(
+        robot, Bodies(robot, scene), meant(robot, np.array(task_file.home_deg)), needs, limits, speed, seed
+    )
     accuracy = task_file.arm.accuracy()
     camera = _camera_at(robot, found, picture)
     rows: Planned = []

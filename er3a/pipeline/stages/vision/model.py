@@ -10,8 +10,7 @@ from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Table, Texts, column, per_joint, vector
 from er3a.vision.calibration_set import Setup
-from er3a.vision.grasping import GraspRefusal
-from er3a.vision.vision_findings import CalibrationWarning, GraspOutcome, Suspect
+from er3a.vision.vision_findings import GraspOutcome
 
 Three = tuple[float, float, float]
 ROTATIONS = ("rx", "ry", "rz")
@@ -79,8 +78,8 @@ class CalibrationResult:
     spread_deg: float
     greatest_turn_deg: float
     axes_apart_deg: float
-    suspects: tuple[Suspect, ...]
-    warnings: tuple[CalibrationWarning, ...]
+    suspects: tuple[Finding, ...]
+    warnings: tuple[Finding, ...]
     moved_mm: float | None
     moved_deg: float | None
     touch: TouchResult | None
@@ -158,7 +157,7 @@ class ObjectResult:
     error_mm: ErrorParts | None
     error_deg: ErrorParts | None
     grasp: GraspResult | None
-    refusal: GraspRefusal | None
+    refusal: Finding | None
     poses: int
     solutions: int
     followed: int
