@@ -27,6 +27,7 @@ from er3a.collision.shapes import Body, arm_bodies, carried_bodies, depth_inside
 from er3a.errors import Er3aError
 from er3a.finding import fact
 from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.robots.joint_limits import but_for_turns
 from er3a.robots.robot import Robot
 
 
@@ -181,6 +182,23 @@ class Bodies:
             distances = self.distances(q[row], pairs)
             pair[row], smallest[row] = pairs[distances.argmin()], distances.min()
         return smallest, pair
+
+    def min_distance_of_turns(self, q: Reals) -> tuple[Reals, Integers]:
+        """As :meth:`min_distance`, for arm poses many of which are others but for whole turns: those are measured once.
+
+        Parameters
+        ----------
+        q : (N, n), rad or m
+
+        Returns
+        -------
+        distance, pair : (N,), m, and numbers of pairs
+        """
+        if self.robot.coupling is not None:
+            return self.min_distance(q)
+        _, first, inverse = np.unique(but_for_turns(self.robot, q), axis=0, return_index=True, return_inverse=True)
+        smallest, pair = self.min_distance(q[first])
+        return smallest[inverse.reshape(-1)], pair[inverse.reshape(-1)]
 
     def overlaps(self, q: Reals) -> Flags:
         """Which pairs overlap, for many arm poses.

@@ -24,6 +24,7 @@ from er3a.collision.convex import (
     ROOM,
     above_plane,
     cores_distance,
+    lines_distance,
     support,
 )
 from er3a.collision.triangles import Trees, surface_above_plane, surface_distance
@@ -107,6 +108,8 @@ def pair_distance(
             return above_plane(w, i, i_end, disc[a], j, near) - sizes, False
         normal = (w[j, 0], w[j, 1], w[j, 2])
         return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
+    if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
+        return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
     core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near)
     if convex or core - sizes > max(far, 0.0):
         return core - sizes, core == 0.0

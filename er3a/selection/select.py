@@ -358,7 +358,7 @@ def refusals_of(bodies: Bodies, solutions: Solutions) -> tuple[Finding | None, .
     """
     refused: list[Finding | None] = list(solutions.reason)
     inside = np.flatnonzero(solutions.within_limits)
-    distance, pair = bodies.min_distance(solutions.q[inside])
+    distance, pair = bodies.min_distance_of_turns(solutions.q[inside])
     overlaps: dict[tuple[int, float], Finding] = {}  # turns share theirs
     for row, depth, number in zip(inside.tolist(), (-distance).tolist(), pair.tolist()):
         if depth > COLLIDES:
@@ -528,7 +528,7 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
     """Rows within the limits and free of collisions; a pose without any is refused."""
     rows = np.flatnonzero(solutions.within_limits)
     if rows.size:
-        rows = rows[bodies_of(robot, scene).min_distance(solutions.q[rows])[0] >= 0]
+        rows = rows[bodies_of(robot, scene).min_distance_of_turns(solutions.q[rows])[0] >= 0]
     if not rows.size:
         raise Er3aError(f"pose {number} of the sequence has no solution within the limits and free of collisions")
     return rows

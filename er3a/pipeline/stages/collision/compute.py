@@ -62,7 +62,7 @@ def target_clearances(
         rows = np.flatnonzero(solutions.within_limits)
         if not rows.size:
             continue
-        distance, pair = bodies.min_distance(solutions.q[rows])
+        distance, pair = bodies.min_distance_of_turns(solutions.q[rows])
         tables.append(
             model.TargetClearances.of(
                 target=target.name,
