@@ -233,7 +233,8 @@ def calibrate(
     found = calibration.calibrate(robot, measurements, fixed)
     text = f"Calibrated with {found.coordinates} measured coordinates, starting from the table of {robot.name}"
     source = Source(text, "inferred")
-    named = ["dh", "zero"] + [name for name in PLACEMENTS if not np.array_equal(*_both(found.robot, robot, name))]
+    own, before = vars(found.robot), vars(robot)
+    named = ["dh", "zero"] + [name for name in PLACEMENTS if not np.array_equal(own[name], before[name])]
     named += ["coupling"] if found.ratios else []
     return replace(found, robot=found.robot.replace(sources=dict(robot.sources) | dict.fromkeys(named, source)))
 
@@ -288,7 +289,3 @@ def _known(path: str | Path, where: str, known: dict[Any, Any], wanted: object) 
     if wanted not in known:
         raise InputError(path, where, f"the robot has no {wanted}", WRITE_CALIBRATION)
     return known[wanted]
-
-
-def _both(first: Robot, second: Robot, name: str) -> tuple[Reals, Reals]:
-    return getattr(first, name), getattr(second, name)

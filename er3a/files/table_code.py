@@ -133,13 +133,13 @@ def _rows(group: CodeGroup) -> list[list[str]]:
         return [row_cells(each[1:-1]) for each in inner]
     lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
     matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
-    if not matrix or len(lines) < 2 or (";" not in group.inside and any(map(_goes_on, lines[:-1]))):
+    if (
+        not matrix
+        or len(lines) < 2
+        or (";" not in group.inside and any(each.rstrip().endswith(",") for each in lines[:-1]))
+    ):
         return []
     return [row_cells(each.strip().strip("[],")) for each in lines]
-
-
-def _goes_on(line: str) -> bool:
-    return line.rstrip().endswith(",")
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:

@@ -54,10 +54,7 @@ def _digest(views: bool) -> str:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*")):
         name = path.relative_to(_PACKAGE)
-        if path.suffix in _KINDS and name.parts[0] != "shipped" and (views or not _is_view(name)):
+        is_view = name.parts[0] == "pipeline" and not VIEWS.isdisjoint(name.parts)
+        if path.suffix in _KINDS and name.parts[0] != "shipped" and (views or not is_view):
             digest.update(name.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def _is_view(name: Path) -> bool:
-    return name.parts[0] == "pipeline" and not VIEWS.isdisjoint(name.parts)

@@ -106,8 +106,12 @@ class ModelState:
 class Quantity(ABC):
     """One number about an arm; ``depends_on_table``: not on the joints' limits and speeds alone."""
 
-    unit: ClassVar[Unit] = "mm"
     depends_on_table: ClassVar[bool] = True
+
+    @property
+    def unit(self) -> Unit:
+        """Of its value."""
+        return "mm"
 
     @property
     def arm_pose(self) -> Pose:
@@ -433,13 +437,38 @@ class SegmentAngle(Quantity):
 
 
 @dataclass(frozen=True)
-class Limit(Quantity):
-    """A joint's ``lower`` or ``upper`` limit."""
+class OfJoint(Quantity):
+    """What the robot's file says of a joint besides the table; ``slides``: the joint is prismatic."""
 
     joint: int
-    side: Side
+    slides: bool = field(default=False, kw_only=True)
     depends_on_table: ClassVar[bool] = False
-    unit: ClassVar[Unit] = "deg"
+
+    def as_stated(self, values: Reals) -> Reals:
+        """The joint's own of all joints' values.
+
+        Parameters
+        ----------
+        values : (..., n), rad or m, or these per second
+
+        Returns
+        -------
+        value : (...), deg or mm, or these per second
+        """
+        own = values[..., self.joint - 1]
+        return own * MM if self.slides else np.degrees(own)
+
+
+@dataclass(frozen=True)
+class Limit(OfJoint):
+    """A joint's ``lower`` or ``upper`` limit."""
+
+    side: Side
+
+    @property
+    def unit(self) -> Unit:
+        """deg, or mm of a prismatic joint."""
+        return "mm" if self.slides else "deg"
 
     def value(self, state: ModelState) -> Reals:
         """The joint's limit of the robot's file.
@@ -450,40 +479,20 @@ class Limit(Quantity):
 
         Returns
         -------
-        limit : (...), deg
+        limit : (...), deg, or mm of a prismatic joint
         """
         limits = state.lower if self.side == "lower" else state.upper
-        return np.degrees(limits[..., self.joint - 1])
+        return self.as_stated(limits)
 
 
 @dataclass(frozen=True)
-class SlideLimit(Limit):
-    """A limit of a prismatic joint."""
-
-    unit: ClassVar[Unit] = "mm"
-
-    def value(self, state: ModelState) -> Reals:
-        """The prismatic joint's limit of the robot's file.
-
-        Parameters
-        ----------
-        state : of one model, or of a batch
-
-        Returns
-        -------
-        limit : (...), mm
-        """
-        # The limit is in m; the class above has made degrees of it as if it were in rad.
-        return np.radians(super().value(state)) * MM
-
-
-@dataclass(frozen=True)
-class Speed(Quantity):
+class Speed(OfJoint):
     """A joint's maximum speed; NaN where the robot's file gives none."""
 
-    joint: int
-    depends_on_table: ClassVar[bool] = False
-    unit: ClassVar[Unit] = "deg/s"
+    @property
+    def unit(self) -> Unit:
+        """deg/s, or mm/s of a prismatic joint."""
+        return "mm/s" if self.slides else "deg/s"
 
     def value(self, state: ModelState) -> Reals:
         """The joint's maximum speed of the robot's file.
@@ -494,29 +503,9 @@ class Speed(Quantity):
 
         Returns
         -------
-        speed : (...), deg/s, NaN where it is unknown
+        speed : (...), deg/s, or mm/s of a prismatic joint; NaN where it is unknown
         """
-        return np.degrees(state.speed[..., self.joint - 1])
-
-
-@dataclass(frozen=True)
-class SlideSpeed(Speed):
-    """The maximum speed of a prismatic joint."""
-
-    unit: ClassVar[Unit] = "mm/s"
-
-    def value(self, state: ModelState) -> Reals:
-        """The prismatic joint's maximum speed of the robot's file.
-
-        Parameters
-        ----------
-        state : of one model, or of a batch
-
-        Returns
-        -------
-        speed : (...), mm/s, NaN where it is unknown
-        """
-        return np.asarray(state.speed[..., self.joint - 1] * MM)
+        return self.as_stated(state.speed)
 
 
 @dataclass(frozen=True)
@@ -671,7 +660,7 @@ def not_of_arm(quantity: Quantity, robot: Robot) -> NotOfArm | None:
     at_wrist = isinstance(quantity, SectionCoordinate | SegmentAngle)
     if getattr(quantity, "point", "wrist_centre" if at_wrist else "flange") != "flange" and robot.rows != SIX:
         return "no_wrist_centre"
-    if isinstance(quantity, Limit | Speed) and isinstance(quantity, SlideLimit | SlideSpeed) != robot.slides[joint - 1]:
+    if isinstance(quantity, OfJoint) and quantity.slides != robot.slides[joint - 1]:
         return "joint_slides" if robot.slides[joint - 1] else "joint_turns"
     return None
 

@@ -216,7 +216,7 @@ class LimitRow(Row):
         """
         sides: tuple[tuple[quantities.Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
         for side, expected in sides:
-            quantity = (quantities.SlideLimit if self.slides else quantities.Limit)(self.joint, side)
+            quantity = quantities.Limit(self.joint, side, slides=self.slides)
             yield subjects.JointLimit(self.joint, side), "limits", quantity, expected, self.uncertainty
 
 
@@ -238,7 +238,7 @@ class SpeedRow(Row):
         ------
         scalar : deg/s, or mm/s of a joint that slides; without value where the source gives none
         """
-        quantity = (quantities.SlideSpeed if self.slides else quantities.Speed)(self.joint)
+        quantity = quantities.Speed(self.joint, slides=self.slides)
         yield subjects.JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
 
 

@@ -137,7 +137,7 @@ class TableEntry(quantities.Quantity):
     joint: int
 
     @property
-    def unit(self) -> quantities.Unit:  # type: ignore[override]
+    def unit(self) -> quantities.Unit:
         """mm or deg."""
         return "mm" if self.column in ("a", "d") else "deg"
 

@@ -152,7 +152,8 @@ def compare_two(
         print_note(note)
     written = _written((a, arm), (b, second.robot), found, asked.output, asked.html, (*tolerances, doubts))
     if asked.as_json:
-        print_json(_record(found) | {"notes": notes, "doubtful_units": doubts} | dict(known or {}))
+        record = {key: plain(value) for key, value in vars(found).items() if key not in ("corrected", "alignment")}
+        print_json(record | {"notes": notes, "doubtful_units": doubts} | dict(known or {}))
     else:
         _print(found, doubts)
         for file in written:
@@ -302,7 +303,3 @@ def _print(found: Comparison, doubts: list[str]) -> None:
     print(headline(found, doubts))
     for layer, state, detail in (*doubt_rows(doubts), *layer_rows(found)):
         print(f"  {layer:<11} {state:<8} {detail}".rstrip())
-
-
-def _record(found: Comparison) -> dict[str, Any]:
-    return {key: plain(value) for key, value in vars(found).items() if key not in ("corrected", "alignment")}

@@ -267,7 +267,8 @@ def plan_lines(found: Plan, robot: Robot) -> list[str]:
     pose = ("X", "Y", "Z", "A", "B", "C")
     lines = [PLAN.format(poses=len(found.q)), "  ".join(f"{name:>8}" for name in (*names, *pose))]
     for q, T in zip(shown(robot, found.q), found.T):
-        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in (*(1000 * T[:3, 3]), *_abc(T)))]
+        pose_values = (*(1000 * T[:3, 3]), *np.degrees(rpy_of(T))[::-1])
+        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in pose_values)]
         lines += ["  ".join(values), f"the pendant shows: {'  '.join(['________'] * len(pose))}"]
     return [*lines, PLAN_SAFE[bool(found.shapes)]]
 
@@ -277,7 +278,3 @@ def table_to_fill(found: Plan, robot: Robot) -> str:
     names = [f"q{k + 1}_{'mm' if slides else 'deg'}" for k, slides in enumerate(robot.slides)]
     rows = [",".join(f"{value:.0f}" for value in q) + ",,,,,," for q in shown(robot, found.q)]
     return "\n".join([",".join([*names, "X", "Y", "Z", "A", "B", "C"]), *rows, ""])
-
-
-def _abc(T: Reals) -> Reals:
-    return np.degrees(rpy_of(T))[::-1]

@@ -168,10 +168,6 @@ def _(jump: model.Jump) -> str:
     return sentence("branch_ends", t_s=jump.t_s, joint=jump.joint)
 
 
-def _when(stretch: model.Stretch) -> str:
-    return sentence("path.stretch", start=stretch.t0_s, end=stretch.t1_s)
-
-
 def cause_text(part: model.Stretch) -> str:
     """Why a stretch of a path is listed."""
     return _with_worst(part, say(part.cause))
@@ -313,8 +309,8 @@ def no_repair(path: model.PathSummary) -> str:
         why = sentence("path.cause", event=strategy_word(only.name), pose=reasons(only))
         return sentence("advice.none", why=why)
     if path.unreachable:
-        when = joined(map(_when, path.unreachable), ", ")
-        why = sentence("path.cause", event=when, pose=sentence("beyond_reach"))
+        spans = [sentence("path.stretch", start=each.t0_s, end=each.t1_s) for each in path.unreachable]
+        why = sentence("path.cause", event=joined(spans, ", "), pose=sentence("beyond_reach"))
     else:
         causes = [say(part.cause) for part in path.out_of_limits] or [reasons(tried) for tried in path.avoidance]
         why = joined(dict.fromkeys(causes))

@@ -65,9 +65,8 @@ def covered_collisions(
     hidden = {f"{row.first}/{row.second}" for row in bodies.matrix if row.hides}
     allowed = [name for name in pairs("allowed") if frozenset(name.split("/")) not in by_scene and name in hidden]
     contacts = base_contacts(robot, scene)
-    guessed = tuple(
-        dict.fromkeys(label_of(each) for arm in (bodies, *_with_tools(arms, scene)) for each in arm.guessed)
-    )
+    with_tools = [bodies, *(bodies_of(arm, scene) for _, arm in arms)]
+    guessed = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.guessed))
     shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
     gaps = (
         Open("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
@@ -90,10 +89,6 @@ def covered_collisions(
         (*(each for each in gaps if each.names), *no_scene),
         (*(each for each in assumed if each.names), *(() if scene and scene.carried else (Open("carried"),))),
     )
-
-
-def _with_tools(arms: Iterable[tuple[str, Robot]], scene: Scene | None) -> Iterable[Bodies]:
-    return (bodies_of(arm, scene) for _, arm in arms)
 
 
 NAMED_DOUBTS = 20

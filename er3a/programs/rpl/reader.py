@@ -135,7 +135,7 @@ def read_rpl(source: ProgramText) -> Program:
     """
     place = Place(source.path, 1)
     builder = CodeBuilder(MAIN, (), place)
-    for place, text, is_comment in statements(source, BREAKS, _ends):
+    for place, text, is_comment in statements(source, BREAKS, lambda _, mark: mark != ""):
         if is_comment:
             builder.remark(place, text)
         else:
@@ -154,10 +154,6 @@ def _variables(source: ProgramText) -> Iterator[Assign]:
             if scope.upper() == "INPUT":  # which the caller gives
                 value = Constant(Unclear(name))
             yield Assign(Place(path, number), Variable(name), value, line.strip(), kind.upper())
-
-
-def _ends(text: str, mark: str) -> bool:
-    return mark != ""
 
 
 def statement(builder: CodeBuilder, place: Place, text: str) -> None:

@@ -30,7 +30,7 @@ from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.results import Figure, Verdict
 from er3a.pipeline.stages.validation import model
-from er3a.references.quantities import Limit, Quantity, Speed, undecided_from
+from er3a.references.quantities import Quantity, undecided_from
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
 from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
@@ -208,7 +208,7 @@ def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[mode
             ("limits", JointLimit(joint, "upper")),
             ("speeds", JointSpeed(joint)),
         ]
-        units = ("mm", "mm/s") if slides[joint - 1] else (Limit.unit, Speed.unit)
+        units = ("mm", "mm/s") if slides[joint - 1] else ("deg", "deg/s")
         gaps += [
             model.Unjudged(subject, group, units[group == "speeds"], note, reference_set=name)
             for group, subject in wanted

@@ -82,11 +82,13 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     worst = next(((found.name, found.t_s) for found in closest if found.t_s is not None), None)
     played, ends = motions(robot, results), dict(zip(results.paths.path.tolist(), results.paths.t_s.tolist()))
     bars = {motion.name: bar_of(motion, ends[motion.name]) for motion in played}
+    # A path of which a part can't be reached is clear of nothing.
+    unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, closest, _unreached(results.paths), bars),
+        _answer(summary, closest, unreached, bars),
         matrix=_matrix(robot, results.matrix),
         never=int((results.matrix.state == "never").sum()),
         tried=TRIED,
@@ -98,11 +100,6 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",
         home_from=word("collision.home", HOMES, summary.home_from),
     )
-
-
-def _unreached(paths: model.PathClearances) -> set[str]:
-    """Names of paths of which a part can't be reached, and is therefore clear of nothing."""
-    return set(paths.path[np.isnan(paths.q_deg).any(axis=1)].tolist())
 
 
 def _answer(

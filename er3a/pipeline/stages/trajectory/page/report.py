@@ -65,7 +65,8 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
     lines = program_head(stored.validated, summary.checked, summary.assumed)
     met = None if contradicted else met_in_tray(study, stored)
     wrong = _by_name(results)
-    played = motions(robot, results, _tray_events(met or {}))
+    trays = {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in (met or {}).items()}
+    played = motions(robot, results, trays)
     for i, path in enumerate(paths):
         rows = checks.take(checks.path == path.name)
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
@@ -166,10 +167,6 @@ def _sound_row(path: model.PathSummary, length: float) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
     return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
-
-
-def _tray_events(met: Mapping[str, Meeting]) -> dict[str, PlayedEvent]:
-    return {name: PlayedEvent(each.t, each.t, each.text, "caution") for name, each in met.items()}
 
 
 def _programs(
