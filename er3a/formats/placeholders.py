@@ -19,7 +19,7 @@ from er3a.dynamics.arm_model import link_shapes
 from er3a.dynamics.plausibility import mass_findings
 from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
-from er3a.robots.masses import Drives, Masses
+from er3a.robots.masses import Masses
 from er3a.robots.robot import Robot, Source
 
 ROUNDED_RAD = 2e-3  # half a turn written as 3.14
@@ -49,7 +49,8 @@ def without_placeholders(robot: Robot) -> tuple[Robot, tuple[str, ...]]:
         notes.append("the limits +-180 deg of all joints are a placeholder: what rests on limits is not settled")
     if why := _no_efforts(robot):
         drives = robot.masses.drives
-        rest = replace(drives, peak=np.full(robot.joints, np.nan)) if drives and _friction(drives) else None
+        friction = drives and np.isfinite([drives.coulomb, drives.viscous]).any()
+        rest = replace(drives, peak=np.full(robot.joints, np.nan)) if drives and friction else None
         robot = robot.replace(masses=replace(robot.masses, drives=rest))
         notes.append(f"{why}: a placeholder, so no torque is held against it")
     if why := _no_masses(robot):
@@ -65,11 +66,6 @@ def _no_efforts(robot: Robot) -> str:
     if len(known) >= SEVERAL and np.ptp(known) == 0:
         return f"all joints have the effort {known[0]:g}"
     return f"joints have the effort {THOUSAND:g}" if (known == THOUSAND).sum() >= SEVERAL else ""
-
-
-def _friction(drives: Drives) -> bool:
-    """Whether friction of any joint is known."""
-    return bool(np.isfinite([drives.coulomb, drives.viscous]).any())
 
 
 def _no_masses(robot: Robot) -> str:

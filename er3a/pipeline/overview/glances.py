@@ -53,7 +53,7 @@ def _(results: ValidationResults) -> Glance:
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
     holes = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), 1), "L")
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), "L"), "L")
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
     return far, tr("hole {size}", size=litres) if holes else tr("no hole")
 

@@ -162,19 +162,11 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
     if table == "not_examined":
         return "measure", tr("not examined yet")
     finding = head.finding if head else None
-    if (
-        table != "caution"
-        or not is_one(finding, "validation.left_open")
-        or finding.contradiction
-        or not _some_settled(finding)
-    ):
-        return "measure", tr("don't rely on it yet")
-    return "plan", tr("plan only")
-
-
-def _some_settled(finding: Any) -> bool:
-    """Whether independent documents settle any length or twist."""
-    return any(part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry")
+    if table == "caution" and is_one(finding, "validation.left_open") and not finding.contradiction:
+        settled = [part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry"]
+        if any(settled):  # by independent documents, of lengths and twists
+            return "plan", tr("plan only")
+    return "measure", tr("don't rely on it yet")
 
 
 def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:

@@ -95,6 +95,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     drawing = from_above(robot, results, study.scene(name, "capability"), [placing.tray], LETTERS)
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
-    answer = tr("At {centre} mm; payload {kg}.", centre=millimetres(placing.tray.place.centre_m), kg=carried)
-    title, hole = tr("Where does the tray go?"), glance(results)[1]
-    return Tile(title, answer, hole, "pass", f"{name}/workspace.html", drawing=drawing)
+    answer = tr("Centre at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
+    title, rest = tr("Where does the tray go?"), tr("Payload {kg}, {hole}.", kg=carried, hole=glance(results)[1])
+    return Tile(title, answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

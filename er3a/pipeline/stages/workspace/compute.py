@@ -134,6 +134,7 @@ def _summary(
     examined = not is_one(tool.capability, "workspace.capability_missing")
     volume, seen = model.Bounds(*proven.proof.bounds), covered_collisions(robot, bodies_of(robot, scene), scene)
     reach = search_reach(robot, grid, samples.q_looked_at)
+    bar = proven.proof.bar
     return model.WorkspaceSummary(
         verdict=judged.with_assumed_shapes(assumed if examined else None),
         figures=_figures(reach, voids, volume, settings.samples),
@@ -144,7 +145,7 @@ def _summary(
             proven.proof.width,
             len(points),
             proven.count_in_empty(points),
-            _bars(proven),
+            model.Bars(bar, model.frame_of(proven.R, proven.origin)) if bar else None,
         ),
         reach_m=reach,
         axis=model.AxisSummary(
@@ -193,10 +194,6 @@ def _in_solids(robot: Robot, scene: Scene | None, found: model.Placement | None)
     ]
     if named:
         yield Open("tray_inside", tuple(named))
-
-
-def _bars(proven: Proven) -> model.Bars | None:
-    return model.Bars(proven.proof.bar, model.frame_of(proven.R, proven.origin)) if proven.proof.bar else None
 
 
 def _figures(reach: ReachExtremes, voids: Sequence[Void], volume: model.Bounds, samples: int) -> tuple[Figure, ...]:

@@ -90,7 +90,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         output,
         _answer(summary, closest, unreached, bars),
         matrix=_matrix(robot, results.matrix),
-        never=int((results.matrix.state == "never").sum()),
+        never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
         most_often=most_often(results.pairs),
         places=_places(robot, results, scene),

@@ -73,7 +73,14 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
     bad = {each.name: row_of(each, shown.get(each.name), ends[each.name], 1.0, notes[each.name]) for each in wrong}
     sound = [
-        ListRow("pass", name, _passed(each), f"#{name}", (name, 0.0), 1.0)
+        ListRow(
+            "pass",
+            name,
+            tr("{passed} of {count} motions", passed=each.passed, count=each.motions),
+            f"#{name}",
+            (name, 0.0),
+            1.0,
+        )
         for name, each in known.items()
         if name not in bad
     ]
@@ -83,11 +90,6 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))
-
-
-def _passed(program: model.ProgramSummary) -> str:
-    """How many of its motions pass, and its cycle time."""
-    return tr("{passed} of {count} motions", passed=program.passed, count=program.motions)
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from markupsafe import Markup
 
@@ -87,14 +87,27 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     return rows
 
 
-def _by_document(checks: Iterable[Judged]) -> Group:
-    """How many checks of each set of references pass, each with its bar."""
+KINDS = {
+    "independent": N_("independent documents"),
+    "consistency": N_("documents it is made from"),
+    "claim": N_("claims of a source"),
+    None: N_("the model itself"),
+}
+"""What a check rests on, as the page names it."""
+
+
+def _by_kind(checks: Sequence[Judged]) -> Group:
+    """How many checks of each kind pass, each with its bar."""
     rows = []
-    for title, own in by_set(checks).items():
-        failed = sum(check.status == "fail" for check in own)
-        passed = tr("{passed} of {total}", passed=len(own) - failed, total=len(own))
-        parts = [Part(1 - failed / len(own), 1.0, "fail")] if failed else []
-        rows.append(ListRow("fail" if failed else "pass", title, passed, "#checks", length=1.0, parts=parts))
+    for kind, title in KINDS.items():
+        own = [check for check in checks if check.kind == kind]
+        if not own:
+            continue
+        counted = Counter(check.status for check in own)
+        passed, total = counted["pass"], len(own)
+        mark: Literal["fail", "caution"] = "fail" if counted["fail"] else "caution"
+        parts, said = [Part(passed / total, 1.0, mark)], tr("{passed} of {total}", passed=passed, total=total)
+        rows.append(ListRow(mark if passed < total else "pass", tr(title), said, "#checks", length=1.0, parts=parts))
     return Group(tr("Checks"), rows)
 
 
@@ -149,7 +162,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
-        by_document=[_by_document(judged)],
+        by_kind=[_by_kind(judged)],
         failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
         all_failed=len(failed),
         columns=[tr(label) for label in COLUMNS],
