@@ -182,7 +182,8 @@ def check_file(path: Path, xacro: Sequence[str] = ()) -> str:
     if not isinstance(kind, str) or kind not in _CHECKS:
         problem = "missing" if kind is None else f"'{kind}' is not known"
         raise InputError(path, "kind", problem, f"Write one of: {', '.join(_CHECKS)}")
-    own = [each for each in path.absolute().parents if each.name == "config" or _is_outside(each)]
+    # The working folder does not lie in it: who works below some ``data`` names files from there.
+    own = [each for each in path.absolute().parents if each.name == "config" or not Path.cwd().is_relative_to(each)]
     homes = (each.parent for each in own if each.name in ("config", "data"))
     home = next((home for home in homes if (home / "data").is_dir()), Path.cwd())
     within = path if home == Path.cwd() else path.absolute().relative_to(home)
@@ -196,11 +197,6 @@ def check_file(path: Path, xacro: Sequence[str] = ()) -> str:
             where = str(error.file) + (f": {error.field}" if error.field else "")
             raise InputError(path, where, error.problem, error.remedy) from None
     return words
-
-
-def _is_outside(folder: Path) -> bool:
-    """Whether the working folder does not lie in it: who works below some ``data`` names files from there."""
-    return not Path.cwd().is_relative_to(folder)
 
 
 def _check_table(path: Path) -> str:

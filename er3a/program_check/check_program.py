@@ -61,10 +61,6 @@ CHECKS: tuple[Check, ...] = ("limits", "reach", "configuration", "singularity", 
 """What is checked of each motion with the arm alone."""
 
 
-def _always() -> bool:
-    return True
-
-
 @dataclass(frozen=True, eq=False)
 class CheckOptions(ByValue):
     """Settings of a program check.
@@ -93,7 +89,7 @@ class CheckOptions(ByValue):
     measures: bool = True
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
-    keep_on: Callable[[], bool] = _always
+    keep_on: Callable[[], bool] = lambda: True
 
 
 @dataclass(frozen=True)

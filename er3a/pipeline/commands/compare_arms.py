@@ -187,6 +187,7 @@ def identify(source: str, asked: CompareRequest) -> None:
     from er3a.comparison.compare import best_of
     from er3a.comparison.nearest import likely, of_equal_geometry
     from er3a.files.arm_catalogue import known_arms
+    from er3a.files.robot_library import known_arm
     from er3a.pipeline.messages.known_arms import identified_lines, not_near_lines
     from er3a.robots.robot import to_standard
 
@@ -209,7 +210,8 @@ def identify(source: str, asked: CompareRequest) -> None:
     if not asked.as_json:
         print("\n".join(identified_lines(known[name], best, *groups)))
     record = {"arm": name, "same_geometry": list(alike), "as_near": sorted(others)}
-    compare_two(source, name, asked, record, read, best)
+    # A robot file of this name goes before the catalogue's arm, and may give more.
+    compare_two(source, name, asked, record, read, best if known_arm(name) else None)
 
 
 def compare_several(sources: Sequence[str], asked: CompareRequest) -> None:

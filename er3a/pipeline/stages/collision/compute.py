@@ -19,7 +19,7 @@ from er3a.kinematics.solutions import MANY_TARGETS
 from er3a.numerics.arrays import Reals
 from er3a.numerics.si_units import stated
 from er3a.pipeline.results import Figure, Verdict
-from er3a.pipeline.scope import OF_MOTIONS, Coverage, by_reason, coverages
+from er3a.pipeline.scope import OF_MOTIONS, Coverage, Open, by_reason, coverages
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
@@ -207,12 +207,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
             mounting=mounting,
             closest=closest,
             checked=_checked(study, name, covered, motions),
-            # What was chosen for the paths that are given to be run.
-            assumed=(
-                *by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed),
-                *assumed_tool(robot),
-                *covered.assumed,
-            ),
+            assumed=(*_chosen(motions), *assumed_tool(robot), *covered.assumed),
         ),
         matrix=matrix,
         pairs=pairs,
@@ -242,6 +237,11 @@ def _free_space(
         blocked=blocked,
         demonstrations=tuple(each for each in (*blocked, *colliding) if each.expected),
     )
+
+
+def _chosen(motions: list[ListedMotion]) -> tuple[Open, ...]:
+    """What was chosen for the paths that are given to be run."""
+    return by_reason(each for motion in motions if motion.meant_safe for each in motion.assumed)
 
 
 def _home(bodies: Bodies, given: Reals | None, free: Reals) -> tuple[model.HomeFrom, Reals]:
