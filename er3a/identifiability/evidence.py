@@ -23,7 +23,7 @@ from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
-from er3a.references.quantities import Limit, LimitExcess, Speed, value_at
+from er3a.references.quantities import LimitExcess, OfJoint, value_at
 from er3a.references.reference import Documents, Reference, conflicts
 from er3a.robots.robot import Robot
 
@@ -52,7 +52,7 @@ def judge_limit(
     status, interval : and lower and upper bound, in the entry's unit
     """
     value = entry.value(robot)
-    direct = [r for r in independent if isinstance(r.quantity, Limit | Speed)]
+    direct = [r for r in independent if isinstance(r.quantity, OfJoint)]
     if direct:
         spans = [(float(r.expected or 0.0) - r.uncertainty, float(r.expected or 0.0) + r.uncertainty) for r in direct]
         agree = [low - ROUNDING <= value <= high + ROUNDING for low, high in spans]

@@ -64,18 +64,12 @@ COLUMNS = (
 Judged = model.Judged
 
 
-def by_set(checks: Iterable[Judged]) -> dict[str, list[Judged]]:
-    """Checks by the set that they come from, as the page names it."""
-    found: dict[str, list[Judged]] = {}
-    for check in checks:
-        found.setdefault(check.reference_set or tr("the model itself"), []).append(check)
-    return found
-
-
 def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     """A row for each set and group."""
-    rows = []
-    for title, own in by_set(checks).items():
+    rows, sets = [], dict[str, list[Judged]]()
+    for check in checks:
+        sets.setdefault(check.reference_set or tr("the model itself"), []).append(check)
+    for title, own in sets.items():
         for group in dict.fromkeys(check.group for check in own):
             part = [check for check in own if check.group == group]
             counted = Counter(check.status for check in part)

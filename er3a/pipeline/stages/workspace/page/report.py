@@ -93,8 +93,10 @@ def _answer(
         ),
         payload,
     ]
+    # The hole that the headline names and the picture shows comes first.
+    voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
     groups = (
-        Group(tr("Holes and pockets"), [_void_as_row(n, void) for n, void in enumerate(summary.voids, start=1)]),
+        Group(tr("Holes and pockets"), [_void_as_row(*each) for each in voids]),
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
     )
     point = tr("Of the flange: no tool is given.") if bare else ""
