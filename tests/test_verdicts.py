@@ -278,7 +278,10 @@ def row_of(page: str, robot: str) -> str:
 
 def cells_of(page: str, robot: str) -> dict[str, str]:
     """The marks of a robot's stages in the index, by stage."""
-    cells = re.findall(rf'<td class="(\w+)"><a href="{robot}/(\w+)\.html"(?: title="[^"]*")?><b>', row_of(page, robot))
+    cells = re.findall(
+        rf'<td class="(\w+)" data-stage="[^"]*"><a href="{robot}/(\w+)\.html"(?: title="[^"]*")?><b>',
+        row_of(page, robot),
+    )
     return {stage: mark for mark, stage in cells}
 
 

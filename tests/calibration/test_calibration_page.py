@@ -60,5 +60,5 @@ def test_each_word_of_the_page_can_be_translated(written, tmp_path):
         write_calibration(robot, rows, found, tmp_path / "page.html", command=["er3a"], files=[], corrected=found.robot)
     page = PageTexts((tmp_path / "page.html").read_text(encoding="utf-8")).texts
     entries = {f"{each.name}" for each in found.estimates}
-    own = {robot.title, robot.name, "compare", "compared.html", *entries}
+    own = {robot.title, robot.name, "calibrate", "compare", "compared.html", *entries}
     assert plain_words([*page, *shown], own) == []

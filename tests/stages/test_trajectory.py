@@ -386,7 +386,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     shutil.copytree(folders["er3_600"], tmp_path / "results/er3_600/trajectory")
     write_index(one, tmp_path / "results", tmp_path)
     index = html.parse(str(tmp_path / "index.html"))
-    assert index.xpath("string(//h1/span[@class='measure'])") == "Measure er3_600 first."
+    assert index.xpath("string(//h1/span[@class='measure'])") == "Measure EFORT ER3-600 first."
     assert index.xpath("//*[@class='steps']//a/@href") == ["er3_600/validation.html"]
     cells = index.xpath("//table[@id='decisions']//tr[@id='er3_600']/td[a]")
     assert {cell.find("a").get("href") for cell in cells} == {

@@ -91,6 +91,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         places=page.packed_text(json.dumps([*places(study, folder, contradicted)], ensure_ascii=False)),
         entries=entries,
         stages=_asked(study),
+        questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, drawn, stored),
         keys=_keys(drawn),
         steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
