@@ -359,18 +359,18 @@ def test_every_word_of_the_panel_is_in_the_dictionary(browser, folder):
         panel = Panel(browser, folder / "marked.html").open()
     assumed = browser.find_element(By.CSS_SELECTOR, ".chip").get_attribute("textContent")
     scene = load_scene(ROOT / "data/scenes/table_and_post.yaml")
+    names = re.compile("|".join(solid.name for solid in scene.solids))
     for degrees in ([0] * 6, [30, -20, 15, 40, 60, 10], [167, 90, 105, 180, 2, 360]):
         panel.move(*degrees)
         time.sleep(0.3)
         texts = panel.texts()
         assert len(texts) > 100
-        words = [text for text in texts if re.search("[A-Za-z]{3}", text)]
+        words = [text for text in texts if re.search("[A-Za-z]{3}", names.sub("", text))]
         known = {
             "EFORT ER3A-C60",
             *map(branch_word, branch_labels(load_robot("er3a_c60"))),
             *FOUNDATIONS.values(),
             FLAT,
-            *(solid.name for solid in scene.solids),
         }
         assert {text for text in words if text not in assumed} <= known
 

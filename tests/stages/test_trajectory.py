@@ -400,7 +400,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     assert own == found.summary.verdict.status
     assert number.split()[1] == f"{len(paths) - len(wrong)}/{len(paths) - len(meant)}"
     assert {status for status, _ in said.values()} == {"not_computed"}
-    rows = index.xpath("//*[contains(@class, 'tile')]//*[@class='runs']//li")
+    rows = index.xpath("//*[contains(@class, 'tile')]//*[contains(@class, 'runs')]//li")
     played = [parse_qs(urlsplit(row.find("a").get("href")).query) for row in rows]
     assert sorted(each["play"][0] for each in played) == sorted(paths)
     assert all(0 <= float(each["t"][0]) <= paths[each["play"][0]].duration_s for each in played)
