@@ -61,6 +61,11 @@ CHECKS: tuple[Check, ...] = ("limits", "reach", "configuration", "singularity", 
 """What is checked of each motion with the arm alone."""
 
 
+def _always() -> bool:
+    """Options are pickled, which no lambda is."""
+    return True
+
+
 @dataclass(frozen=True, eq=False)
 class CheckOptions(ByValue):
     """Settings of a program check.
@@ -89,7 +94,7 @@ class CheckOptions(ByValue):
     measures: bool = True
     assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
-    keep_on: Callable[[], bool] = lambda: True
+    keep_on: Callable[[], bool] = _always
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import measured, number
 from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad, Unit
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -32,7 +32,11 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
     return [
         PlayedMotion(
             holding_name(each.joint),
-            tr("J{joint} holds {torque} at most.", joint=each.joint, torque=_size(each.torque, each.unit)),
+            tr(
+                "J{joint} holds {torque} at most.",
+                joint=each.joint,
+                torque=with_unit(number(abs(each.torque), 3), each.unit),
+            ),
             np.array([0.0, 1.0]),
             np.tile(meant(robot, np.array(each.q)), (2, 1)),
         )
@@ -43,10 +47,6 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 def holding_name(joint: int) -> str:
     """What the player calls the pose in which a joint holds most."""
     return tr("J{joint}, held", joint=joint)
-
-
-def _size(torque: float, unit: Unit) -> str:
-    return with_unit(number(abs(torque), 3), unit)
 
 
 def _peak(load: JointLoad) -> str:
