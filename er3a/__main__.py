@@ -9,7 +9,7 @@ from io import TextIOWrapper
 from er3a.pipeline.working_folder import distrust
 
 FEW_POSES = {"arms", "compare"}
-"""Commands that numpy has answered before numba has started."""
+"""Commands that numpy has answered of one or two arms before numba has started; of more, compiled code is faster."""
 
 
 def main() -> None:
@@ -17,7 +17,7 @@ def main() -> None:
     distrust()
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # many small matrices: threads of BLAS only wait
         os.environ.setdefault(name, "1")
-    if FEW_POSES.intersection(sys.argv[1:2]):
+    if FEW_POSES.intersection(sys.argv[1:2]) and len(sys.argv) in (3, 4):
         os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
     os.environ.setdefault("PYTHONUTF8", "1")  # of jobs and viewers, whatever the console's code page
     for stream in (sys.stdin, sys.stdout, sys.stderr):

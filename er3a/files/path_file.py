@@ -175,6 +175,10 @@ class RosTime(StrictModel):
     nsecs: float = 0.0
 
 
+def _as_seconds(value: Any) -> Any:
+    return {"sec": value} if isinstance(value, int | float) else value
+
+
 class RosPoint(StrictModel):
     """A point of ``trajectory_msgs/JointTrajectory``; its efforts are not used."""
 
@@ -182,9 +186,7 @@ class RosPoint(StrictModel):
     velocities: list[float] | None = None
     accelerations: list[float] | None = None
     effort: Any = None
-    time_from_start: Annotated[
-        RosTime, BeforeValidator(lambda value: {"sec": value} if isinstance(value, int | float) else value)
-    ]
+    time_from_start: Annotated[RosTime, BeforeValidator(_as_seconds)]
 
     @property
     def seconds(self) -> float:

@@ -305,7 +305,7 @@ def link_shapes(
         "hulls": tuple(shape for shape in shapes if isinstance(shape, ConvexPiece)),
         "meshes": tuple(link_mesh(number, np.concatenate(parts)) for number, parts in surfaces.items()),
     }
-    notes = [f"shapes of {', '.join(unread)} are left out ({why})" for why in unread.values()][:1]
+    notes = [f"shapes of {', '.join(unread)} are left out ({next(iter(unread.values()))})"] if unread else []
     if astray:
         notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))

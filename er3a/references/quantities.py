@@ -481,8 +481,7 @@ class Limit(OfJoint):
         -------
         limit : (...), deg, or mm of a prismatic joint
         """
-        limits = state.lower if self.side == "lower" else state.upper
-        return self.as_stated(limits)
+        return self.as_stated(state.lower if self.side == "lower" else state.upper)
 
 
 @dataclass(frozen=True)

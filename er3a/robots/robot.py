@@ -474,9 +474,8 @@ def robot_name(path: Path) -> str:
     -------
     name : small letters, digits and underscores, 64 at most; ``imported`` if nothing is left
     """
-    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in path.stem.lower().removesuffix(".urdf")).strip(
-        "_"
-    )[:64]
+    stem = path.stem.lower().removesuffix(".urdf")
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in stem).strip("_")[:64]
     return name or "imported"
 
 
