@@ -177,7 +177,7 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
 
 VoidKind = Literal["enclosed", "open"]
 
-_FLAT, _AT_ONCE = 1e-9, 8192  # thickness, in parts of the length, of a flat hull; points looked at together
+_FLAT = 1e-9  # thickness, in parts of the length, of a flat hull
 
 
 def is_flat(points: Reals) -> bool:
@@ -211,9 +211,10 @@ def inside_hull(corners: Reals, points: Reals) -> Flags:
     """
     if is_flat(corners):
         return np.zeros(len(points), dtype=bool)
-    planes = scipy.spatial.ConvexHull(corners).equations
-    parts = np.array_split(points, len(points) // _AT_ONCE + 1)
-    return np.concatenate([(part @ planes[:, :3].T + planes[:, 3] < 0).all(axis=1) for part in parts])
+    every = inside = np.arange(len(points))
+    for x, y, z, offset in scipy.spatial.ConvexHull(corners).equations:
+        inside = inside[points[inside] @ (x, y, z) + offset < 0]  # the first planes leave few to the others
+    return np.isin(every, inside)
 
 
 POCKET_BLOCKS, TURNS = 64, 180  # across the section and around, on which pockets are searched
