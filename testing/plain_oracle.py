@@ -132,8 +132,9 @@ def _extreme(
         counts = [GRID, GRID, 9 if moving else 1, 9][: joints - 1]
         q, seen = _on_grid(one, measure, sign, (least, most), counts)
         best = -np.inf
-        for turn in np.unique(q[:, 3]):  # the best place of each angle of joint 4 is closed in on
-            own = q[:, 3] == turn
+        upper_half = q[:, 1] > (least[0] + most[0]) / 2
+        for turn, half in product(np.unique(q[:, 3]), (False, True)):  # the best place of each is closed in on
+            own = (q[:, 3] == turn) & (upper_half == half)
             near, wide = (
                 q[own][seen[own].argmax(), 1:joints],
                 1.5 * (most - least) / np.maximum(np.array(counts) - 1, 1),

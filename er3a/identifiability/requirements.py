@@ -17,12 +17,13 @@ import numpy as np
 
 from er3a.kinematics.table_batch import Tables, frames_of, tables_of
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import CLIMBS, SCAN, box_points, peak
+from er3a.numerics.peaks import box_points, peak
 from er3a.references import quantities
 from er3a.references.predict import TablesState
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
 
+SCAN, CLIMBS = 4096, 12  # points of a box and climbs where an extreme is sought afresh: a table far away has many tops
 WATCHED = 48  # points of a box where an extreme is followed
 LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excluded
 SLIGHT = 1e-3  # of a half-width
@@ -61,10 +62,8 @@ class SoughtExtreme:
         if self.q is not None:
             points = np.concatenate([np.clip(self.q[self.joints], lower, upper)[None], points])
 
-        def higher(q: Reals) -> Reals:
-            return np.asarray(self.sign * self._measure(table, self._whole(q))[0])
-
-        q, value = peak(higher, lower, upper, points, CLIMBS if self.q is None else 1)
+        climbs = CLIMBS if self.q is None else 1
+        q, value = peak(lambda q: self.sign * self._measure(table, self._whole(q))[0], lower, upper, points, climbs)
         self.q = self._whole(q)
         return self.sign * value * quantities.MM
 
