@@ -9,7 +9,7 @@ arm can have.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import update_wrapper
+from functools import partial, update_wrapper
 from inspect import Parameter, signature
 from pathlib import Path
 from types import NoneType, UnionType
@@ -19,7 +19,7 @@ from er3a.errors import ArgumentError, with_extra
 from er3a.robots.robot import Robot
 from er3a.robots.usable import check_joint_values, check_robot
 
-Check = Callable[[Any], None]
+Check = Callable[[Any, Any], None]  # of the first argument, and of the one that is checked
 Function = TypeVar("Function", bound=Callable[..., Any])
 LOOK_FOR_CROSSED_LIMITS = {"diagnose"}
 JOINT_VALUES = ("q", "q_ref", "q0", "q_start")
@@ -29,20 +29,14 @@ CALLED = {str: "a text", Path: "a path", NoneType: "None"}
 def checked(function: Function) -> Function:
     """The public form of a function, which refuses unusable arguments with an :class:`er3a.Er3aError`."""
     checks = _checks(function)
-    places = list(signature(function).parameters)
-    joints = [(places.index(name), name) for name in JOINT_VALUES if name in places and places[0] == "robot"]
 
     def public(*args: Any, **named: Any) -> Any:
+        first, given = args[0] if args else named.get("robot"), len(args)
         for place, name, check in checks:
-            if place < len(args):
-                check(args[place])
+            if place < given:
+                check(first, args[place])
             elif name in named:
-                check(named[name])
-        for place, name in joints:
-            if place < len(args):
-                check_joint_values(args[0], args[place], name)
-            elif named.get(name) is not None:
-                check_joint_values(args[0] if args else named["robot"], named[name], name)
+                check(first, named[name])
         try:
             return function(*args, **named)
         except ModuleNotFoundError as error:
@@ -57,9 +51,12 @@ def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
     # Without what it returns, which may be of a library that is not installed.
     own = {name: hint for name, hint in function.__annotations__.items() if name != "return"}
     hints = get_type_hints(type("Parameters", (), {"__annotations__": own}), function.__globals__)
-    found = []
-    for place, (name, parameter) in enumerate(signature(function).parameters.items()):
+    found, parameters = [], signature(function).parameters
+    of_robot = next(iter(parameters), "") == "robot"
+    for place, (name, parameter) in enumerate(parameters.items()):
         check = _check_of(name, hints[name], function.__name__ in LOOK_FOR_CROSSED_LIMITS)
+        if of_robot and name in JOINT_VALUES:
+            check = partial(check_joint_values, argument=name)
         if check is not None:
             found.append((place if parameter.kind is not Parameter.KEYWORD_ONLY else 1_000, name, check))
     return tuple(found)
@@ -68,12 +65,10 @@ def _checks(function: Callable[..., Any]) -> tuple[tuple[int, str, Check], ...]:
 def _check_of(name: str, hint: Any, crossed_limits: bool) -> Check | None:
     """The check for an argument with this annotation; None if the function checks it itself."""
     if hint is Robot:
-        return lambda value: check_robot(value, crossed_limits)
-    if hint == Robot | None:
-        return lambda value: None if value is None else check_robot(value, crossed_limits)
+        return lambda _, value: check_robot(value, crossed_limits)
     allowed = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     if set(allowed) == {Robot, NoneType}:
-        return lambda value: None if value is None else check_robot(value, crossed_limits)
+        return lambda _, value: None if value is None else check_robot(value, crossed_limits)
     plain = tuple(each for each in allowed if isinstance(each, type) and (_ours(each) or each in CALLED))
     listed = tuple(get_args(each)[0] for each in allowed if get_origin(each) is Sequence and _ours(get_args(each)[0]))
     if len(plain) + len(listed) != len(allowed):
@@ -82,7 +77,7 @@ def _check_of(name: str, hint: Any, crossed_limits: bool) -> Check | None:
         [CALLED.get(each, _article(each)) for each in plain] + [f"several {each.__name__}" for each in listed]
     )
 
-    def check(value: Any) -> None:
+    def check(_: Any, value: Any) -> None:
         if isinstance(value, plain):
             return
         if not listed or isinstance(value, str) or not isinstance(value, Sequence):

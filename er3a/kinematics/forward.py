@@ -51,7 +51,7 @@ def forward(robot: Robot, q: Reals, frame: int | None = None, out: Reals | None 
         raise ArgumentError("out", out, f"an array of shape {shape}")
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise ShapeError("out", out.shape, f"{shape}, float64, C-contiguous and writeable")
-    links = constant_links(robot, frame)
+    links = constant_links(robot) if frame is None else constant_links(robot, frame)
     _fill_poses(*_motion(robot, q), links, out.reshape(-1, 4, 4))
     return out
 
@@ -112,8 +112,9 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
         if q has the wrong shape, or is no array of numbers
     """
     q = checked_joints(robot, q)
-    out = np.empty((*q.shape[:-1], 6, robot.rows))
-    _jacobian(*_motion(robot, q), constant_links(robot), out.reshape(-1, 6, robot.rows))
+    rows = robot.rows
+    out = np.empty((*q.shape[:-1], 6, rows))
+    _jacobian(*_motion(robot, q), constant_links(robot), out.reshape(-1, 6, rows))
     if robot.coupling is None:
         return out
     coupled: Reals = out @ robot.coupling
@@ -140,14 +141,15 @@ def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
         if some values are no real numbers
     """
     q = np.ascontiguousarray(as_floats(q, argument))
-    if q.ndim == 0 or q.shape[-1] != robot.joints:
+    if q.shape[-1:] != (robot.joints,):
         raise ShapeError(argument, q.shape, f"(..., {robot.joints})")
     return q
 
 
 def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
     """Kernel arguments: each row's motion u (N, m), its direction, the start value of x, and whether it slides."""
-    u = for_kernel(row_values(robot, q)).reshape(-1, robot.rows)
+    u = row_values(robot, q).reshape(-1, robot.rows)
+    u.setflags(write=False)  # as kernels take arrays; this view, not q
     return u, robot.direction, joint_starts(robot), robot.sliding
 
 
@@ -238,58 +240,60 @@ def write_rows(x: Row, y: Row, z: Row, out: Reals) -> None:
 
 
 @inner_kernel
-def _cos_sin_rows(q: Reals, sign: float, zero: float, start: int, k: int, of_y: float, rows: Reals) -> bool:
+def _cos_sin_rows(q: Reals, sign: float, zero: float, k: int, of_y: float, rows: Reals) -> bool:
     """Rows 12 and 13: cosines of joint ``k`` for a block, and sines times y's sign; whether one is NaN or far off."""
-    count, far = min(BLOCK, q.shape[0] - start), False
-    for i in range(count):
-        rows[_COS * BLOCK + i] = q[start + i, k]
-    for i in range(BLOCK):
+    far = False
+    for i in range(len(q)):
+        rows[_COS * BLOCK + i] = q[i, k]
+    for i in range(len(q)):
         angle = sign * rows[_COS * BLOCK + i] + zero
         c, s = cos_sin(angle)
         rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = c, of_y * s
         far = far | (not abs(angle) <= LARGEST_ANGLE)
     if far:
-        for i in range(count):
-            angle = sign * q[start + i, k] + zero
+        for i in range(len(q)):
+            angle = sign * q[i, k] + zero
             if not abs(angle) <= LARGEST_ANGLE:
                 rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = np.cos(angle), of_y * np.sin(angle)
     return far
 
 
 @inner_kernel
-def _slide_rows(q: Reals, sign: float, start: int, k: int, rows: Reals, axes: Axes) -> None:
+def _slide_rows(q: Reals, sign: float, k: int, rows: Reals, axes: Axes) -> None:
     """Shift a block of transforms along their z axes by joint ``k``, and leave no turn in rows 12 and 13."""
-    for i in range(min(BLOCK, q.shape[0] - start)):
-        along = sign * q[start + i, k] * axes[3]
+    for i in range(len(q)):
+        along = sign * q[i, k] * axes[3]
         for r in range(3):
             rows[(4 * r + 3) * BLOCK + i] += along * rows[(4 * r + axes[1]) * BLOCK + i]
-    for i in range(BLOCK):
+    for i in range(len(q)):
         rows[_COS * BLOCK + i], rows[_SIN * BLOCK + i] = 1.0, 0.0
 
 
 @kernel
 def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
-    rows = np.zeros((_SIN + 1) * BLOCK)
+    rows = np.empty((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
-        axes = _fill_start(rows, links[0])
+        block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
+        count = len(block)
+        axes = _fill_start(rows, count, links[0])
         for k in range(links.shape[0] - 1):
             far = False
             if sliding[k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
-                _slide_rows(q, direction[k], start, k, rows, axes)
+                _slide_rows(block, direction[k], k, rows, axes)
             else:
-                far = _cos_sin_rows(q, direction[k], start_at[k], start, k, axes[2], rows)
-            axes = _turn_and_step(rows, links[k + 1], axes, far)
+                far = _cos_sin_rows(block, direction[k], start_at[k], k, axes[2], rows)
+            axes = _turn_and_step(rows, count, links[k + 1], axes, far)
         ys, zs = rows[axes[0] * BLOCK :], rows[axes[1] * BLOCK :]
-        for i in range(min(BLOCK, q.shape[0] - start)):
+        for i in range(count):
             for r in range(3):
                 # Plus 0.0: a zero is positive, as it would be among the sums that were left out.
-                out[start + i, r, 0] = rows[4 * r * BLOCK + i] + 0.0
-                out[start + i, r, 1] = axes[2] * ys[4 * r * BLOCK + i] + 0.0
-                out[start + i, r, 2] = axes[3] * zs[4 * r * BLOCK + i] + 0.0
-                out[start + i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
-            out[start + i, 3, 0], out[start + i, 3, 1], out[start + i, 3, 2] = 0.0, 0.0, 0.0
-            out[start + i, 3, 3] = 1.0
+                filled[i, r, 0] = rows[4 * r * BLOCK + i] + 0.0
+                filled[i, r, 1] = axes[2] * ys[4 * r * BLOCK + i] + 0.0
+                filled[i, r, 2] = axes[3] * zs[4 * r * BLOCK + i] + 0.0
+                filled[i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
+            for j in range(4):
+                filled[i, 3, j] = j // 3
 
 
 @np.errstate(all="ignore")  # as kernels have it
@@ -312,7 +316,7 @@ _fill_poses = _forward if is_compiled() else _forward_by_arrays
 
 
 @inner_kernel
-def _turn_and_step(rows: Reals, link: Reals, axes: Axes, dense: bool) -> Axes:
+def _turn_and_step(rows: Reals, count: int, link: Reals, axes: Axes, dense: bool) -> Axes:
     """Multiply a block of transforms by Rz of the block's cosines and sines and by a constant transform.
 
     Right angles about x, which nearly all tables have, multiply nothing: they rename columns. If a joint value is NaN,
@@ -329,13 +333,13 @@ def _turn_and_step(rows: Reals, link: Reals, axes: Axes, dense: bool) -> Axes:
         row, angle = rows[4 * r * BLOCK : 4 * (r + 1) * BLOCK], rows[_COS * BLOCK :]
         ys, zs = row[to_y * BLOCK : (to_y + 1) * BLOCK], row[to_z * BLOCK : (to_z + 1) * BLOCK]
         if sparse:
-            for i in range(BLOCK):
+            for i in range(count):
                 cosine, sine, p, s = angle[i], angle[BLOCK + i], row[i], ys[i]
                 p, s = p * cosine + s * sine, s * cosine - p * sine
                 row[i], ys[i] = p, s
                 row[3 * BLOCK + i] += p * x + zs[i] * z
         else:
-            for i in range(BLOCK):
+            for i in range(count):
                 cosine, sine, p, s, t = angle[i], angle[BLOCK + i], row[i], ys[i], zs[i]
                 p, s = p * cosine + s * sine, s * cosine - p * sine
                 row[i] = p * a + s * d + t * g
@@ -369,60 +373,61 @@ def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: 
 def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
-    rows, columns = np.zeros((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
+    rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
     for start in range(0, q.shape[0], BLOCK):
-        axes = _fill_start(rows, links[0])
+        block, filled = q[start : start + BLOCK], out[start : start + BLOCK]
+        count = len(block)
+        axes = _fill_start(rows, count, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, axes, direction[k], columns[k])
+            _keep_axis(rows, count, axes, direction[k], columns[k])
             far = False
             if sliding[k]:
-                _slide_rows(q, direction[k], start, k, rows, axes)
+                _slide_rows(block, direction[k], k, rows, axes)
             else:
-                far = _cos_sin_rows(q, direction[k], start_at[k], start, k, axes[2], rows)
-            axes = _turn_and_step(rows, links[k + 1], axes, far)
+                far = _cos_sin_rows(block, direction[k], start_at[k], k, axes[2], rows)
+            axes = _turn_and_step(rows, count, links[k + 1], axes, far)
         for k in range(joints):
             if sliding[k]:
-                _along(columns[k])
+                _along(count, columns[k])
             else:
-                _lever(rows, columns[k])
-        for i in range(min(BLOCK, q.shape[0] - start)):
+                _lever(rows, count, columns[k])
+        for i in range(count):
             for r in range(6):
                 for k in range(joints):
-                    out[start + i, r, k] = columns[k, r * BLOCK + i]
+                    filled[i, r, k] = columns[k, r * BLOCK + i]
 
 
 @inner_kernel
-def _fill_start(rows: Reals, link: Reals) -> Axes:
+def _fill_start(rows: Reals, count: int, link: Reals) -> Axes:
     """Set all poses of a block to the first link; returns which columns hold y and z, and their signs."""
-    for r in range(3):
-        for c in range(4):
-            rows[(4 * r + c) * BLOCK : (4 * r + c + 1) * BLOCK] = link[r, c]
+    for k in range(12):
+        rows[k * BLOCK : k * BLOCK + count] = link[k // 4, k % 4]
     return int(1), int(2), 1.0, 1.0  # noqa: RUF046, UP018  (see inner_kernel)
 
 
 @inner_kernel
-def _keep_axis(rows: Reals, axes: Axes, sign: float, column: Reals) -> None:
+def _keep_axis(rows: Reals, count: int, axes: Axes, sign: float, column: Reals) -> None:
     """A point on the joint's axis, and the axis in the sense of the manufacturer's angle."""
     for r in range(3):
         zs = rows[(4 * r + axes[1]) * BLOCK :]
-        for i in range(BLOCK):
+        for i in range(count):
             column[r * BLOCK + i] = rows[(4 * r + 3) * BLOCK + i]
             column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign
 
 
 @kernel
-def _along(column: Reals) -> None:
+def _along(count: int, column: Reals) -> None:
     """The tool point's velocity by a prismatic joint: its axis, and no turn."""
-    for i in range(BLOCK):
+    for i in range(count):
         for r in range(3):
             column[r * BLOCK + i], column[(3 + r) * BLOCK + i] = column[(3 + r) * BLOCK + i], 0.0
 
 
 @inner_kernel
-def _lever(rows: Reals, column: Reals) -> None:
+def _lever(rows: Reals, count: int, column: Reals) -> None:
     """The tool point's velocity: axis times arm from the axis to the tool point."""
-    for i in range(BLOCK):
+    for i in range(count):
         x, y, z = rows[3 * BLOCK + i], rows[7 * BLOCK + i], rows[11 * BLOCK + i]
         x, y, z = x - column[i], y - column[BLOCK + i], z - column[2 * BLOCK + i]
         wx, wy, wz = column[3 * BLOCK + i], column[4 * BLOCK + i], column[5 * BLOCK + i]

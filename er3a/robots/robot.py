@@ -506,7 +506,7 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
     """
 
     def once(robot: Robot, /, *rest: Rest.args, **named: Rest.kwargs) -> Value:
-        key = (function, *rest, *named.items())
+        key = (function, *rest, *named.items()) if rest or named else function
         kept = robot.derived
         if key not in kept:
             kept[key] = function(robot, *rest, **named)

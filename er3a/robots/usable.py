@@ -135,10 +135,10 @@ def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
         q = as_floats(values, argument)
     except ShapeError:
         return
-    if q.ndim == 0 or q.shape[-1] != robot.joints or not q.size:
-        return
     flat, far = q.ravel(), _surely_no_radians(robot)
-    if q.size <= _FEW and flat @ flat < far**2:  # what most calls ask, in a microsecond
+    if q.size <= _FEW and flat.dot(flat) < far * far:  # what most calls ask, in a microsecond
+        return
+    if q.ndim == 0 or q.shape[-1] != robot.joints or not q.size:
         return
     highest, lowest = float(q.max()), float(q.min())
     if not (np.isfinite(highest) and np.isfinite(lowest)):
