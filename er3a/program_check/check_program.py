@@ -35,7 +35,7 @@ from er3a.planning.commands import (
 from er3a.planning.names import ACCELERATION_TIME
 from er3a.planning.profiles import LegTimes
 from er3a.planning.timing import JointLimits, joint_limits
-from er3a.program_check.motion_checks import AssumedRates, CheckRules
+from er3a.program_check.motion_checks import CheckRules
 from er3a.program_check.program_check_findings import (
     RANKS,
     Level,
@@ -92,7 +92,6 @@ class CheckOptions(ByValue):
     penetration_tolerance: float = PENETRATION_TOLERANCE
     assumed_margin: float = ASSUMED_MARGIN
     measures: bool = True
-    assumed: AssumedRates = field(default_factory=AssumedRates)
     limits: RunLimits = field(default_factory=RunLimits)
     keep_on: Callable[[], bool] = _always
 
@@ -231,7 +230,7 @@ def check_program(program: Program | str | Path, robot: Robot, options: CheckOpt
     """
     program = program if isinstance(program, Program) else read_program(program)
     options = options or CheckOptions()
-    judge = Judge(robot, CheckRules(options.near, assumed_limits(robot, options), options.assumed))
+    judge = Judge(robot, CheckRules(options.near, assumed_limits(robot, options)))
     execution = execute(program, robot, options.start, options.frames, options.limits, judge)
     motions = {number: execution.steps[number].moved for number in execution.motions}
     obstacles = None

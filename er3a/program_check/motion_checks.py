@@ -121,18 +121,8 @@ class MotionLaw:
         return np.where(share < rise, early, np.where(share > 1 - rise, self.duration - late, even))
 
 
-@dataclass(frozen=True)
-class AssumedRates:
-    """What is assumed where a program does not say.
-
-    Attributes
-    ----------
-    tool_speed : m/s; tool_acceleration : m/s^2; joint_share : of the joints' maximum speed
-    """
-
-    tool_speed: float = 0.25
-    tool_acceleration: float = 2.0
-    joint_share: float = 0.1
+ASSUMED_TOOL_SPEED, ASSUMED_TOOL_ACCELERATION = 0.25, 2.0  # m/s and m/s^2, where a program does not say
+ASSUMED_JOINT_SHARE = 0.1  # of the joints' maximum speed, where a program does not say
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +137,6 @@ class CheckRules(ByValue):
 
     near: NearSingular
     limits: JointLimits
-    assumed: AssumedRates
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,14 +220,13 @@ def _given(rate: Rate | None, unit: str) -> float | None:
     return rate.value if rate is not None and rate.unit == unit and rate.value > 0 else None
 
 
-def tool_law(motion: ArmMotion, length: float, turned: float, assumed: AssumedRates) -> MotionLaw:
+def tool_law(motion: ArmMotion, length: float, turned: float) -> MotionLaw:
     """The law of a line or arc, by its path or by its tool's turn, whichever takes longer.
 
     Parameters
     ----------
     length : m, of the tool point's path
     turned : rad, of the tool
-    assumed : speed and acceleration where the program gives none
 
     Returns
     -------
@@ -250,15 +238,13 @@ def tool_law(motion: ArmMotion, length: float, turned: float, assumed: AssumedRa
     """
     if (seconds := _given(motion.speed, "s")) is not None:
         return MotionLaw(seconds, RAMP_OF_A_DURATION)
-    v = _given(motion.speed, "m/s") or assumed.tool_speed
-    a = _given(motion.acceleration, "m/s2") or assumed.tool_acceleration
+    v = _given(motion.speed, "m/s") or ASSUMED_TOOL_SPEED
+    a = _given(motion.acceleration, "m/s2") or ASSUMED_TOOL_ACCELERATION
     turn_speed = motion.turn_speed or v / TURN_LENGTH
     return law_of(max(length, turned * v / turn_speed), v, a)
 
 
-def joint_law(
-    motion: ArmMotion, steps: Reals, limits: JointLimits, assumed: AssumedRates, length: float = 0.0
-) -> MotionLaw:
+def joint_law(motion: ArmMotion, steps: Reals, limits: JointLimits, length: float = 0.0) -> MotionLaw:
     """The law of a joint move whose joints turn by ``steps`` (n,) in rad, all together.
 
     With a speed of the tool it takes as long as the tool's straight way of ``length`` (m), and no joint is faster than
@@ -272,7 +258,7 @@ def joint_law(
         a = _given(motion.acceleration, "rad/s2") or float(limits.acceleration[lead])
         return law_of(float(size[lead]), lead_speed, a)
     along = _given(motion.speed, "m/s")
-    share = 1.0 if along is not None else _given(motion.speed, "share") or assumed.joint_share
+    share = 1.0 if along is not None else _given(motion.speed, "share") or ASSUMED_JOINT_SHARE
     quick = _given(motion.acceleration, "share") or 1.0
     slowest = int(np.argmax(size / limits.speed))
     law = law_of(
@@ -313,7 +299,7 @@ def joint_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: C
         return None
     tool = forward(arm, np.stack([start, end]))[:, :3, 3]
     moved = float(np.linalg.norm(tool[1] - tool[0]))
-    law = joint_law(motion, step, rules.limits, rules.assumed, moved)
+    law = joint_law(motion, step, rules.limits, moved)
     share = np.linspace(0.0, 1.0, _parts(0.0, lead) + 1)
     return MotionPath(arm, law, share, start + share[:, None] * step, moved, lead, of_tool=False)
 
@@ -347,7 +333,7 @@ def tool_path(
         return fact("not_followed", text=motion.form, reason="turns_with_path")
     share, q, stop = _followed(arm, way.poses, start, _parts(length, turned))
     ahead = None if stop is None else way.poses(np.array(min(stop + AHEAD, 1.0)))
-    return MotionPath(arm, tool_law(motion, length, turned, rules.assumed), share, q, length, turned, True, ahead)
+    return MotionPath(arm, tool_law(motion, length, turned), share, q, length, turned, True, ahead)
 
 
 def _followed(arm: Robot, poses: Poses, start: Reals, parts: int) -> tuple[Reals, Reals, float | None]:

@@ -32,6 +32,8 @@ from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import (
+    ASSUMED_JOINT_SHARE,
+    ASSUMED_TOOL_SPEED,
     CheckRules,
     MotionPath,
     Shares,
@@ -178,8 +180,8 @@ class Judge:
         else:
             self._to_joints(checked, target)
         if checked.path is not None and not is_given(motion):
-            assumed, word = self.rules.assumed, "" if motion.speed is None else motion.speed.text
-            speed = Amount(assumed.tool_speed, "m/s") if of_tool else Amount(100 * assumed.joint_share, "%")
+            word = "" if motion.speed is None else motion.speed.text
+            speed = Amount(ASSUMED_TOOL_SPEED, "m/s") if of_tool else Amount(100 * ASSUMED_JOINT_SHARE, "%")
             refused = motion.speed is not None and motion.speed.refused is not None
             checked.add(fact("speed_not_given", assumed=speed, word=word, refused=refused))
         return checked

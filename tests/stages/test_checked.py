@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from itertools import product
 from pathlib import Path
@@ -68,6 +69,8 @@ from er3a.pipeline.stages.vision.compute import compute as vision
 from er3a.pipeline.stages.workspace.compute import compute as workspace
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.study import Study, load_study
+from er3a.program_check.check_program import CheckOptions
+from er3a.programs.execution import RunLimits
 from er3a.robots.robot import ConvexPiece, Envelope, LinkMesh, PairRule, Robot
 
 ROBOT = "er3a_c60"
@@ -249,16 +252,17 @@ def test_free_space_that_no_motion_from_home_enters_is_no_pass(study, tmp_path):
     assert summary.verdict.status == "caution"
 
 
-def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path):
-    """The joint leaves its limits in a round that the settings leave out."""
+def test_loops_cut_off_by_their_limits_do_not_pass(study, tmp_path, monkeypatch):
+    """The joint leaves its limits in a round that is left out."""
     text = "def a():\n  i = 0\n  while i < 60:\n    i = i + 1\n    movej([0, 0, 0, 0, 0.1 * i, 0])\n  end\nend\n"
     (tmp_path / "a.script").write_text(text)
     listed = {"kind": "programs", "programs": [{"name": "job", "title": "Job", "file": str(tmp_path / "a.script")}]}
     (tmp_path / "programs.yaml").write_text(json.dumps(listed))
     entry = {"programs": str(tmp_path / "programs.yaml")}
     assert programs(changed(study, entry), ROBOT).summary.verdict.status == "fail"
-    for few in ({"loop_rounds": 3}, {"most_steps": 100}):
-        results = programs(changed(study, entry, programs=few), ROBOT)
+    for few in (RunLimits(rounds=3), RunLimits(operations=100)):
+        monkeypatch.setattr("er3a.pipeline.stages.programs.compute.CheckOptions", partial(CheckOptions, limits=few))
+        results = programs(changed(study, entry), ROBOT)
         if results.summary.verdict.status != "fail":
             assert "program_lines" in subjects(results), few
             assert results.summary.verdict.status == "caution", few

@@ -19,13 +19,10 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.covered import Covered, assumed_rates, covered_collisions
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.programs import model
-from er3a.pipeline.stages.programs.entry import ProgramsSettings
 from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular
 from er3a.pipeline.study import Study
 from er3a.program_check.check_program import CheckOptions, ProgramCheck, check_program
-from er3a.program_check.motion_checks import AssumedRates
 from er3a.program_check.program_check_findings import Level
-from er3a.programs.execution import RunLimits
 from er3a.programs.instructions import Pause
 from er3a.programs.languages import read_program
 from er3a.programs.program_names import ProgramOutcome
@@ -125,16 +122,12 @@ def _assumed(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[
 
 
 def _options(study: Study, name: str, listed: ProgramsFile) -> CheckOptions:
-    paths, own = study.section(TrajectorySettings), study.section(ProgramsSettings)
+    paths = study.section(TrajectorySettings)
     return CheckOptions(
         frames=listed.transforms(),
         near=near_singular(paths),
         penetration_tolerance=paths.penetration_tolerance_mm / 1000,
         assumed_margin=study.assumed_margin(name),
-        assumed=AssumedRates(
-            own.tool_speed_mm_s / 1000, own.tool_acceleration_mm_s2 / 1000, own.joint_speed_percent / 100
-        ),
-        limits=RunLimits(own.most_steps, own.most_branches, own.loop_rounds),
     )
 
 
