@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Collection, Sequence
 from pathlib import PurePosixPath
@@ -43,7 +42,6 @@ METRES_ABOVE_KG, FAR_WIDER = 0.5, 100.0  # ... of a link heavier than this, with
 AS_PRINTED = {"as_printed": True}
 """The context in which a table's values may be another unit's."""
 RADIANS_BELOW = 4.01 * math.pi  # an arm's widest limit, two turns, or its fastest joint, if written in radians
-MAX_PACKED = 400_000  # letters of a link's corners or triangles
 
 IMPOSSIBLE = {
     "not_finite": "is not a finite number",
@@ -575,64 +573,6 @@ class Envelopes(Sourced):
         return self
 
 
-class LinkVisual(StrictModel):
-    """The visual mesh of link ``link``, in the frame of its joint. It also shows whether the link reaches out of its
-    shapes.
-
-    In base64, as ``er3a import-urdf`` writes them: ``points_mm`` x, y, z of each corner as 32-bit floats, ``faces``
-    three corners (from 0) of each triangle as 16-bit integers, both little-endian.
-    """
-
-    link: Annotated[int, Field(ge=0)]
-    points_mm: Annotated[str, Field(max_length=MAX_PACKED)]
-    faces: Annotated[str, Field(max_length=MAX_PACKED)]
-
-    @model_validator(mode="after")
-    def _triangles(self):
-        self.visual()
-        return self
-
-    def visual(self) -> LinkMesh:
-        """Unpack the mesh.
-
-        Returns
-        -------
-        visual : corners in m, in the frame of the link's joint
-
-        Raises
-        ------
-        ValueError
-            if what is packed is anything but triangles
-        """
-        try:
-            points, faces = (
-                np.frombuffer(base64.b64decode(text, validate=True), kind).reshape(-1, 3)
-                for text, kind in ((self.points_mm, "<f4"), (self.faces, "<u2"))
-            )
-            if not len(faces) or faces.max() >= len(points) or not np.isfinite(points).all():
-                raise ValueError
-        except ValueError:
-            raise ValueError("holds no triangles | Import the URDF again, or remove the link from visuals") from None
-        return LinkMesh(self.link, points / 1000.0, faces.astype(np.int64))
-
-
-def link_visual(visual: LinkMesh) -> dict[str, int | str]:
-    """The fields of a :class:`LinkVisual`, packed for a file.
-
-    Parameters
-    ----------
-    visual : corners (k, 3) in m, faces (m, 3) as indices of corners
-
-    Returns
-    -------
-    fields : the link's number; corners in mm as little-endian 32-bit floats and faces as 16-bit integers, each in
-        base64
-    """
-    packed = ((1000 * visual.points).astype("<f4"), visual.faces.astype("<u2"))
-    points, faces = (base64.b64encode(array.tobytes()).decode() for array in packed)
-    return {"link": visual.link, "points_mm": points, "faces": faces}
-
-
 SHAPES = ("capsules", "meshes", "hulls", "surfaces")
 
 
@@ -684,7 +624,10 @@ class CollisionPairs(StrictModel):
 
 
 class RobotFile(InputFile):
-    """A robot file: data/robots/NAME.yaml."""
+    """A robot file: data/robots/NAME.yaml.
+
+    ``visuals`` are how links look. They also show whether a link reaches out of its shapes.
+    """
 
     kind: Literal["robot"]
     name: Name
@@ -701,7 +644,7 @@ class RobotFile(InputFile):
     flange: SourcedPlacement | None = None
     tool: SourcedPlacement | None = None
     envelopes: Envelopes | None = None
-    visuals: Annotated[list[LinkVisual], Field(max_length=MAX_JOINTS + 1)] = []
+    visuals: Annotated[list[LinkSurface], Field(max_length=MAX_JOINTS + 1)] = []
     collision: CollisionPairs | None = None
     inertia: Inertia | None = None
     drives: DriveGroup | None = None
@@ -712,15 +655,20 @@ class RobotFile(InputFile):
 
     @property
     def surfaces(self) -> tuple[LinkMesh, ...]:
-        """The triangles that ``envelopes.surfaces`` names."""
+        """The triangles that ``envelopes.surfaces`` names, then those that ``visuals`` does."""
         return self._surfaces
 
+    def named_surfaces(self) -> list[LinkSurface]:
+        """The entries of :attr:`surfaces`, those of ``envelopes`` first."""
+        return [*(self.envelopes.surfaces if self.envelopes else ()), *self.visuals]
+
     def with_surfaces(self, surfaces: tuple[LinkMesh, ...]) -> RobotFile:
-        """Keep the triangles that ``envelopes.surfaces`` names, which are read from files of their own.
+        """Keep the triangles that the file names, which are read from files of their own.
 
         Parameters
         ----------
-        surfaces : one mesh for each entry, corners in m in the frame that moves with the link's joint
+        surfaces : one mesh for each of :meth:`named_surfaces`, corners in m in the frame that moves with the link's
+            joint
 
         Returns
         -------

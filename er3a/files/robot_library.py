@@ -237,7 +237,7 @@ def read_robot(path: Path) -> robot_file.RobotFile:
     content = load(robot_file.RobotFile, path)
     if content.name != path.stem:
         raise InputError(path, "name", f"'{content.name}' is not the file's name", f"Write {path.stem}")
-    given = content.envelopes.surfaces if content.envelopes else []
+    given = content.named_surfaces()
     return content.with_surfaces(tuple(read_stl(path.parent / each.stl, each.link, each.sha256) for each in given))
 
 
@@ -323,7 +323,7 @@ def robot_of(content: robot_file.RobotFile) -> Robot:
             for each in (shapes.hulls if shapes else ())
         ),
         meshes=_surfaces(content),
-        visuals=tuple(each.visual() for each in content.visuals),
+        visuals=content.surfaces[len(content.surfaces) - len(content.visuals) :],
         pair_rules=content.collision.rules() if content.collision else (),
         sources={group: Source(value.source, value.grade, value.origin or "") for group, value in present.items()},
         origins=_origins(content),
@@ -411,7 +411,7 @@ def _metres(point: Sequence[float]) -> tuple[float, float, float]:
 
 def _surfaces(content: robot_file.RobotFile) -> tuple[LinkMesh, ...]:
     """The triangles beside the file, and those of the mesh files that it names."""
-    found = list(content.surfaces)
+    found = list(content.surfaces[: len(content.surfaces) - len(content.visuals)])
     for mesh in content.envelopes.meshes if content.envelopes else ():
         T, (points, faces) = mesh.transform(), mesh.triangles()
         found.append(LinkMesh(mesh.link, points @ T[:3, :3].T + T[:3, 3], faces))

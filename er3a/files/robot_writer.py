@@ -21,7 +21,6 @@ from er3a.files.robot_file import (
     BodyFields,
     RobotFile,
     drive_keys,
-    link_visual,
 )
 from er3a.files.robot_library import VALUES_OF_ROW
 from er3a.files.yaml_file import parse
@@ -121,7 +120,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         "title": robot.title,
         "zero_pose": robot.zero_pose or "not stated",
         "references": list(robot.references),
-        "visuals": [link_visual(each) for each in robot.visuals],
+        "visuals": _surfaces(robot.visuals),
         "home_deg": None if robot.home is None else [_tidy(value) for value in shown(robot, robot.home)],
     }
     if robot.pair_rules:
@@ -130,7 +129,7 @@ def robot_file(robot: Robot, path: Path | None = None) -> RobotFile:
         source = robot.sources.get(group, _UNKNOWN)
         content[group] = fields | {"source": source.source, "grade": source.grade, "origin": source.origin or None}
     with warnings.catch_warnings(action="ignore", category=InputWarning):  # for those who write numbers by hand
-        return parse(RobotFile, content, path).with_surfaces(robot.meshes)
+        return parse(RobotFile, content, path).with_surfaces((*robot.meshes, *robot.visuals))
 
 
 def _short(lengths_mm: np.ndarray) -> bool:
@@ -207,26 +206,31 @@ def _shapes(robot: Robot) -> dict[str, Any]:
             {"link": h.link, "margin_mm": _tidy(h.margin * 1000), "points_mm": [point(p) for p in h.points]}
             for h in robot.hulls
         ],
-        "surfaces": [
-            {"link": mesh.link, "stl": place.as_posix(), "sha256": hashlib.sha256(content).hexdigest()}
-            for mesh, (place, content) in zip(robot.meshes, surface_files(robot.meshes).items())
-        ],
+        "surfaces": _surfaces(robot.meshes),
     }
 
 
-def surface_files(meshes: Sequence[LinkMesh]) -> dict[Path, bytes]:
-    """The STL files of an arm's surfaces.
-
-    Parameters
-    ----------
-    meshes : corners in m, in the frame that moves with the link's joint
+def surface_files(robot: Robot) -> dict[Path, bytes]:
+    """The STL files of an arm's surfaces, those that are checked and those that it is drawn by.
 
     Returns
     -------
     files : content by place below the robot file's folder; names hold the link and the first 16 digits of the checksum
     """
-    contents = [(mesh.link, stl_of(mesh)) for mesh in meshes]
-    return {Path("meshes", f"link_{k}_{hashlib.sha256(each).hexdigest()[:16]}.stl"): each for k, each in contents}
+    return {_stl_place(each): stl_of(each) for each in (*robot.meshes, *robot.visuals)}
+
+
+def _surfaces(meshes: Sequence[LinkMesh]) -> list[dict[str, Any]]:
+    """Triangles as the file names them."""
+    return [{"link": each.link, "stl": _stl_place(each).as_posix(), "sha256": _checksum(each)} for each in meshes]
+
+
+def _stl_place(mesh: LinkMesh) -> Path:
+    return Path("meshes", f"link_{mesh.link}_{_checksum(mesh)[:16]}.stl")
+
+
+def _checksum(mesh: LinkMesh) -> str:
+    return hashlib.sha256(stl_of(mesh)).hexdigest()
 
 
 def _decided(robot: Robot, rule: str) -> list[dict[str, Any]]:
@@ -249,7 +253,7 @@ def write_robot(robot: Robot, path: Path) -> None:
         if the disk is full or permission is missing; an older file then stays as it is
     """
     text = robot_text(robot_file(robot, path))
-    for place, content in surface_files(robot.meshes).items():
+    for place, content in surface_files(robot).items():
         write_atomically(path.parent / place, partial(Path.write_bytes, data=content))
     write_text(path, text)
 

@@ -341,8 +341,7 @@ def link_visuals(
     for number, meshes in sorted(parts.items()):
         whole = link_mesh(number, np.concatenate([points[faces] for points, faces in meshes]))
         points, faces = simplified(whole.points, whole.faces, DRAWN_TRIANGLES // len(parts))
-        used, corners = np.unique(faces, return_inverse=True)
-        found.append(LinkMesh(number, points[used], corners.reshape(-1, 3)))
+        found.append(link_mesh(number, points[faces]))
     notes = (f"pictures show no visual geometry of {', '.join(missing)}: {why}" for why in missing.values())
     return tuple(found), tuple(notes)[:1]
 

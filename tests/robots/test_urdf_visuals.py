@@ -71,7 +71,7 @@ def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_pat
     write_robot(imported.robot.replace(name="arm"), tmp_path / "arm.yaml")
     again = load_robot(tmp_path / "arm.yaml")
     for one, other in zip(imported.robot.visuals, again.visuals, strict=True):
-        assert np.allclose(one.points, other.points, atol=1e-7)
+        assert np.array_equal(one.points, other.points)
         assert np.array_equal(one.faces, other.faces)
     (tmp_path / "out.urdf").write_text(export_urdf(imported.robot, tmp_path / "meshes"))
     exported = import_urdf(tmp_path / "out.urdf").robot
@@ -90,13 +90,12 @@ def test_pages_get_the_looks_beside_all_shapes_that_are_checked(imported):
     assert "visual" not in drawn_arm(imported.robot.replace(visuals=()))["looks"]
 
 
-@pytest.mark.parametrize("damage", ["faces: AAA", "faces: ////////", "points_mm: AAAA"])
-def test_a_damaged_surface_is_one_clear_error(imported, tmp_path, damage):
-    key = damage.partition(":")[0]
+def test_a_damaged_surface_is_one_clear_error(imported, tmp_path):
     write_robot(imported.robot.replace(name="arm"), tmp_path / "arm.yaml")
-    text = (tmp_path / "arm.yaml").read_text()
-    start = text.index(f"{key}: ", text.index("visuals:"))
-    end = min(at for at in (text.find(mark, start) for mark in (",", "}", "\n")) if at > 0)
-    (tmp_path / "arm.yaml").write_text(text[:start] + damage + text[end:])
-    with pytest.raises(InputError, match=r"visuals.*no triangles"):
+    own = next((tmp_path / "meshes").glob("link_1_*.stl"))
+    own.write_bytes(own.read_bytes()[:-1])
+    with pytest.raises(InputError, match=rf"{own.name}: was changed"):
+        load_robot(tmp_path / "arm.yaml")
+    own.unlink()
+    with pytest.raises(InputError, match=rf"{own.name}: can't be read"):
         load_robot(tmp_path / "arm.yaml")

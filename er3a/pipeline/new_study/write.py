@@ -78,7 +78,7 @@ def write_study(arm: Arm, folder: Path) -> tuple[list[Path], str]:
     texts |= {place: (ROOT / place).read_text(encoding="utf-8") for place in aids}
     for place, text in texts.items():
         write_text(folder / place, text)
-    for surface, content in surface_files(arm.robot.meshes).items():
+    for surface, content in surface_files(arm.robot).items():
         write_atomically(folder / "data" / "robots" / surface, partial(Path.write_bytes, data=content))
     return [folder / place for place in texts if place not in aids], found.shortcoming
 
