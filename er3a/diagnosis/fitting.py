@@ -168,7 +168,7 @@ Model = Callable[[Reals, Integers], Reals]
 """Residuals (R, n) of rows (R,) with amounts (R, k)."""
 
 
-def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers | None = None) -> Reals:
+def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers) -> Reals:
     """Derivatives of residuals by one-sided differences.
 
     Parameters
@@ -176,13 +176,13 @@ def slopes_of(model: Model, amounts: Reals, left: Reals, rows: Integers | None =
     model : of amounts and rows
     amounts : (R, k), m or rad
     left : (R, n), residuals there
-    rows : (R,), which the amounts belong to; None for 0 to R - 1
+    rows : (R,), which the amounts belong to
 
     Returns
     -------
     slopes : (R, n, k), half-widths per m or rad
     """
-    rows, k = np.arange(len(amounts)) if rows is None else rows, amounts.shape[1]
+    k = amounts.shape[1]
     ahead = (amounts[:, None] + PROBE * np.eye(k)).reshape(-1, k)
     beside = model(ahead, np.repeat(rows, k)).reshape(len(rows), k, -1)
     return ((beside - left[:, None]) / PROBE).swapaxes(1, 2)
@@ -236,7 +236,7 @@ def lowered(
         stalled = better & (after > (1 - STALLED) * before)
         going[rows[stalled | (after == 0)]] = False
         going &= by < MAX_DAMPING
-    return amounts, left
+    return amounts, off
 
 
 def descend(search: Search, fits: Fits, passes: int) -> Fits:
@@ -294,8 +294,7 @@ def _solved(slopes: Reals, left: Reals, damping: Reals, floor: float) -> Reals:
     unit = normal / scale[:, :, None] / scale[:, None, :]
     unit += np.eye(slopes.shape[2]) * damping[:, None, None]
     aim = np.einsum("bnk,bn->bk", slopes, left) / scale
-    solved: Reals = np.linalg.solve(unit, aim[:, :, None])[:, :, 0] / scale
-    return solved
+    return np.linalg.solve(unit, aim[:, :, None])[:, :, 0] / scale
 
 
 @dataclass(frozen=True)

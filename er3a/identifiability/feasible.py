@@ -109,8 +109,9 @@ class Region:
         def within(off: Reals) -> Reals:
             return self.asked.rest(off, inner)
 
-        found, _ = lowered(model, amounts, held, within, passes=PASSES, damping=DAMPING, floor=1.0, widest=self.widest)
-        off = off_of(self.tables(direction, found))
+        found, off = lowered(
+            model, amounts, held, within, passes=PASSES, damping=DAMPING, floor=1.0, widest=self.widest
+        )
         chi2 = (off[:, self.asked.likely] ** 2).sum(axis=1)
         return found, (self.asked.excess(off) <= MET) & (chi2 <= self.chi2 + PROFILE**2 * (1 + MET) + MET)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.comparison.entries import Entry, shifted
 from er3a.identifiability.entries import document_of, entries_of
-from er3a.identifiability.requirements import SoughtExtreme
+from er3a.identifiability.requirements import SoughtExtreme, along
 from er3a.kinematics.table_batch import Tables, join, tables_of
 from er3a.numerics.arrays import Flags
 from er3a.references.predict import predict_tables
@@ -173,7 +173,7 @@ def _moving_extreme(robot: Robot, quantity: Extreme, table: Tables, probes: Tabl
     """Whether (P,) an extreme moves: its measure where the table attains it, or, of other limits, the extreme."""
     sought = SoughtExtreme(quantity, robot)
     own = sought.at(table)
-    moving: Flags = np.abs(sought.along(probes) - own) > REACTS_MM
+    moving: Flags = np.abs(along(probes, [sought])[0] - own) > REACTS_MM
     bounded = ((probes.lower != table.lower) | (probes.upper != table.upper)).any(axis=1)
     for i in np.flatnonzero(bounded):
         moving[i] = abs(SoughtExtreme(quantity, robot).at(probes[[int(i)]]) - own) > REACTS_MM

@@ -62,35 +62,41 @@ class SoughtExtreme:
         if self.q is not None:
             points = np.concatenate([np.clip(self.q[self.joints], lower, upper)[None], points])
 
-        climbs = CLIMBS if self.q is None else 1
-        q, value = peak(lambda q: self.sign * self._measure(table, self._whole(q))[0], lower, upper, points, climbs)
+        q, value = peak(
+            lambda q: self.sign * self.quantity.measure(frames_of(table, self.robot, self._whole(q)))[0],
+            lower,
+            upper,
+            points,
+            CLIMBS if self.q is None else 1,
+        )
         self.q = self._whole(q)
         return self.sign * value * quantities.MM
-
-    def along(self, tables: Tables) -> Reals:
-        """The measure of many tables where the extreme was attained last.
-
-        Parameters
-        ----------
-        tables : H of them
-
-        Returns
-        -------
-        measure : (H,), mm
-        """
-        if self.q is None:
-            self.at(tables[[0]])
-        assert self.q is not None
-        return self._measure(tables, self.q[None])[:, 0] * quantities.MM
-
-    def _measure(self, tables: Tables, q: Reals) -> Reals:
-        measured: Reals = self.quantity.measure(frames_of(tables, self.robot, q))
-        return measured
 
     def _whole(self, q: Reals) -> Reals:
         whole = np.zeros((*q.shape[:-1], self.robot.joints))
         whole[..., self.joints] = q
         return whole
+
+
+def along(tables: Tables, extremes: Sequence[SoughtExtreme]) -> list[Reals]:
+    """The measures of many tables where extremes of one arm were attained last, in one batch of poses.
+
+    Parameters
+    ----------
+    tables : H of them
+    extremes : those that were not sought yet are sought for the first table
+
+    Returns
+    -------
+    measures : of each extreme (H,), mm
+    """
+    for sought in extremes:
+        if sought.q is None:
+            sought.at(tables[[0]])
+    if not extremes:
+        return []
+    T = frames_of(tables, extremes[0].robot, np.array([sought.q for sought in extremes]))
+    return [sought.quantity.measure(T[:, k]) * quantities.MM for k, sought in enumerate(extremes)]
 
 
 @dataclass(frozen=True)
@@ -216,7 +222,8 @@ class Asked:
         -------
         off : (H, m), components in half-widths or standard deviations
         """
-        extremes = [(sought.along(tables) - each.expected) / each.half_width for each, sought in self.extreme]
+        measured = along(tables, [sought for _, sought in self.extreme])
+        extremes = [(value - each.expected) / each.half_width for value, (each, _) in zip(measured, self.extreme)]
         return np.column_stack([self.plain_off(tables), *extremes])
 
     def off(self, table: Tables, afresh: bool = True) -> Reals:

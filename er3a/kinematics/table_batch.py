@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -58,6 +59,28 @@ class Tables(ByValue):
         column = getattr(self, name).copy()
         column[:, joints] = values
         return replace(self, **{name: column})
+
+    @cached_property
+    def kernel_columns(self) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]:
+        """Tables of either convention as arguments of :func:`fill_frames`.
+
+        Returns
+        -------
+        a, alpha, beta, d : (H, m + 1), of the link after each joint, the base's first, m and rad
+        direction, offset, sliding : (H, m)
+        """
+        count, joints = self.d.shape
+        a, alpha, beta, d = links = np.zeros((4, count, joints + 1))
+        d[:, 1:] = self.d
+        own = 0 if self.modified.all() else 1
+        for link, column in ((a, self.a), (alpha, self.alpha), (beta, self.beta)):
+            link[:, own : own + joints] = column
+        if own and self.modified.any():
+            rows = self.modified
+            for link, column in ((a, self.a), (alpha, self.alpha), (beta, self.beta)):
+                link[rows, :joints], link[rows, joints] = column[rows], 0.0
+        a, alpha, beta, d = for_kernel(links)
+        return a, alpha, beta, d, for_kernel(self.direction), for_kernel(self.offset), for_kernel(self.sliding)
 
 
 COLUMNS = tuple(field.name for field in fields(Tables) if field.name != "modified")
@@ -122,36 +145,10 @@ def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
         is the flange
     """
     out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
-    fill_frames(for_kernel(robot.base), *kernel_columns(tables), np.require(q, requirements=["C", "W"]), out)
+    fill_frames(for_kernel(robot.base), *tables.kernel_columns, np.require(q, requirements=["C", "W"]), out)
     if not robot.flange_is_last_frame:
         out[:, :, -1] = out[:, :, -1] @ robot.flange
     return out
-
-
-def kernel_columns(tables: Tables) -> tuple[Reals, Reals, Reals, Reals, Reals, Reals, Flags]:
-    """Tables of either convention as arguments of :func:`fill_frames`.
-
-    Parameters
-    ----------
-    tables : H tables
-
-    Returns
-    -------
-    a, alpha, beta, d : (H, m + 1), of the link after each joint, the base's first, m and rad
-    direction, offset, sliding : (H, m)
-    """
-    count, joints = tables.d.shape
-    a, alpha, beta, d = np.zeros((4, count, joints + 1))
-    d[:, 1:] = tables.d
-    own = 0 if tables.modified.all() else 1
-    for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
-        link[:, own : own + joints] = column
-    if own and tables.modified.any():
-        rows = tables.modified
-        for link, column in ((a, tables.a), (alpha, tables.alpha), (beta, tables.beta)):
-            link[rows, :joints], link[rows, joints] = column[rows], 0.0
-    a, alpha, beta, d = (for_kernel(each) for each in (a, alpha, beta, d))
-    return a, alpha, beta, d, for_kernel(tables.direction), for_kernel(tables.offset), for_kernel(tables.sliding)
 
 
 @kernel
@@ -172,7 +169,7 @@ def fill_frames(
     Parameters
     ----------
     base : (4, 4), m
-    a, alpha, beta, d, direction, offset, sliding : of :func:`kernel_columns`
+    a, alpha, beta, d, direction, offset, sliding : of :attr:`Tables.kernel_columns`
     q : (P, m), rad or m, row values
     out : (H, P, m + 1, 4, 4), filled, base frame
     """

@@ -7,6 +7,7 @@ eigenvalues. Nothing is random: equal inputs give equal numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -66,7 +67,6 @@ def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: 
 def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, float]:
     """From a point up to the next maximum: the point and its value."""
     offsets = _stencil(len(q))
-    here = -np.inf
     for _ in range(PEAK_STEPS):
         values = function(q + offsets)
         here = float(values[0])
@@ -101,10 +101,10 @@ def _newton(slope: Reals, curvature: Reals) -> Reals:
     values, vectors = np.linalg.eigh(curvature)
     size = np.maximum(np.abs(values), 1e-3 * max(float(np.abs(values).max()), float(np.abs(slope).max())) + 1e-12)
     step: Reals = vectors @ ((vectors.T @ slope) / size)
-    length = float(np.linalg.norm(step))
-    return step * min(1.0, LONGEST_STEP / length) if length else step
+    return step * (LONGEST_STEP / max(float(np.linalg.norm(step)), LONGEST_STEP))
 
 
+@cache
 def _stencil(d: int) -> Reals:
     unit = STEP * np.eye(d)
     pairs = [unit[i] + unit[j] for i in range(d) for j in range(i)]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from pathlib import Path
 from typing import Any, Concatenate, Literal, ParamSpec, TypeVar, get_args
 
@@ -363,7 +363,7 @@ class Robot(ByValue, Displayed):
         """
         return self.replace(tool=np.asarray(tool, float))
 
-    @property
+    @cached_property
     def flange_is_last_frame(self) -> bool:
         """Whether the table ends at the flange."""
         return np.array_equal(self.flange, np.eye(4))

@@ -21,7 +21,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
 from er3a.workspace.general_arm import GeneralArm
 
-Spread = tuple[float, float, float, float, float, float]
+Four = tuple[float, float, float, float]
 _PIECES, _LEVELS = 64, 6  # of a turn that is searched, and how often a piece is halved at most
 _ARCS = 6  # of azimuth that are kept for a ring
 
@@ -117,7 +117,7 @@ def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, 
         z_0, z_1 = z_0 + arm.lower[k], z_1 + arm.upper[k]
     else:
         a, b = a + arm.lower[k], b + arm.upper[k]
-    spread = max(0.0, rho - 1e-9), rho + 1e-9, z_0 - 1e-9, z_1 + 1e-9, 0.0, 0.0
+    spread = max(0.0, rho - 1e-9), rho + 1e-9, z_0 - 1e-9, z_1 + 1e-9
     i_0, i_1, j_0, j_1 = _range_of(spread, rings)
     for i in range(i_0, i_1 + 1):
         for j in range(j_0, j_1 + 1):
@@ -128,7 +128,7 @@ def _mark_tip(arm: GeneralArm, k: int, rho: float, azimuth: float, alone: bool, 
 
 
 @inner_kernel
-def _range_of(spread: Spread, rings: Rings) -> tuple[int, int, int, int]:
+def _range_of(spread: Four, rings: Rings) -> tuple[int, int, int, int]:
     """First and last ring in radius and height; none if the first is after the last."""
     n_rho, n_z = rings.counts.shape
     i_0, i_1 = int(spread[0] / rings.size[0] - 1e-9), int(spread[1] / rings.size[0] + 1e-9)
@@ -153,13 +153,15 @@ def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
 
 
 @kernel
-def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spread:
+def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tuple[Four, Four]:
     """Where a cell about axis k (of a bar so long (m), unless that is 0), at angles within ``width`` of one, lies about
     axis k + 1.
 
     Returns
     -------
-    rho_low, rho_high, z_low, z_high : m; phi, d_phi : rad
+    rho_low, rho_high, z_low, z_high : m
+    x, y, aside, clear : m, the middle, how far all is from it across, and how far from axis k + 1 along it at least;
+        azimuths, which take long, are worked out from them where they are needed
     """
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     c, s, along_bar = np.cos(angle), np.sin(angle), 0.0
@@ -188,15 +190,14 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> Spr
     safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + bar + abs(z) + abs(L[0, 3]) + abs(L[1, 3]) + abs(L[2, 3]))
     along, aside, up = along + safe, aside + safe, up + safe
     nearest = max(0.0, rho_there - along)
-    d_phi = np.arctan2(aside, rho_there - along) + 1e-9 if rho_there > along else np.pi
     farthest = np.sqrt((rho_there + along) ** 2 + aside * aside)
-    return nearest, farthest, pz - up, pz + up, np.arctan2(py, px), d_phi
+    return (nearest, farthest, pz - up, pz + up), (px, py, aside, rho_there - along)
 
 
 @kernel
 def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: float) -> bool:
     """Whether a cell at a range of angles about axis k may meet what is not empty about axis k + 1."""
-    spread = _spread(L, cell, angle, width, bar)
+    spread, (x, y, aside, clear) = _spread(L, cell, angle, width, bar)
     i_0, i_1, j_0, j_1 = _range_of(spread, outer)
     if i_0 > i_1 or j_0 > j_1:
         return False
@@ -205,9 +206,10 @@ def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: 
     total = sums[i_1 + 1, j_1 + 1] - sums[i_0, j_1 + 1] - sums[i_1 + 1, j_0] + sums[i_0, j_0]
     if total == 0:
         return False
-    if outer.full or spread[5] >= np.pi:
+    if outer.full or clear <= 0.0:
         return True
-    low, high = spread[4] - spread[5], spread[4] + spread[5]
+    phi, d_phi = np.arctan2(y, x), np.arctan2(aside, clear) + 1e-9
+    low, high = phi - d_phi, phi + d_phi
     for i in range(i_0, i_1 + 1):
         for j in range(j_0, j_1 + 1):
             if not _within(outer.empty[i, j], outer.counts[i, j], low, high):
@@ -324,7 +326,7 @@ def _shift(still: Rings, low: float, high: float, rings: Rings) -> None:
         for j in range(n_z):
             z_0 = rings.low + j * rings.size[1] - high
             z_1 = rings.low + (j + 1) * rings.size[1] - low
-            spread = i * rings.size[0], (i + 1) * rings.size[0], z_0 - 1e-9, z_1 + 1e-9, 0.0, 0.0
+            spread = i * rings.size[0], (i + 1) * rings.size[0], z_0 - 1e-9, z_1 + 1e-9
             i_0, i_1, j_0, j_1 = _range_of(spread, still)
             count = rings.counts[i, j]
             for k in range(i_0, i_1 + 1):

@@ -7,7 +7,7 @@ import pytest
 
 from er3a.files.robot_library import load_robot
 from er3a.identifiability.continuous import same_robots
-from er3a.identifiability.requirements import SoughtExtreme
+from er3a.identifiability.requirements import SoughtExtreme, along
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.references.predict import search
 from er3a.references.quantities import AxisDistance, SectionExtent
@@ -39,5 +39,5 @@ def test_an_extreme_is_that_of_the_flange_where_it_stands_off_the_table(reach, r
     expected, _ = search(robot, reach, STARTS)
     sought = SoughtExtreme(reach, robot)
     assert sought.at(tables_of(robot)) == pytest.approx(expected, abs=1e-3)
-    assert sought.along(tables_of(robot)) == pytest.approx(expected, abs=1e-3)
+    assert along(tables_of(robot), [sought])[0] == pytest.approx(expected, abs=1e-3)
     assert expected > least + 20
