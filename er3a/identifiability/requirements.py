@@ -23,8 +23,7 @@ from er3a.references.predict import TablesState
 from er3a.references.reference import Reference, conflicts
 from er3a.robots.robot import Robot
 
-SCAN, CLIMBS = 4096, 12  # points of a box and climbs where an extreme is sought afresh: a table far away has many tops
-WATCHED = 48  # points of a box where an extreme is followed
+AFRESH, FOLLOWED = (4096, 12), (48, 1)  # points of a box and climbs: a table far away has many tops
 LIKELY = 4.0  # standard deviations, beyond which a discrete alternative is excluded
 SLIGHT = 1e-3  # of a half-width
 TINY = 1e-300
@@ -58,16 +57,16 @@ class SoughtExtreme:
         """
         ends = np.sort(np.stack([table.lower[0], table.upper[0]]), axis=0)
         lower, upper = ends[:, self.joints]
-        points = box_points(lower, upper, SCAN if self.q is None else WATCHED)
+        count, climbs = AFRESH if self.q is None else FOLLOWED
+        points = box_points(lower, upper, count)
         if self.q is not None:
             points = np.concatenate([np.clip(self.q[self.joints], lower, upper)[None], points])
-
         q, value = peak(
             lambda q: self.sign * self.quantity.measure(frames_of(table, self.robot, self._whole(q)))[0],
             lower,
             upper,
             points,
-            CLIMBS if self.q is None else 1,
+            climbs,
         )
         self.q = self._whole(q)
         return self.sign * value * quantities.MM
@@ -161,7 +160,7 @@ def _hull(stated: Sequence[Reference], places: list[int]) -> Requirement:
 
 
 def _stated(reference: Reference) -> float:
-    return float(reference.expected if reference.expected is not None else np.nan)
+    return float(reference.expected or 0.0)  # there always is one
 
 
 class Asked:
