@@ -340,24 +340,18 @@ def _is_row(cells: Iterable[str]) -> bool:
 
 
 def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
-    """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
-    rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
+    """Rows as ``{"a": 0, "alpha": 90, ...}``; if such keys hold lists, these are columns (:func:`_vectors`)."""
+    rows = list[tuple[int, dict[str, str]]]()
     for each in sorted(groups, key=lambda group: group.start):
         if each.bracket != "{":
             continue
         pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
         cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
-        if not _is_row(cells):
-            continue
-        lists = {key: row_cells(value[1:-1]) for key, value in cells.items() if value[:1] == "["}
-        line = code.line(each.start)
-        if lists:
-            grids.append(_columns(line, lists))
-        else:
+        if _is_row(key for key, value in cells.items() if value[:1] != "["):
             label = re.search(r"""["']?([\w ]+)["']?\s*:\s*$""", each.before)
             names = {"joint": label[1]} if label and re.search(r"\d", label[1]) else {}
-            rows.append((line, names | cells))
-    return [*grids, *([_grid(rows)] if rows else [])]
+            rows.append((code.line(each.start), names | cells))
+    return [_grid(rows)] if rows else []
 
 
 def _blocks(code: Code) -> list[Grid]:
@@ -381,12 +375,6 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
     header = list(dict.fromkeys(key for _, cells in rows for key in cells))
     blank = {"direction": "1"}
     return [(0, header), *((line, [cells.get(key, blank.get(key, "")) for key in header]) for line, cells in rows)]
-
-
-def _columns(line: int, lists: dict[str, list[str]]) -> Grid:
-    longest = max(map(len, lists.values()))
-    fit = {key: values for key, values in lists.items() if len(values) == longest}
-    return [(0, list(fit)), *((line, list(row)) for row in zip(*fit.values()))]
 
 
 # Matrices and lists ---------------------------------------------------------------------------------------------------
@@ -465,57 +453,65 @@ def _order(code: Code, first: int, last: int, width: int) -> list[str]:
 
 
 def elements(text: str) -> dict[str, str]:
-    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``."""
-    return {
-        f"{name}{number}": cell
-        for name, cells in _lists(code_of(text)).items()
-        for number, cell in enumerate(cells, 0 if f"{name}[" in text else 1)
-    }
+    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``.
+
+    In square brackets numbers begin at 0 if a 0 is used, at 1 if the list's length is (Julia); else no element has a
+    value.
+    """
+    found = dict[str, str]()
+    for name, cells in _lists(code_of(text)).items():
+        used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
+        if not used or used & {0, len(cells)}:
+            found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
+    return found
 
 
 def _lists(code: Code) -> dict[str, list[str]]:
     """The lists of a program by their names; the last of a name that has several."""
-    return {name: cells for name, cells, _ in _named_lists(code)}
+    return {name: cells for name, cells, _, _ in _named_lists(code)}
 
 
-def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int]]:
-    """The name and the cells of each list, multiplied by what is written after it, and its line."""
+def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+    """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in groups_of(code.text):
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
         cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
-        yield name[1], cells, code.line(group.start)
+        yield name[1], cells, code.line(group.start), name[2]
 
 
 def _vectors(code: Code) -> list[Grid]:
-    """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
+    """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
     named: dict[str, list[str]] = {}
-    for name, cells, line in _named_lists(code):
+    line = 0
+    for name, cells, line, mark in _named_lists(code):
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
-        if heading and len(cells) > 1:
-            quantity = heading.quantity
-            if named.setdefault(quantity, cells) != cells and quantity != "theta":  # poses may follow
-                raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
+        quantity = heading.quantity if heading else name
+        if quantity not in _OF_VECTORS or not cells:
+            continue
+        text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
+        if quantity == "theta" and mark == "=" and not re.search(r"[^\W\d]", text):
+            quantity = "pose" if re.search("[1-9]", text) and name != "q" else ""
+        if named.setdefault(quantity, cells) != cells and quantity not in ("", "theta", "pose"):
+            raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
-    length = len(named["alpha"])
-    columns = {quantity: cells for quantity, cells in named.items() if len(cells) == length}
-    if not {"a", "alpha", "d"} <= {*columns}:
-        return []
-    theta = [re.sub(r"\b(?:\w+[._])?pi\b", "1", cell, flags=re.I) for cell in columns.get("theta", [])]
-    if not any(re.search(r"[^\W\d]", cell) for cell in theta):
-        columns.pop("theta", None)
-        theta = [cell for cell in theta if re.sub(r"[0.,()\s]", "", cell)]
-    if theta and "theta" not in columns:
+    named.pop("", None)
+    if named.pop("pose", None) and "theta" not in named:
         problem = "the list theta may hold zeros of the joints, or a pose"
         raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
-    used = "a", "alpha", "d", "theta", "offset"
-    return [_columns(1, {key: columns[key] for key in used if key in columns})]
+    if len({len(cells) for cells in named.values()}) > 1:
+        problem = f"lists of different lengths: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
+        raise InputError(None, f"line {line}", problem, "Give each list a number for each joint")
+    return [[(0, [*named]), *((1, list(row)) for row in zip(*named.values()))]]
+
+
+_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction"
 
 
 def _pairs(code: Code) -> list[Grid]:

@@ -268,6 +268,9 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("a (mm),alpha (deg),d (mm)\n0,pi/2°,3\n", "one unit|without a unit"),
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\noffset = [pi]", "offset 1|length"),
+        ('dh = {"a": [0, 0.3, 0], "d": [0.2, 0, 0], "alpha": [1, 0, 0], "theta": [0, 1]}', "theta 2"),
+        ("l = [0.1, 0.2, 0.3]\n# a alpha d\ndh = [[l[1], 0, 0], [0, 0, l[2]]]", "l1 = "),  # from 0 or from 1
         ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
         ("a1, a2 = 0, 0.3\na_2 = pi/2\nd = [0.2, 0]\na = [a1, a2]\nalpha = [a_2, 0]", "a2"),  # one symbol for er3a
         (
