@@ -8,6 +8,7 @@ ways is refused, with both.
 from __future__ import annotations
 
 import difflib
+import html
 import itertools
 import math
 import re
@@ -41,6 +42,7 @@ _CELL = (
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
     (r"\b[A-Za-z]\w*::", ""),
+    (r"(?<=[\d.])f\b", ""),
     (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
@@ -133,6 +135,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
+    text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
     try:
         found, from_code = _tables(text, columns)
     except InputError as error:
@@ -370,8 +373,9 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.rstrip(" \t.")
-                found[symbol] = value if found.get(symbol, value) == value else "two values"
+                value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
+                for symbol in {name, name_of(name)}:
+                    found[symbol] = value if found.get(symbol, value) == value else "two values"
         return found
 
     def converted(self) -> PrintedTable:
@@ -448,9 +452,9 @@ class _Table:
             own = heading_of(name)
             if not (_NUMBERED.search(name) or (own and own.quantity == "theta")):
                 self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
-        if {*map(abs, names.values())} - {1.0}:
+        if {*map(abs, names.values())} - {1.0, math.radians(1.0)}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
-        return replace(found, variables=names)
+        return replace(found, variables={name: math.copysign(1.0, times) for name, times in names.items()})
 
     def _kinds(self) -> list[str]:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
@@ -18,6 +18,9 @@ _BLOCK = re.compile(
 )
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
+_FIELD = r"(?:double|float|\w+_t)\s+(\w+);|(\w+)\s*:\s*(?:float|f32|f64|double)\b"
+_TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
+"""A type whose fields are numbers: in C its name may follow."""
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
 _ORDERS = {
     "dhlink": ("d", "alpha", "theta", "a", "sigma"),
@@ -41,17 +44,18 @@ _UNPACKED = re.compile(
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
-_INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
+_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
 @dataclass(frozen=True)
 class Code:
-    """A program: its text without comments, and these by their lines."""
+    """A program: its text without comments, these by their lines, and the fields of its types by their names."""
 
     text: str
     comments: dict[int, str]
+    fields: dict[str, list[str]]
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
@@ -72,7 +76,13 @@ class CodeGroup:
 def code_of(text: str) -> Code:
     """A program's text without its comments; the numbers of its lines stay."""
     comments: dict[int, str] = {}
-    text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+
+    def lines_of(found: re.Match[str]) -> str:
+        first = text.count("\n", 0, found.start()) + 1
+        comments.update(enumerate(found[0].split("\n"), first))
+        return "\n" * found[0].count("\n")
+
+    text = _BLOCK.sub(lines_of, text)
     text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
     def kept(found: re.Match[str]) -> str:
@@ -80,7 +90,9 @@ def code_of(text: str) -> Code:
             comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
         return found[1] or ""
 
-    return Code(_COMMENT.sub(kept, text), comments)
+    text = _COMMENT.sub(kept, text)
+    fields = {each[1] or each[4]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
+    return Code(text, comments, {name: [a or b for a, b in pairs] for name, pairs in fields.items()})
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -184,8 +196,8 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
-    texts = [cell for row in rows for cell in _constants(row.cells)]
-    if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
+    texts, lists = [cell for row in rows for cell in _constants(row.cells)], _lists(code)
+    if any((own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in lists for text in texts):  # a matrix, by rows
         return []
     if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
         return [_looped(code, rows)]
@@ -195,15 +207,16 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
-    lists = [each for each in lists if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in arms or lists or _begun_again(rows)]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
+    held = [each for each in held if len(each) > 1]
+    return [_grid([(row.line, row.cells) for row in each]) for each in arms or held or _begun_again(rows)]
 
 
 def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     named tuple."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
+    orders |= {name: names for name, names in code.fields.items() if _names_columns(names)}
     for each in groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = [heading.quantity for name in names if (heading := heading_of(name))]
@@ -386,15 +399,17 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     widths = {len(row) for row in rows}
     if len(rows) < 2 or len(widths) > 1 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0]):
         return []
+    if re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1])):  # a pose
+        return []
     (width,) = widths
     if not 3 <= width <= 8:
         return []
     first, last = code.line(group.start), code.line(group.end)
-    header = _order(code, first, last, width) or _symbols(rows[0])
+    header = _order(code, group, width) or _symbols(rows[0])
     lines = _row_lines(code, first, last, len(rows))
     labels = [code.comments.get(line, "") for line in lines]
     named = header and "joint" not in header and len({*lines}) == len(rows)
-    if named and all(re.search(r"[^\W\d_]", each) and not heading_of(each) for each in labels):
+    if named and all(re.search(r"\w", each) and not heading_of(each) for each in labels):
         header = ["joint", *header]
         rows = [[label, *row] for label, row in zip(labels, rows)]
     return [(0, header), *zip(lines, rows)]
@@ -402,7 +417,7 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows = list[tuple[int, list[str]]]()
+    rows, used = list[tuple[int, list[str]]](), list[CodeGroup]()
     for group in sorted(groups, key=lambda each: each.start):
         label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
@@ -413,9 +428,10 @@ def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
                 and (not rows or len(cells) == len(rows[0][1]) - 1)
             ):
                 rows.append((code.line(group.start), [label[1] or "", *cells]))
+                used.append(group)
     if len(rows) < 2:
         return []
-    header = _order(code, rows[0][0], rows[-1][0], len(rows[0][1]) - 1)
+    header = _order(code, replace(used[0], end=used[-1].end), len(rows[0][1]) - 1)
     return [[(0, ["joint", *header] if header else []), *rows]]
 
 
@@ -429,27 +445,58 @@ def _row_lines(code: Code, first: int, last: int, rows: int) -> list[int]:
 def _symbols(row: list[str]) -> list[str]:
     """The names of columns as a row of symbols has them: ``theta1 d1 a1 alpha1``."""
     names = [re.sub(r"\d+$", "", cell) for cell in row]
-    quantities = {found.quantity for name in names if (found := heading_of(name))}
-    return names if len(quantities) == len(row) and {"a", "alpha", "d"} <= quantities else []
+    return names if _names_columns(names) else []
 
 
-def _order(code: Code, first: int, last: int, width: int) -> list[str]:
-    """The names of a matrix's columns, of a comment, of what its rows are unpacked into, or of a library."""
+def _order(code: Code, group: CodeGroup, width: int) -> list[str]:
+    """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, of
+    a list of names in any comment, of names given by column (``a = dh[i][0]``), or of a library."""
+    first, last = code.line(group.start), code.line(group.end)
     near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
     unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
-    for comment in (*reversed(near), *(unpacked if len(unpacked) == 1 else ())):
+    typed = [",".join(names) for name, names in code.fields.items() if re.search(rf"\b{name}\b", group.before)]
+    listed = {
+        each for text in code.comments.values() for each in re.findall(rf"\[(?:[^][,]+,){{{width - 1}}}[^][,]+\]", text)
+    }
+    for comment in (
+        *reversed(near),
+        *(each for several in (typed, unpacked, listed) if len(several) == 1 for each in several),
+    ):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):
             window = words[start : start + width]
-            quantities = [found.quantity for word in window if (found := heading_of(word))]
-            if len({*quantities}) == width and {"a", "alpha", "d"} <= {*quantities}:
+            if _names_columns(window):
                 return window
+    if _names_columns(names := _by_column(code, width)):
+        return names
     for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
         if library in code.text and len(names) >= width and width >= 4:
             return names[:width]
     return []
+
+
+def _names_columns(names: list[str]) -> bool:
+    """Whether names are those of a D-H table's columns, each once."""
+    quantities = {found.quantity for name in names if (found := heading_of(name))}
+    return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
+
+
+def _by_column(code: Code, width: int) -> list[str]:
+    """The names that a matrix's columns get one by one: ``a = dh[i][0]``, ``alpha = dh(i,2)``, or in a call."""
+    given = re.findall(r"(\w+)[ \t]*=(?!=)[ \t]*([^=\n;]+)", code.text)
+    orders = _signatures(code, groups := groups_of(code.text))
+    for each in groups:
+        if named := re.search(r"(\w+)\s*$", each.before):
+            given += zip(orders.get(named[1], ()), parts(each.inside))
+    places: dict[int, str] = {}
+    for name, text in given:
+        if heading_of(name) and (place := re.search(r"\w(?:[\[(][^\[\]()]*,|\[[^\[\]]*\]\[)\s*(\d)\s*[\])]", text)):
+            if places.setdefault(int(place[1]), name) != name:
+                return []
+    begin = 0 if 0 in places else 1 if width in places else width
+    return [places.get(place, "") for place in range(begin, begin + width)]
 
 
 def elements(text: str) -> dict[str, str]:
@@ -477,7 +524,8 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
+        tuple_of = group.bracket == "(" and "," in group.inside and group.before.rstrip()[-1:] == "="
+        if name is None or (group.bracket == "(" and not tuple_of) or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
@@ -492,55 +540,61 @@ def _vectors(code: Code) -> list[Grid]:
     for name, cells, line, mark in _named_lists(code):
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         quantity = heading.quantity if heading else name
+        if quantity == "theta" and mark == "=" and not _symbolic(cells):
+            quantity = "pose" if name != "q" and re.search("[1-9]", " ".join(cells)) else ""
         if quantity not in _OF_VECTORS or not cells:
             continue
-        text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
-        if quantity == "theta" and mark == "=" and not re.search(r"[^\W\d]", text):
-            quantity = "pose" if re.search("[1-9]", text) and name != "q" else ""
-        if named.setdefault(quantity, cells) != cells and quantity not in ("", "theta", "pose"):
+        if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
             raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
-    named.pop("", None)
     if named.pop("pose", None) and "theta" not in named:
-        problem = "the list theta may hold zeros of the joints, or a pose"
-        raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
+        raise _pose(line)
     if len({len(cells) for cells in named.values()}) > 1:
         problem = f"lists of different lengths: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
         raise InputError(None, f"line {line}", problem, "Give each list a number for each joint")
     return [[(0, [*named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
-_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction"
+_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
+
+
+def _symbolic(cells: Iterable[str]) -> bool:
+    """Whether cells hold names other than pi."""
+    return bool(re.search(r"[^\W\d]", re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)))
+
+
+def _pose(line: int) -> InputError:
+    problem = "theta may be zeros of the joints, or a pose"
+    return InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
 
 
 def _pairs(code: Code) -> list[Grid]:
     """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
-    entries = {
-        (name.rpartition("_")[2], int(number)): (value.strip(), place)
-        for name, number, value, place in _found(pattern, code.text)
-    }
-    found_names = {name for name, _ in entries}
+    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
+    entries, marks = dict[tuple[str, int], str](), dict[str, str]()
+    places = dict[int, int]()
+    for each in re.finditer(pattern, code.text, re.I):
+        name = each[1].lower().rpartition("_")[2]
+        name = "theta" if name == "th" else name
+        entries[name, int(each[2])], marks[name], places[int(each[2])] = each[4].strip(), each[3], each.start()
     joints = sorted(number for name, number in entries if name == "d")
     shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
+    names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
     rows = list[tuple[int, dict[str, str]]]()
     for joint in joints:
-        before = joint - shift
-        angle = entries.get(("q", joint)) or entries.get(("theta", joint)) or (f"q{joint}", 0)
-        cells = [entries.get((name, number)) for name, number in (("alpha", before), ("a", before), ("d", joint))]
-        if None in cells:
+        keys = ("alpha", joint - shift), ("a", joint - shift), ("d", joint)
+        if not entries.keys() >= {*keys}:
             return []
-        names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
-        row = {name: cell[0] for name, cell in zip(names, cells) if cell}
-        row |= {"joint": str(joint), "theta": angle[0]}
-        if "offset" in found_names:
-            row["offset"] = entries.get(("offset", joint), ("0", 0))[0]
-        rows.append((code.line(cells[2][1] if cells[2] else 0), row))
-    angles = found_names & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
-    return [_grid(rows)] if len(rows) > 1 and (angles or "DH_" in code.text) else []
-
-
-def _found(pattern: str, text: str) -> Iterator[tuple[str, str, str, int]]:
-    for each in re.finditer(pattern, text, re.IGNORECASE):
-        yield each[1].lower(), each[2], each[3], each.start()
+        angle = entries.get(("q", joint)) or entries.get(("theta", joint)) or f"q{joint}"
+        row = dict(zip(names, map(entries.__getitem__, keys))) | {"joint": str(joint), "theta": angle}
+        if "offset" in marks:
+            row["offset"] = entries.get(("offset", joint), "0")
+        rows.append((code.line(places[joint]), row))
+    angles = [angle for (name, _), angle in entries.items() if name == "theta"]
+    found = marks.keys() & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
+    if len(rows) < 2 or not (found or re.search("DH_ALPHA", code.text, re.I)):
+        return []
+    if marks.get("theta") == "=" and re.search("[1-9]", " ".join(angles)) and not _symbolic(angles):
+        raise _pose(rows[0][0])
+    return [_grid(rows)]
