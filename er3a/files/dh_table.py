@@ -330,8 +330,8 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
     # A small arm in mm, or a large one in cm, and no other for sure.
     small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
     if unsaid and small and (likely in ("mm", "cm") or all(length == round(length) for length in lengths)):
-        problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
-        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
+        problem = f"the lengths, {longest:g} at most, say no unit"
+        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm, m or in")
     if likely == "mm":
         return "mm"
     word = {"m": "metres", "in": "inches", "cm": "centimetres"}[likely]

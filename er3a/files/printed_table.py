@@ -24,7 +24,7 @@ from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, code_grids, elements
-from er3a.files.table_headings import Heading, heading_of
+from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
@@ -173,7 +173,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
     -------
     found : whether a, alpha and d are all among them
     """
-    return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
+    return {*quantities_of(map(str.strip, header))} >= NEEDED
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -373,10 +373,11 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                value = f"({value}) {unit}" if unit else value.rstrip(" \t.")
-                for symbol in {name, name_of(name)}:
-                    found[symbol] = value if found.get(symbol, value) == value else "two values"
-        return found
+                _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+        plainly: dict[str, str] = {}
+        for name, value in found.items():
+            _keep(plainly, name_of(name), value)
+        return plainly | found
 
     def converted(self) -> PrintedTable:
         """The table under er3a's headings, with variables taken out of the cells of theta and d.
@@ -570,6 +571,11 @@ class _Table:
         """Whether other columns are in radians, whose small angles are radians then."""
         texts = [cell.lower() for _, cells in self.rows for cell in cells]
         return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
+
+
+def _keep(found: dict[str, str], name: str, value: str) -> None:
+    """A symbol's value; one with two values has none."""
+    found[name] = value if found.get(name, value) == value else "two values"
 
 
 def _in(amount: CellAmount, unit: str) -> float:

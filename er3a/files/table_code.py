@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
-from er3a.files.table_headings import heading_of
+from er3a.files.table_headings import heading_of, quantities_of
 
 _COMMENT = re.compile(
     r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
@@ -138,20 +138,21 @@ def row_cells(text: str) -> list[str]:
     return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
 
 
-def _rows(group: CodeGroup) -> list[list[str]]:
-    """The rows of a matrix; [] if the group is none."""
-    inner = [each for each in parts(group.inside) if each]
-    if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
-        return [row_cells(each[1:-1]) for each in inner]
-    lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-    matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
-    if (
-        not matrix
-        or len(lines) < 2
-        or (";" not in group.inside and any(each.rstrip().endswith(",") for each in lines[:-1]))
-    ):
-        return []
-    return [row_cells(each.strip().strip("[],")) for each in lines]
+def _rows(code: Code, group: CodeGroup) -> Grid:
+    """The rows of a matrix with their lines; [] if the group is none."""
+    texts = [each for each in parts(group.inside) if each]
+    if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
+        texts = [each[1:-1] for each in texts]
+    else:
+        lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
+        lists = ";" not in group.inside and any(each.endswith(",") for each in lines[:-1])
+        matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
+        texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
+    grid, place = Grid(), group.start
+    for text in texts:
+        place = code.text.index(text, place)
+        grid.append((code.line(place), row_cells(text)))
+    return grid
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
@@ -170,8 +171,8 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for each in groups if (grid := _matrix(code, each))]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, *_listed(code, groups)) if grid[0][1]]
-    return _calls(code, groups) or _records(code, groups) or _blocks(code) or named or _vectors(code) or _pairs(code)
+    named = [grid for grid in (*matrices, _listed(code, groups)) if grid and grid[0][1]]
+    return _calls(code, groups) or _records(code, groups) or _blocks(code) or named or _vectors(code)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
@@ -214,15 +215,14 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
 
 def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
-    named tuple."""
+    type."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
-    orders |= {name: names for name, names in code.fields.items() if _names_columns(names)}
     for each in groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
-        found = [heading.quantity for name in names if (heading := heading_of(name))]
+        found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
             orders.setdefault(named[1], names)
-    return orders
+    return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
 def _parameters(text: str) -> list[str]:
@@ -239,7 +239,7 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 
 def _constants(cells: dict[str, str]) -> list[str]:
     """The cells of a row without theta, which can be an element ``q[0]``."""
-    return [cell for name, cell in cells.items() if (own := heading_of(name)) is None or own.quantity != "theta"]
+    return [cell for name, cell in cells.items() if quantities_of([name]) != ["theta"]]
 
 
 @dataclass(frozen=True)
@@ -348,7 +348,7 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
 
 def _is_row(cells: Iterable[str]) -> bool:
     """Whether keys are those of a D-H row."""
-    quantities = {found.quantity for key in cells if (found := heading_of(key))}
+    quantities = {*quantities_of(cells)}
     return "alpha" in quantities and bool(quantities & {"a", "d"})
 
 
@@ -394,52 +394,38 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
 
 
 def _matrix(code: Code, group: CodeGroup) -> Grid:
-    """A matrix with the names of its columns, as a comment or the library that takes it says them."""
-    rows = _rows(group)
-    widths = {len(row) for row in rows}
-    if len(rows) < 2 or len(widths) > 1 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0]):
+    """A matrix with the names of its columns; [] if it is none, or a pose."""
+    rows = _rows(code, group)
+    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0][1]):
         return []
-    if re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1])):  # a pose
+    if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
         return []
-    (width,) = widths
-    if not 3 <= width <= 8:
-        return []
-    first, last = code.line(group.start), code.line(group.end)
-    header = _order(code, group, width) or _symbols(rows[0])
-    lines = _row_lines(code, first, last, len(rows))
-    labels = [code.comments.get(line, "") for line in lines]
-    named = header and "joint" not in header and len({*lines}) == len(rows)
-    if named and all(re.search(r"\w", each) and not heading_of(each) for each in labels):
-        header = ["joint", *header]
-        rows = [[label, *row] for label, row in zip(labels, rows)]
-    return [(0, header), *zip(lines, rows)]
+    several = len({line for line, _ in rows}) == len(rows)
+    labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
+    return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
 
 
-def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, used = list[tuple[int, list[str]]](), list[CodeGroup]()
+    rows, labels = Grid(), list[str]()
     for group in sorted(groups, key=lambda each: each.start):
         label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
-            if (
-                4 <= len(cells) <= 8
-                and all(re.search(r"\d|pi|π", cell) for cell in cells)
-                and (not rows or len(cells) == len(rows[0][1]) - 1)
-            ):
-                rows.append((code.line(group.start), [label[1] or "", *cells]))
-                used.append(group)
-    if len(rows) < 2:
-        return []
-    header = _order(code, replace(used[0], end=used[-1].end), len(rows[0][1]) - 1)
-    return [[(0, ["joint", *header] if header else []), *rows]]
+            numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
+            if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
+                rows.append((code.line(group.start), cells))
+                labels.append(label[1] or "")
+    return _titled(code, rows, labels) if len(rows) > 1 else []
 
 
-def _row_lines(code: Code, first: int, last: int, rows: int) -> list[int]:
-    """The lines on which the rows of a matrix are."""
-    texts = code.text.split("\n")
-    filled = [line for line in range(first, last + 1) if re.search(r"[\d\w]", re.sub(r"^.*=", "", texts[line - 1]))]
-    return filled[-rows:] if len(filled) >= rows else [first] * rows
+def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
+    """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
+    header = _order(code, rows, before) or _symbols(rows[0][1])
+    if header and "joint" not in header and all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels):
+        if not any(map(heading_of, labels)):
+            return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
+    return [(0, header), *rows]
 
 
 def _symbols(row: list[str]) -> list[str]:
@@ -448,13 +434,14 @@ def _symbols(row: list[str]) -> list[str]:
     return names if _names_columns(names) else []
 
 
-def _order(code: Code, group: CodeGroup, width: int) -> list[str]:
+def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, of
     a list of names in any comment, of names given by column (``a = dh[i][0]``), or of a library."""
-    first, last = code.line(group.start), code.line(group.end)
-    near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
+    first, last, width = rows[0][0], rows[-1][0], len(rows[0][1])
+    near = [code.comments[line] for line in range(max(first - 5, 0), last + 2) if line in code.comments]
     unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
-    typed = [",".join(names) for name, names in code.fields.items() if re.search(rf"\b{name}\b", group.before)]
+    orders = _signatures(code, groups_of(code.text))
+    typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
     listed = {
         each for text in code.comments.values() for each in re.findall(rf"\[(?:[^][,]+,){{{width - 1}}}[^][,]+\]", text)
     }
@@ -479,22 +466,17 @@ def _order(code: Code, group: CodeGroup, width: int) -> list[str]:
 
 def _names_columns(names: list[str]) -> bool:
     """Whether names are those of a D-H table's columns, each once."""
-    quantities = {found.quantity for name in names if (found := heading_of(name))}
+    quantities = {*quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
 
 
 def _by_column(code: Code, width: int) -> list[str]:
-    """The names that a matrix's columns get one by one: ``a = dh[i][0]``, ``alpha = dh(i,2)``, or in a call."""
-    given = re.findall(r"(\w+)[ \t]*=(?!=)[ \t]*([^=\n;]+)", code.text)
-    orders = _signatures(code, groups := groups_of(code.text))
-    for each in groups:
-        if named := re.search(r"(\w+)\s*$", each.before):
-            given += zip(orders.get(named[1], ()), parts(each.inside))
+    """The names that a matrix's columns get one by one: ``a = dh[i][0]``, ``alpha = dh(i,2)``."""
+    pattern = r"(\w+)[ \t]*=(?!=)[^=\n;]*\w(?:[\[(][^\[\]()\n]*,|\[[^\[\]\n]*\]\[)\s*(\d)\s*[\])]"
     places: dict[int, str] = {}
-    for name, text in given:
-        if heading_of(name) and (place := re.search(r"\w(?:[\[(][^\[\]()]*,|\[[^\[\]]*\]\[)\s*(\d)\s*[\])]", text)):
-            if places.setdefault(int(place[1]), name) != name:
-                return []
+    for name, place in re.findall(pattern, code.text):
+        if heading_of(name) and places.setdefault(int(place), name) != name:
+            return []
     begin = 0 if 0 in places else 1 if width in places else width
     return [places.get(place, "") for place in range(begin, begin + width)]
 
@@ -535,66 +517,51 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
 
 def _vectors(code: Code) -> list[Grid]:
     """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
+    return _of_lists(_named_lists(code)) or _of_lists(_numbered(code))
+
+
+def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
-    line = 0
-    for name, cells, line, mark in _named_lists(code):
+    header, line = dict[str, str](), 0
+    for name, cells, line, mark in lists:
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         quantity = heading.quantity if heading else name
-        if quantity == "theta" and mark == "=" and not _symbolic(cells):
-            quantity = "pose" if name != "q" and re.search("[1-9]", " ".join(cells)) else ""
+        if quantity == "theta" and mark == "=":
+            text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
+            if not re.search(r"[^\W\d]", text):
+                quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
         if quantity not in _OF_VECTORS or not cells:
             continue
+        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
             raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     if named.pop("pose", None) and "theta" not in named:
-        raise _pose(line)
+        problem = "theta may be zeros of the joints, or a pose"
+        raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
     if len({len(cells) for cells in named.values()}) > 1:
-        problem = f"lists of different lengths: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
-        raise InputError(None, f"line {line}", problem, "Give each list a number for each joint")
-    return [[(0, [*named]), *((1, list(row)) for row in zip(*named.values()))]]
+        problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
+        raise InputError(None, f"line {line}", problem, "Give one for each joint")
+    return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
 _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 
-def _symbolic(cells: Iterable[str]) -> bool:
-    """Whether cells hold names other than pi."""
-    return bool(re.search(r"[^\W\d]", re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)))
-
-
-def _pose(line: int) -> InputError:
-    problem = "theta may be zeros of the joints, or a pose"
-    return InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
-
-
-def _pairs(code: Code) -> list[Grid]:
-    """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
-    entries, marks = dict[tuple[str, int], str](), dict[str, str]()
-    places = dict[int, int]()
+def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
+    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
+    found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(pattern, code.text, re.I):
-        name = each[1].lower().rpartition("_")[2]
-        name = "theta" if name == "th" else name
-        entries[name, int(each[2])], marks[name], places[int(each[2])] = each[4].strip(), each[3], each.start()
-    joints = sorted(number for name, number in entries if name == "d")
-    shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
-    names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
-    rows = list[tuple[int, dict[str, str]]]()
-    for joint in joints:
-        keys = ("alpha", joint - shift), ("a", joint - shift), ("d", joint)
-        if not entries.keys() >= {*keys}:
-            return []
-        angle = entries.get(("q", joint)) or entries.get(("theta", joint)) or f"q{joint}"
-        row = dict(zip(names, map(entries.__getitem__, keys))) | {"joint": str(joint), "theta": angle}
-        if "offset" in marks:
-            row["offset"] = entries.get(("offset", joint), "0")
-        rows.append((code.line(places[joint]), row))
-    angles = [angle for (name, _), angle in entries.items() if name == "theta"]
-    found = marks.keys() & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
-    if len(rows) < 2 or not (found or re.search("DH_ALPHA", code.text, re.I)):
-        return []
-    if marks.get("theta") == "=" and re.search("[1-9]", " ".join(angles)) and not _symbolic(angles):
-        raise _pose(rows[0][0])
-    return [_grid(rows)]
+        found.setdefault(each[1].lower(), {})[int(each[2])] = each
+    if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
+        return  # they may be in a matrix of these symbols
+    for name, entries in found.items():
+        last = entries[max(entries)]
+        of_link = found["alpha" if name in ("alpha", "a") else "d"]
+        if gaps := {*range(min(of_link), max(entries) + 1)} - {*entries}:
+            problem = f"{name}{min(gaps)} is missing"
+            raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
+        before = "(i-1)" if min(of_link) < min(found["d"]) else ""
+        yield name + before, [entries[k][4].strip() for k in sorted(entries)], code.line(last.start()), last[3]

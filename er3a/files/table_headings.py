@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -75,3 +76,8 @@ def heading_of(text: str) -> Heading | None:
     last = _LAST_WORD.fullmatch(plain(text.lower()))
     marked = marked or (last and _NAMES.get(last[1]))
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None
+
+
+def quantities_of(names: Iterable[str]) -> list[str]:
+    """The quantities of those headings that are a D-H table's."""
+    return [found.quantity for name in names if (found := heading_of(name))]
