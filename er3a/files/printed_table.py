@@ -264,33 +264,23 @@ def _trimmed(table: Grid) -> Grid:
 
 
 def _stacked(text: str) -> list[Grid]:
-    """A table that was copied with each cell on a line of its own."""
+    """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
     lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
     cells = [(number, line) for number, line in enumerate(lines, 1) if line]
     width = 0
     for place, (_, cell) in enumerate(cells):
-        header = [name for _, name in cells[place - width : place]]
+        rows = [cells[k : k + width] for k in range(place - width, len(cells), width)] if width else []
+        grid = [(row[0][0], [text for _, text in row]) for row in rows]
         if heading_of(cell):
             width += 1
-        elif is_printed_table(header):
-            return [_rows_of(width, header, cells[place - width :])]
+        elif grid and is_printed_table(grid[0][1]):
+            end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
+            if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
+                raise InputError(None, f"line {grid[0][0]}", "cells are missing in the last row", "Add them")
+            return [grid[:end]]
         else:
             width = 0
     return []
-
-
-def _rows_of(width: int, header: list[str], cells: list[tuple[int, str]]) -> Grid:
-    """Cells from those of the header on, ``width`` in a row, as far as these are a table's."""
-    grid: Grid = [(cells[0][0], header)]
-    for place in range(width, len(cells), width):
-        row = [cell for _, cell in cells[place : place + width]]
-        if len(row) == width and _numeric(row):
-            grid.append((cells[place][0], row))
-        elif re.fullmatch(r"[-\d.]+", row[0]):
-            raise InputError(None, f"line {cells[0][0]}", "cells are missing in the last row", "Add them")
-        else:
-            break
-    return grid
 
 
 def _turned(grid: Grid) -> list[Grid]:
@@ -453,9 +443,9 @@ class _Table:
             own = heading_of(name)
             if not (_NUMBERED.search(name) or (own and own.quantity == "theta")):
                 self._refuse(row, k, f"'{name}' has no value", f"Write {name} = ... below the table")
-        if {*map(abs, names.values())} - {1.0, math.radians(1.0)}:
+        if {*map(abs, names.values())} - {1.0}:
             self._refuse(row, k, f"'{cell}' is not a number", "Write a number")
-        return replace(found, variables={name: math.copysign(1.0, times) for name, times in names.items()})
+        return replace(found, variables=names)
 
     def _kinds(self) -> list[str]:
         """The type of each row: its d slides if that is a variable, and theta none; nothing moves in a row that has no

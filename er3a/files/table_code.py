@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
@@ -18,7 +18,7 @@ _BLOCK = re.compile(
 )
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
-_FIELD = r"(?:double|float|\w+_t)\s+(\w+);|(\w+)\s*:\s*(?:float|f32|f64|double)\b"
+_FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
 _TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
 """A type whose fields are numbers: in C its name may follow."""
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
@@ -76,13 +76,7 @@ class CodeGroup:
 def code_of(text: str) -> Code:
     """A program's text without its comments; the numbers of its lines stay."""
     comments: dict[int, str] = {}
-
-    def lines_of(found: re.Match[str]) -> str:
-        first = text.count("\n", 0, found.start()) + 1
-        comments.update(enumerate(found[0].split("\n"), first))
-        return "\n" * found[0].count("\n")
-
-    text = _BLOCK.sub(lines_of, text)
+    text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
     text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
     def kept(found: re.Match[str]) -> str:
@@ -91,8 +85,8 @@ def code_of(text: str) -> Code:
         return found[1] or ""
 
     text = _COMMENT.sub(kept, text)
-    fields = {each[1] or each[4]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
-    return Code(text, comments, {name: [a or b for a, b in pairs] for name, pairs in fields.items()})
+    fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
+    return Code(text, comments, fields)
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -172,7 +166,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
     named = [grid for grid in (*matrices, _listed(code, groups)) if grid and grid[0][1]]
-    return _calls(code, groups) or _records(code, groups) or _blocks(code) or named or _vectors(code)
+    return _calls(code, groups) or _records(code, groups) or named or _vectors(code)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
@@ -353,35 +347,34 @@ def _is_row(cells: Iterable[str]) -> bool:
 
 
 def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
-    """Rows as ``{"a": 0, "alpha": 90, ...}``; if such keys hold lists, these are columns (:func:`_vectors`)."""
+    """Rows as ``{"a": 0, "alpha": 90, ...}``, or as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a
+    name or a key that is repeated; if such keys hold lists, these are columns (:func:`_vectors`)."""
     rows = list[tuple[int, dict[str, str]]]()
     for each in sorted(groups, key=lambda group: group.start):
-        if each.bracket != "{":
-            continue
-        pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
-        cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
-        if _is_row(key for key, value in cells.items() if value[:1] != "["):
-            label = re.search(r"""["']?([\w ]+)["']?\s*:\s*$""", each.before)
-            names = {"joint": label[1]} if label and re.search(r"\d", label[1]) else {}
-            rows.append((code.line(each.start), names | cells))
-    return [_grid(rows)] if rows else []
-
-
-def _blocks(code: Code) -> list[Grid]:
-    """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated."""
-    rows: list[tuple[int, dict[str, str]]] = [(0, {})]
+        if each.bracket == "{":
+            pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
+            label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
+            cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+            rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
+    if any(_is_full(cells) for _, cells in rows):
+        return [_grid([row for row in rows if _is_full(row[1])])]
+    rows = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
         key = found[2].lower()
         if found[1] or key in rows[-1][1] or not found[3]:
-            label = {"joint": key} if not found[3] and re.search(r"\d", key) else {}
-            rows.append((number, label))
+            rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [(line, cells) for line, cells in rows if _is_row(cells)]
+    full = [row for row in rows if _is_full(row[1])]
     return [_grid(full)] if len(full) > 1 else []
+
+
+def _is_full(cells: dict[str, str]) -> bool:
+    """Whether cells are those of a D-H row, not lists."""
+    return _is_row(key for key, value in cells.items() if value[:1] != "[")
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
@@ -421,42 +414,32 @@ def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
 
 def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
-    header = _order(code, rows, before) or _symbols(rows[0][1])
-    if header and "joint" not in header and all(re.search(r"[^\W\d_]|^\d+$", each) for each in labels):
-        if not any(map(heading_of, labels)):
-            return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
+    symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
+    header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
+    if header and (kind := re.search(r"Joint\([^;\n]*[\"'](prismatic|fixed)", code.text)):
+        problem = f"a joint is {kind[1]}, and no column says which"
+        raise InputError(None, f"line {code.line(kind.start())}", problem, "Add a column of types")
+    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
+    if header and "joint" not in header and labelled:
+        return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
     return [(0, header), *rows]
 
 
-def _symbols(row: list[str]) -> list[str]:
-    """The names of columns as a row of symbols has them: ``theta1 d1 a1 alpha1``."""
-    names = [re.sub(r"\d+$", "", cell) for cell in row]
-    return names if _names_columns(names) else []
-
-
 def _order(code: Code, rows: Grid, before: str) -> list[str]:
-    """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, of
-    a list of names in any comment, of names given by column (``a = dh[i][0]``), or of a library."""
+    """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
+    of a library."""
     first, last, width = rows[0][0], rows[-1][0], len(rows[0][1])
     near = [code.comments[line] for line in range(max(first - 5, 0), last + 2) if line in code.comments]
     unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
     orders = _signatures(code, groups_of(code.text))
     typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
-    listed = {
-        each for text in code.comments.values() for each in re.findall(rf"\[(?:[^][,]+,){{{width - 1}}}[^][,]+\]", text)
-    }
-    for comment in (
-        *reversed(near),
-        *(each for several in (typed, unpacked, listed) if len(several) == 1 for each in several),
-    ):
+    for comment in (*reversed(near), *typed, *(unpacked if len(unpacked) == 1 else ())):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):
             window = words[start : start + width]
             if _names_columns(window):
                 return window
-    if _names_columns(names := _by_column(code, width)):
-        return names
     for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
         if library in code.text and len(names) >= width and width >= 4:
@@ -468,17 +451,6 @@ def _names_columns(names: list[str]) -> bool:
     """Whether names are those of a D-H table's columns, each once."""
     quantities = {*quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
-
-
-def _by_column(code: Code, width: int) -> list[str]:
-    """The names that a matrix's columns get one by one: ``a = dh[i][0]``, ``alpha = dh(i,2)``."""
-    pattern = r"(\w+)[ \t]*=(?!=)[^=\n;]*\w(?:[\[(][^\[\]()\n]*,|\[[^\[\]\n]*\]\[)\s*(\d)\s*[\])]"
-    places: dict[int, str] = {}
-    for name, place in re.findall(pattern, code.text):
-        if heading_of(name) and places.setdefault(int(place), name) != name:
-            return []
-    begin = 0 if 0 in places else 1 if width in places else width
-    return [places.get(place, "") for place in range(begin, begin + width)]
 
 
 def elements(text: str) -> dict[str, str]:
@@ -506,8 +478,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        tuple_of = group.bracket == "(" and "," in group.inside and group.before.rstrip()[-1:] == "="
-        if name is None or (group.bracket == "(" and not tuple_of) or re.search(r"[\[{:]", group.inside):
+        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
