@@ -186,7 +186,7 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
-    if rows and unread:
+    if unread and (rows or "Link([" in code.text):
         raise InputError(
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
@@ -428,8 +428,8 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
 def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
-    first, last, width = rows[0][0], rows[-1][0], len(rows[0][1])
-    near = [code.comments[line] for line in range(max(first - 5, 0), last + 2) if line in code.comments]
+    width = len(rows[0][1])
+    near = [code.comments[k] for k in range(max(rows[0][0] - 5, 0), rows[-1][0] + 2) if k in code.comments]
     unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
     orders = _signatures(code, groups_of(code.text))
     typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
