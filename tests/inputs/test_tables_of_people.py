@@ -303,6 +303,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("th1 = pi/6; th2 = 0\nd1 = 0.3; d2 = 0\na1 = 0; a2 = 0.4\nalpha1 = pi/2; alpha2 = 0", "pose"),
         ("q1 = q1; q2 = q2\nd1 = 0.3; d2 = 0\na1 = 0\nalpha1 = pi/2; alpha2 = 0", "a 1|different"),
         ("% theta d a alpha\nDH = [0 0 0 pi/2;\n0 0 0.3 0];\nL(1) = Link([DH(1,:) 1 0]);", "line 4"),
+        ("i;a [mm];alpha [gon];d [mm]\n1;0;100;300\n2;270;0;0\n", "alpha_deg"),
         ("j = rigidBodyJoint(['j' n],'prismatic');\n% a alpha d theta\nM = [0 0 0.3 0;\n0.2 0 0 0];", "types"),
         ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
         (
