@@ -24,7 +24,7 @@ def words_of(text: str) -> dict[str, str]:
 
 
 UNITS = words_of(
-    "mm=mm 毫米=mm cm=cm m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
+    "mm=mm 毫米=mm cm=cm dm=dm ft=ft gon=gon m=m 米=m metre=m meter=m metres=m meters=m in=in inch=in "
     "°=deg deg=deg degs=deg degree=deg degrees=deg grad=deg 度=deg rad=rad rads=rad radian=rad radians=rad"
 )
 _RADIANS = {"deg2rad", "radians", "d2r", "dtr", "torad"}

@@ -329,12 +329,12 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
     longest = max(lengths, default=0.0)
     # A small arm in mm, or a large one in cm, and no other for sure.
     small = LONGEST_LINK_M <= longest < SHORTEST_LINK_MM
-    if unsaid and small and (likely == "mm" or all(length == round(length) for length in lengths)):
-        problem = f"the lengths, {longest:g} at most, say no unit: mm, cm or inches"
-        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm or in")
+    if unsaid and small and (likely in ("mm", "cm") or all(length == round(length) for length in lengths)):
+        problem = f"the lengths, {longest:g} at most, say no unit"
+        raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm, m or in")
     if likely == "mm":
         return "mm"
-    word = {"m": "metres", "in": "inches"}[likely]
+    word = {"m": "metres", "in": "inches", "cm": "centimetres"}[likely]
     if not (as_printed or unsaid):
         problem = f"the lengths, {longest:g} mm at most, are those of an arm in {word}"
         remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"
@@ -401,7 +401,7 @@ def _likely_unit(lengths: list[float]) -> LengthUnit:
     in_inches = max(lengths) < LONGEST_ARM_IN and is_round(25.4) and not is_round(1.0)
     if in_inches and not (metres and is_round(1000.0)):
         return "in"
-    return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "in"
+    return "mm" if not metres else "m" if max(lengths) < LONGEST_LINK_M else "cm"
 
 
 def _unit(row: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ ways is refused, with both.
 from __future__ import annotations
 
 import difflib
+import html
 import itertools
 import math
 import re
@@ -23,7 +24,7 @@ from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, code_grids, elements
-from er3a.files.table_headings import Heading, heading_of
+from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
 from er3a.robots.robot import CONVENTIONS, MAX_JOINTS, Convention
@@ -40,7 +41,8 @@ _CELL = (
     (r"\[(mm|cm|m|in|deg|rad|°)\]", r" \1"),
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
-    (r"\b[A-Za-z]\w*::", ""),
+    (r"\b[A-Za-z]\w*(?:::|\.(?=[A-Za-z]))", ""),
+    (r"(?<=[\d.])f\b", ""),
     (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
@@ -59,7 +61,7 @@ SIGNS = {
 }
 """What a text around a table says of its convention."""
 _GIVEN = re.compile(
-    r"(?<![\w.\])}])([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
+    r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
     r"(?=[),;，；。%#≈`\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
@@ -133,6 +135,7 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
         naming line and cell: for two tables, for what can be read in two ways, and for what can't be read
     """
     text = re.sub(r"(?m)^[ \t]*#define[ \t]+(\w+)[ \t]+(.+)$", r"\1 = \2;", text)
+    text = re.sub(r"&#?\w+;", lambda found: html.unescape(found[0]), text)
     try:
         found, from_code = _tables(text, columns)
     except InputError as error:
@@ -170,7 +173,7 @@ def is_printed_table(header: Iterable[str]) -> bool:
     -------
     found : whether a, alpha and d are all among them
     """
-    return {found.quantity for name in header if (found := heading_of(name.strip()))} >= NEEDED
+    return {*quantities_of(map(str.strip, header))} >= NEEDED
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -261,33 +264,23 @@ def _trimmed(table: Grid) -> Grid:
 
 
 def _stacked(text: str) -> list[Grid]:
-    """A table that was copied with each cell on a line of its own."""
+    """A table that was copied with each cell on a line of its own, as far as its rows are a table's."""
     lines = [line.strip() for line in without_latex(plain(text)).split("\n")]
     cells = [(number, line) for number, line in enumerate(lines, 1) if line]
     width = 0
     for place, (_, cell) in enumerate(cells):
-        header = [name for _, name in cells[place - width : place]]
+        rows = [cells[k : k + width] for k in range(place - width, len(cells), width)] if width else []
+        grid = [(row[0][0], [text for _, text in row]) for row in rows]
         if heading_of(cell):
             width += 1
-        elif is_printed_table(header):
-            return [_rows_of(width, header, cells[place - width :])]
+        elif grid and is_printed_table(grid[0][1]):
+            end = next((k for k, (_, row) in enumerate(grid) if k and not (len(row) == width and _numeric(row))), None)
+            if end and re.fullmatch(r"[-\d.]+", grid[end][1][0]):
+                raise InputError(None, f"line {grid[0][0]}", "cells are missing in the last row", "Add them")
+            return [grid[:end]]
         else:
             width = 0
     return []
-
-
-def _rows_of(width: int, header: list[str], cells: list[tuple[int, str]]) -> Grid:
-    """Cells from those of the header on, ``width`` in a row, as far as these are a table's."""
-    grid: Grid = [(cells[0][0], header)]
-    for place in range(width, len(cells), width):
-        row = [cell for _, cell in cells[place : place + width]]
-        if len(row) == width and _numeric(row):
-            grid.append((cells[place][0], row))
-        elif re.fullmatch(r"[-\d.]+", row[0]):
-            raise InputError(None, f"line {cells[0][0]}", "cells are missing in the last row", "Add them")
-        else:
-            break
-    return grid
 
 
 def _turned(grid: Grid) -> list[Grid]:
@@ -370,9 +363,11 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                symbol, value = name_of(name), f"({value}) {unit}" if unit else value.rstrip(" \t.")
-                found[symbol] = value if found.get(symbol, value) == value else "two values"
-        return found
+                _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+        plainly: dict[str, str] = {}
+        for name, value in found.items():
+            _keep(plainly, name_of(name), value)
+        return plainly | found
 
     def converted(self) -> PrintedTable:
         """The table under er3a's headings, with variables taken out of the cells of theta and d.
@@ -566,6 +561,11 @@ class _Table:
         """Whether other columns are in radians, whose small angles are radians then."""
         texts = [cell.lower() for _, cells in self.rows for cell in cells]
         return any(own.unit == "rad" for own in self.headings.values()) or any("π" in x or "pi" in x for x in texts)
+
+
+def _keep(found: dict[str, str], name: str, value: str) -> None:
+    """A symbol's value; one with two values has none."""
+    found[name] = value if found.get(name, value) == value else "two values"
 
 
 def _in(amount: CellAmount, unit: str) -> float:

@@ -37,7 +37,7 @@ _LATEX = (
     (r"\\beta", "β"),
     (r"\\pi(?![a-z])", "π"),
     (r"\\(?:cdot|times|ast)\b", "*"),
-    (r"\\[()\[\],;!: ]|\$|~|\\q?quad|&nbsp;", " "),
+    (r"\\[()\[\],;!: ]|\$|~|\\q?quad", " "),
 )
 _FRACTION = re.compile(r"\\[dt]?frac\s*(?:\{([^{}]*)\}|(\\?\w))\s*(?:\{([^{}]*)\}|(\w))")
 _FUNCTION = re.compile(r"\\(sqrt|sin|cos|arctan|arcsin|arccos)\s*(?:\{([^{}]*)\})?")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
-from er3a.files.table_headings import heading_of
+from er3a.files.table_headings import heading_of, quantities_of
 
 _COMMENT = re.compile(
     r"""("(?:[^"\\\n]|\\.)*"|(?<![\w\])}.'])'(?:[^'\\\n]|\\.)*')|(?:(?<![:\w])//|[%\#])+([^\n]*)|\.\.\.(?=\s*(?:%[^\n]*)?\n)"""
@@ -18,6 +18,9 @@ _BLOCK = re.compile(
 )
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
+_FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
+_TYPE = re.compile(rf"(?:struct|class)\s+(\w*)[^{{}}\n]*[{{:]?\s*(?:(?:{_FIELD})[^\n]*\s*){{3,8}}(?:\}}\s*(\w*))?")
+"""A type whose fields are numbers: in C its name may follow."""
 _OF_LINK = "theta", "d", "a", "alpha", "sigma", "offset"
 _ORDERS = {
     "dhlink": ("d", "alpha", "theta", "a", "sigma"),
@@ -41,17 +44,18 @@ _UNPACKED = re.compile(
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
-_INDEXED = re.compile(r"(\w+)\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
+_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
 @dataclass(frozen=True)
 class Code:
-    """A program: its text without comments, and these by their lines."""
+    """A program: its text without comments, these by their lines, and the fields of its types by their names."""
 
     text: str
     comments: dict[int, str]
+    fields: dict[str, list[str]]
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
@@ -80,7 +84,9 @@ def code_of(text: str) -> Code:
             comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
         return found[1] or ""
 
-    return Code(_COMMENT.sub(kept, text), comments)
+    text = _COMMENT.sub(kept, text)
+    fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
+    return Code(text, comments, fields)
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -126,20 +132,21 @@ def row_cells(text: str) -> list[str]:
     return [cell.strip("\"'") for cell in (cells if cells[-1:] != [""] else cells[:-1])]
 
 
-def _rows(group: CodeGroup) -> list[list[str]]:
-    """The rows of a matrix; [] if the group is none."""
-    inner = [each for each in parts(group.inside) if each]
-    if len(inner) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in inner):
-        return [row_cells(each[1:-1]) for each in inner]
-    lines = [each for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-    matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
-    if (
-        not matrix
-        or len(lines) < 2
-        or (";" not in group.inside and any(each.rstrip().endswith(",") for each in lines[:-1]))
-    ):
-        return []
-    return [row_cells(each.strip().strip("[],")) for each in lines]
+def _rows(code: Code, group: CodeGroup) -> Grid:
+    """The rows of a matrix with their lines; [] if the group is none."""
+    texts = [each for each in parts(group.inside) if each]
+    if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
+        texts = [each[1:-1] for each in texts]
+    else:
+        lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
+        lists = ";" not in group.inside and any(each.endswith(",") for each in lines[:-1])
+        matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
+        texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
+    grid, place = Grid(), group.start
+    for text in texts:
+        place = code.text.index(text, place)
+        grid.append((code.line(place), row_cells(text)))
+    return grid
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
@@ -158,8 +165,8 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for each in groups if (grid := _matrix(code, each))]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, *_listed(code, groups)) if grid[0][1]]
-    return _calls(code, groups) or _records(code, groups) or _blocks(code) or named or _vectors(code) or _pairs(code)
+    named = [grid for grid in (*matrices, _listed(code, groups)) if grid and grid[0][1]]
+    return _calls(code, groups) or _records(code, groups) or named or _vectors(code)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
@@ -179,13 +186,13 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
-    if rows and unread:
+    if unread and (rows or "Link([" in code.text):
         raise InputError(
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
-    texts = [cell for row in rows for cell in _constants(row.cells)]
-    if any(re.fullmatch(r"\w+\[\d\]", text) for text in texts):  # of a matrix, by rows
+    texts, lists = [cell for row in rows for cell in _constants(row.cells)], _lists(code)
+    if any((own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in lists for text in texts):  # a matrix, by rows
         return []
     if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
         return [_looped(code, rows)]
@@ -195,21 +202,21 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    lists = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
-    lists = [each for each in lists if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in arms or lists or _begun_again(rows)]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
+    held = [each for each in held if len(each) > 1]
+    return [_grid([(row.line, row.cells) for row in each]) for each in arms or held or _begun_again(rows)]
 
 
 def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
-    named tuple."""
+    type."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
     for each in groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
-        found = [heading.quantity for name in names if (heading := heading_of(name))]
+        found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
             orders.setdefault(named[1], names)
-    return orders
+    return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
 def _parameters(text: str) -> list[str]:
@@ -226,7 +233,7 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 
 def _constants(cells: dict[str, str]) -> list[str]:
     """The cells of a row without theta, which can be an element ``q[0]``."""
-    return [cell for name, cell in cells.items() if (own := heading_of(name)) is None or own.quantity != "theta"]
+    return [cell for name, cell in cells.items() if quantities_of([name]) != ["theta"]]
 
 
 @dataclass(frozen=True)
@@ -335,46 +342,39 @@ def _looped(code: Code, rows: list[_Link]) -> Grid:
 
 def _is_row(cells: Iterable[str]) -> bool:
     """Whether keys are those of a D-H row."""
-    quantities = {found.quantity for key in cells if (found := heading_of(key))}
+    quantities = {*quantities_of(cells)}
     return "alpha" in quantities and bool(quantities & {"a", "d"})
 
 
 def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
-    """Rows as ``{"a": 0, "alpha": 90, ...}``, and columns as ``{"a": [0, 270], ...}``."""
-    rows, grids = list[tuple[int, dict[str, str]]](), list[Grid]()
+    """Rows as ``{"a": 0, "alpha": 90, ...}``, or as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a
+    name or a key that is repeated; if such keys hold lists, these are columns (:func:`_vectors`)."""
+    rows = list[tuple[int, dict[str, str]]]()
     for each in sorted(groups, key=lambda group: group.start):
-        if each.bracket != "{":
-            continue
-        pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
-        cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
-        if not _is_row(cells):
-            continue
-        lists = {key: row_cells(value[1:-1]) for key, value in cells.items() if value[:1] == "["}
-        line = code.line(each.start)
-        if lists:
-            grids.append(_columns(line, lists))
-        else:
-            label = re.search(r"""["']?([\w ]+)["']?\s*:\s*$""", each.before)
-            names = {"joint": label[1]} if label and re.search(r"\d", label[1]) else {}
-            rows.append((line, names | cells))
-    return [*grids, *([_grid(rows)] if rows else [])]
-
-
-def _blocks(code: Code) -> list[Grid]:
-    """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated."""
-    rows: list[tuple[int, dict[str, str]]] = [(0, {})]
+        if each.bracket == "{":
+            pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
+            label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
+            cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+            rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
+    if any(_is_full(cells) for _, cells in rows):
+        return [_grid([row for row in rows if _is_full(row[1])])]
+    rows = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
         key = found[2].lower()
         if found[1] or key in rows[-1][1] or not found[3]:
-            label = {"joint": key} if not found[3] and re.search(r"\d", key) else {}
-            rows.append((number, label))
+            rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [(line, cells) for line, cells in rows if _is_row(cells)]
+    full = [row for row in rows if _is_full(row[1])]
     return [_grid(full)] if len(full) > 1 else []
+
+
+def _is_full(cells: dict[str, str]) -> bool:
+    """Whether cells are those of a D-H row, not lists."""
+    return _is_row(key for key, value in cells.items() if value[:1] != "[")
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
@@ -383,79 +383,62 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
     return [(0, header), *((line, [cells.get(key, blank.get(key, "")) for key in header]) for line, cells in rows)]
 
 
-def _columns(line: int, lists: dict[str, list[str]]) -> Grid:
-    longest = max(map(len, lists.values()))
-    fit = {key: values for key, values in lists.items() if len(values) == longest}
-    return [(0, list(fit)), *((line, list(row)) for row in zip(*fit.values()))]
-
-
 # Matrices and lists ---------------------------------------------------------------------------------------------------
 
 
 def _matrix(code: Code, group: CodeGroup) -> Grid:
-    """A matrix with the names of its columns, as a comment or the library that takes it says them."""
-    rows = _rows(group)
-    widths = {len(row) for row in rows}
-    if len(rows) < 2 or len(widths) > 1 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0]):
+    """A matrix with the names of its columns; [] if it is none, or a pose."""
+    rows = _rows(code, group)
+    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0][1]):
         return []
-    (width,) = widths
-    if not 3 <= width <= 8:
+    if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
         return []
-    first, last = code.line(group.start), code.line(group.end)
-    header = _order(code, first, last, width) or _symbols(rows[0])
-    lines = _row_lines(code, first, last, len(rows))
-    labels = [code.comments.get(line, "") for line in lines]
-    named = header and "joint" not in header and len({*lines}) == len(rows)
-    if named and all(re.search(r"[^\W\d_]", each) and not heading_of(each) for each in labels):
-        header = ["joint", *header]
-        rows = [[label, *row] for label, row in zip(labels, rows)]
-    return [(0, header), *zip(lines, rows)]
+    several = len({line for line, _ in rows}) == len(rows)
+    labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
+    return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
 
 
-def _listed(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows = list[tuple[int, list[str]]]()
+    rows, labels = Grid(), list[str]()
     for group in sorted(groups, key=lambda each: each.start):
         label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
-            if (
-                4 <= len(cells) <= 8
-                and all(re.search(r"\d|pi|π", cell) for cell in cells)
-                and (not rows or len(cells) == len(rows[0][1]) - 1)
-            ):
-                rows.append((code.line(group.start), [label[1] or "", *cells]))
-    if len(rows) < 2:
-        return []
-    header = _order(code, rows[0][0], rows[-1][0], len(rows[0][1]) - 1)
-    return [[(0, ["joint", *header] if header else []), *rows]]
+            numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
+            if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
+                rows.append((code.line(group.start), cells))
+                labels.append(label[1] or "")
+    return _titled(code, rows, labels) if len(rows) > 1 else []
 
 
-def _row_lines(code: Code, first: int, last: int, rows: int) -> list[int]:
-    """The lines on which the rows of a matrix are."""
-    texts = code.text.split("\n")
-    filled = [line for line in range(first, last + 1) if re.search(r"[\d\w]", re.sub(r"^.*=", "", texts[line - 1]))]
-    return filled[-rows:] if len(filled) >= rows else [first] * rows
+def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
+    """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
+    symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
+    header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
+    if header and (kind := re.search(r"Joint\([^;\n]*[\"'](prismatic|fixed)", code.text)):
+        problem = f"a joint is {kind[1]}, and no column says which"
+        raise InputError(None, f"line {code.line(kind.start())}", problem, "Add a column of types")
+    labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
+    if header and "joint" not in header and labelled:
+        return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
+    return [(0, header), *rows]
 
 
-def _symbols(row: list[str]) -> list[str]:
-    """The names of columns as a row of symbols has them: ``theta1 d1 a1 alpha1``."""
-    names = [re.sub(r"\d+$", "", cell) for cell in row]
-    quantities = {found.quantity for name in names if (found := heading_of(name))}
-    return names if len(quantities) == len(row) and {"a", "alpha", "d"} <= quantities else []
-
-
-def _order(code: Code, first: int, last: int, width: int) -> list[str]:
-    """The names of a matrix's columns, of a comment, of what its rows are unpacked into, or of a library."""
-    near = [code.comments[line] for line in range(max(first - 4, 0), last + 1) if line in code.comments]
+def _order(code: Code, rows: Grid, before: str) -> list[str]:
+    """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
+    of a library."""
+    width = len(rows[0][1])
+    near = [code.comments[k] for k in range(max(rows[0][0] - 5, 0), rows[-1][0] + 2) if k in code.comments]
     unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
-    for comment in (*reversed(near), *(unpacked if len(unpacked) == 1 else ())):
+    orders = _signatures(code, groups_of(code.text))
+    typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
+    for comment in (*reversed(near), *typed, *(unpacked if len(unpacked) == 1 else ())):
         comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
         words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
         for start in range(len(words) - width + 1):
             window = words[start : start + width]
-            quantities = [found.quantity for word in window if (found := heading_of(word))]
-            if len({*quantities}) == width and {"a", "alpha", "d"} <= {*quantities}:
+            if _names_columns(window):
                 return window
     for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
@@ -464,87 +447,92 @@ def _order(code: Code, first: int, last: int, width: int) -> list[str]:
     return []
 
 
+def _names_columns(names: list[str]) -> bool:
+    """Whether names are those of a D-H table's columns, each once."""
+    quantities = {*quantities_of(names)}
+    return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
+
+
 def elements(text: str) -> dict[str, str]:
-    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``."""
-    return {
-        f"{name}{number}": cell
-        for name, cells in _lists(code_of(text)).items()
-        for number, cell in enumerate(cells, 0 if f"{name}[" in text else 1)
-    }
+    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``.
+
+    In square brackets numbers begin at 0 if a 0 is used, at 1 if the list's length is (Julia); else no element has a
+    value.
+    """
+    found = dict[str, str]()
+    for name, cells in _lists(code_of(text)).items():
+        used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
+        if not used or used & {0, len(cells)}:
+            found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
+    return found
 
 
 def _lists(code: Code) -> dict[str, list[str]]:
     """The lists of a program by their names; the last of a name that has several."""
-    return {name: cells for name, cells, _ in _named_lists(code)}
+    return {name: cells for name, cells, _, _ in _named_lists(code)}
 
 
-def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int]]:
-    """The name and the cells of each list, multiplied by what is written after it, and its line."""
+def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+    """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in groups_of(code.text):
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*[=:]\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
         if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
         cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
-        yield name[1], cells, code.line(group.start)
+        yield name[1], cells, code.line(group.start), name[2]
 
 
 def _vectors(code: Code) -> list[Grid]:
-    """Columns as lists of their own: ``a = [0, 0.27, ...]``."""
+    """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
+    return _of_lists(_named_lists(code)) or _of_lists(_numbered(code))
+
+
+def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
-    for name, cells, line in _named_lists(code):
+    header, line = dict[str, str](), 0
+    for name, cells, line, mark in lists:
         heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
-        if heading and len(cells) > 1:
-            quantity = heading.quantity
-            if named.setdefault(quantity, cells) != cells and quantity != "theta":  # poses may follow
-                raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
+        quantity = heading.quantity if heading else name
+        if quantity == "theta" and mark == "=":
+            text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
+            if not re.search(r"[^\W\d]", text):
+                quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
+        if quantity not in _OF_VECTORS or not cells:
+            continue
+        header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
+        if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
+            raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
-    length = len(named["alpha"])
-    columns = {quantity: cells for quantity, cells in named.items() if len(cells) == length}
-    if not {"a", "alpha", "d"} <= {*columns}:
-        return []
-    theta = [re.sub(r"\b(?:\w+[._])?pi\b", "1", cell, flags=re.I) for cell in columns.get("theta", [])]
-    if not any(re.search(r"[^\W\d]", cell) for cell in theta):
-        columns.pop("theta", None)
-        theta = [cell for cell in theta if re.sub(r"[0.,()\s]", "", cell)]
-    if theta and "theta" not in columns:
-        problem = "the list theta may hold zeros of the joints, or a pose"
-        raise InputError(None, "theta", problem, "Name it offset if theta = q + offset, or remove it")
-    used = "a", "alpha", "d", "theta", "offset"
-    return [_columns(1, {key: columns[key] for key in used if key in columns})]
+    if named.pop("pose", None) and "theta" not in named:
+        problem = "theta may be zeros of the joints, or a pose"
+        raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
+    if len({len(cells) for cells in named.values()}) > 1:
+        problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
+        raise InputError(None, f"line {line}", problem, "Give one for each joint")
+    return [[(0, [header[name] for name in named]), *((1, list(row)) for row in zip(*named.values()))]]
 
 
-def _pairs(code: Code) -> list[Grid]:
-    """Entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|a|d|q|r|(?:theta|q)_offset)_?(\d{1,2})\s*[:=](?!=)\s*([^,}\n;:=]+)"
-    entries = {
-        (name.rpartition("_")[2], int(number)): (value.strip(), place)
-        for name, number, value, place in _found(pattern, code.text)
-    }
-    found_names = {name for name, _ in entries}
-    joints = sorted(number for name, number in entries if name == "d")
-    shift = 1 if ("alpha", 0) in entries and 0 not in joints else 0
-    rows = list[tuple[int, dict[str, str]]]()
-    for joint in joints:
-        before = joint - shift
-        angle = entries.get(("q", joint)) or entries.get(("theta", joint)) or (f"q{joint}", 0)
-        cells = [entries.get((name, number)) for name, number in (("alpha", before), ("a", before), ("d", joint))]
-        if None in cells:
-            return []
-        names = ("alpha(i-1)", "a(i-1)", "d(i)") if shift else ("alpha", "a", "d")
-        row = {name: cell[0] for name, cell in zip(names, cells) if cell}
-        row |= {"joint": str(joint), "theta": angle[0]}
-        if "offset" in found_names:
-            row["offset"] = entries.get(("offset", joint), ("0", 0))[0]
-        rows.append((code.line(cells[2][1] if cells[2] else 0), row))
-    angles = found_names & {"q", "theta", "offset"}  # else they may be in a matrix of these symbols
-    return [_grid(rows)] if len(rows) > 1 and (angles or "DH_" in code.text) else []
+_OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 
-def _found(pattern: str, text: str) -> Iterator[tuple[str, str, str, int]]:
-    for each in re.finditer(pattern, text, re.IGNORECASE):
-        yield each[1].lower(), each[2], each[3], each.start()
+def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
+    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
+    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
+    found: dict[str, dict[int, re.Match[str]]] = {}
+    for each in re.finditer(pattern, code.text, re.I):
+        found.setdefault(each[1].lower(), {})[int(each[2])] = each
+    if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
+        return  # they may be in a matrix of these symbols
+    for name, entries in found.items():
+        last = entries[max(entries)]
+        of_link = found["alpha" if name in ("alpha", "a") else "d"]
+        if gaps := {*range(min(of_link), max(entries) + 1)} - {*entries}:
+            problem = f"{name}{min(gaps)} is missing"
+            raise InputError(None, f"line {code.line(last.start())}", problem, "Give one for each joint")
+        before = "(i-1)" if min(of_link) < min(found["d"]) else ""
+        yield name + before, [entries[k][4].strip() for k in sorted(entries)], code.line(last.start()), last[3]

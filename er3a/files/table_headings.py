@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +15,7 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha al=alpha "
+    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha "
     "offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
     "type=type jointtype=type sigma=type σ=type 类型=type"
 )
@@ -75,3 +76,8 @@ def heading_of(text: str) -> Heading | None:
     last = _LAST_WORD.fullmatch(plain(text.lower()))
     marked = marked or (last and _NAMES.get(last[1]))
     return Heading(marked, unit, bool(_BEFORE.search(short)), name) if marked else None
+
+
+def quantities_of(names: Iterable[str]) -> list[str]:
+    """The quantities of those headings that are a D-H table's."""
+    return [found.quantity for name in names if (found := heading_of(name))]

@@ -204,12 +204,40 @@ ARRAYS = (
 )
 
 
+TYPED = "struct Row {\n  float d;  // offset\n  float a;\n  float alpha;\n  float offset;\n};\n"
+TYPED += "const Row rows[] = {\n {0.29f, 0.0f, -M_PI_2, 0.0f},\n {0.0f, 0.27f, 0.0f, -M_PI_2}\n};\n"
+ENTITIES = "&alpha; | a | d | &theta;\n:--|:--|:--|:--\n-&pi;/2 | 0 | 0.29 | q&#8321;\n0 | 0.27 | 0 | q&#8322;-&pi;/2\n"
+NUMBERED = "a1 = 0; alpha1 = -pi/2; d1 = 0.29; th1 = th(1);\na2 = 0.27; alpha2 = 0; d2 = 0; th2 = th(2)-pi/2;\n"
+TWO_NAMES = (
+    "a1, a2 = 0, 0.27\na_1 = -pi/2\na_2 = 0\noffset = [0, a_1]\nd = [0.29, 0]\na = [a1, a2]\nalpha = [a_1, a_2]\n"
+)
+HELD = "self.d1 = 0.29\nself.a2 = 0.27\nlinks = [RevoluteDH(d=self.d1, a=0, alpha=-np.pi / 2),\n"
+HELD += "RevoluteDH(d=0, a=self.a2, alpha=0, offset=-np.pi / 2)]\n"
 NAMED = "Row = namedtuple('Row', ['a', 'alpha', 'd', 'theta'])\n"
 NAMED += "arm = [Row(0, -FRAC_PI_2, 0.29, 'q1'), Row(0.27, 0, 0, 'q2-pi/2')]\n"
 CELLS = "% theta, d, a, alpha\nDH = {'q1' 0.29 0 -pi/2;\n  'q2-pi/2' 0 0.27 0};\n"
 
 
-@pytest.mark.parametrize("text", [NAMED, CELLS, CALLS, DECLARED, KDL, DEFINED, TOML, WORDS, NO_ANGLE, ARRAYS])
+@pytest.mark.parametrize(
+    "text",
+    [
+        TYPED,
+        HELD,
+        ENTITIES,
+        NUMBERED,
+        TWO_NAMES,
+        NAMED,
+        CELLS,
+        CALLS,
+        DECLARED,
+        KDL,
+        DEFINED,
+        TOML,
+        WORDS,
+        NO_ANGLE,
+        ARRAYS,
+    ],
+)
 def test_two_rows_of_an_irb_120_are_read_in_programs_and_files_of_others(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
@@ -268,8 +296,16 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("a (mm),alpha (deg),d (mm)\n0,pi/2°,3\n", "one unit|without a unit"),
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\ntheta = [0, -pi/2]", "offset"),  # zeros or a pose
         ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\nd = [0.1, 0]", "another list of d"),
+        ("a = [0, 0.3]\nd = [0.2, 0]\nalpha = [pi/2, 0]\noffset = [pi]", "offset 1|length"),
+        ('dh = {"a": [0, 0.3, 0], "d": [0.2, 0, 0], "alpha": [1, 0, 0], "theta": [0, 1]}', "theta 2"),
+        ("l = [0.1, 0.2, 0.3]\n# a alpha d\ndh = [[l[1], 0, 0], [0, 0, l[2]]]", "l1 = "),  # from 0 or from 1
         ("i,a (mm),alpha (deg),d (mm),theta (deg)\n1,0,90,300,0\n2,270,0,0,180 + β\n", "β = "),
-        ("a1, a2 = 0, 0.3\na_2 = pi/2\nd = [0.2, 0]\na = [a1, a2]\nalpha = [a_2, 0]", "a2"),  # one symbol for er3a
+        ("th1 = pi/6; th2 = 0\nd1 = 0.3; d2 = 0\na1 = 0; a2 = 0.4\nalpha1 = pi/2; alpha2 = 0", "pose"),
+        ("q1 = q1; q2 = q2\nd1 = 0.3; d2 = 0\na1 = 0\nalpha1 = pi/2; alpha2 = 0", "a 1|different"),
+        ("% theta d a alpha\nDH = [0 0 0 pi/2;\n0 0 0.3 0];\nL(1) = Link([DH(1,:) 1 0]);", "line 4"),
+        ("i;a [mm];alpha [gon];d [mm]\n1;0;100;300\n2;270;0;0\n", "alpha_deg"),
+        ("j = rigidBodyJoint(['j' n],'prismatic');\n% a alpha d theta\nM = [0 0 0.3 0;\n0.2 0 0 0];", "types"),
+        ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
             "one of them",
