@@ -166,7 +166,8 @@ def _name(arm: SeenArm) -> Markup:
 
 def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
     """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
-    order = sorted(labels, key=lambda each: -each.at[1])
+    # Of those at one height the nearest to the column is written first: their lines don't cross.
+    order = sorted(labels, key=lambda each: (-round(each.at[1]), -each.at[0]))
     gap, above = GAP * (high[1] - low[1]), high[1]
     heights = [above := min(above - gap, float(label.at[1])) for label in order]
     below = low[1]

@@ -99,9 +99,9 @@ def _by_kind(checks: Sequence[Judged]) -> Group:
             continue
         counted = Counter(check.status for check in own)
         passed, total = counted["pass"], len(own)
-        mark: Literal["fail", "caution"] = "fail" if counted["fail"] else "caution"
+        mark: Literal["fail", "caution", "pass"] = "fail" if counted["fail"] else "caution" if passed < total else "pass"
         parts, said = [Part(passed / total, 1.0, mark)], tr("{passed} of {total}", passed=passed, total=total)
-        rows.append(ListRow(mark if passed < total else "pass", tr(title), said, "#checks", length=1.0, parts=parts))
+        rows.append(ListRow(mark, tr(title), said, "#checks", length=1.0, parts=parts))
     return Group(tr("Checks"), rows)
 
 
