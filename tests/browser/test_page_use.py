@@ -175,7 +175,7 @@ def test_back_leads_to_where_one_was(browser, small_study):
     browser.execute_script("arguments[0].open = true; arguments[0].scrollIntoView()", fold)
     place = "return document.getElementById('judged').getBoundingClientRect().top"
     before = browser.execute_script(place)
-    browser.execute_script("document.querySelector('.before a').click()")
+    browser.execute_script("document.querySelector('.chip a').click()")
     WebDriverWait(browser, PAUSE).until(lambda _: "validation.html" in browser.current_url)
     browser.back()
     WebDriverWait(browser, PAUSE).until(lambda _: browser.find_element(By.ID, "judged").get_property("open"))
@@ -249,7 +249,7 @@ def test_a_place_inside_of_a_program_shows_that_program_whole_with_its_player(br
     ("page", "words", "warning"),
     [
         ("er3a_c60_article/workspace.html", "volume", ".answer, .before"),
-        ("er3a_c60/trajectory.html", "line_clean", ".answer, .before"),
+        ("er3a_c60/trajectory.html", "line_clean", ".answer, .chip"),
     ],
 )
 def test_no_warning_is_hidden_by_a_search(browser, small_study, page, words, warning):

@@ -89,8 +89,7 @@ def _(results: DynamicsResults) -> Glance:
     if not motors:
         return "–", tr("masses unknown")
     worst = max(motors, key=lambda motor: motor.peak)
-    limited = all(motor.peak_limit is not None for motor in motors)
-    return with_unit(number(worst.peak, 2), worst.unit), f"J{worst.joint}" if limited else tr("no limits known")
+    return with_unit(number(worst.peak, 2), worst.unit), tr("J{joint} moving", joint=worst.joint)
 
 
 @glance.register

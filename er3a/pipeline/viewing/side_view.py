@@ -20,7 +20,7 @@ from er3a.robots.robot import Robot
 Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
-WIDE, UPRIGHT = 1.7, 0.83  # width of a drawing, of its height
+UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 GAP = 0.045  # of the height, between two labels
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
@@ -101,7 +101,7 @@ def beyond(arms: Sequence[SeenArm]) -> float:
 def side_view(
     arms: Sequence[SeenArm],
     floor_mm: float | None = None,
-    ratio: float = WIDE,
+    ratio: float = 1.7,
     labels: Sequence[Label] = (),
     trays: Sequence[Reals] = (),
     column_mm: float | None = None,
@@ -166,7 +166,8 @@ def _name(arm: SeenArm) -> Markup:
 
 def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float | None) -> list[tuple[Label, Reals]]:
     """Labels from above, each with where it is written (2,), mm: none on another, none below the drawing."""
-    order = sorted(labels, key=lambda each: -each.at[1])
+    # Of those at one height the nearest to the column is written first: their lines don't cross.
+    order = sorted(labels, key=lambda each: (-round(each.at[1]), -each.at[0]))
     gap, above = GAP * (high[1] - low[1]), high[1]
     heights = [above := min(above - gap, float(label.at[1])) for label in order]
     below = low[1]

@@ -78,8 +78,8 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
             for status in MARKS
             if status in present
         ],
-        open_columns=[tr(column) for column in OPEN_COLUMNS],
-        settled_columns=[tr(column) for column in SETTLED_COLUMNS],
+        open_columns=OPEN_COLUMNS,
+        settled_columns=SETTLED_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         unmet=not evidence.table_meets and evidence.other is None,

@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from er3a.files.robot_library import robot_of
@@ -30,7 +31,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     plain_table,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
+from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
@@ -38,6 +39,7 @@ from er3a.pipeline.viewing.page import (
     text_address,
 )
 from er3a.pipeline.viewing.side_view import (
+    COLUMN,
     UPRIGHT,
     Label,
     LabelKind,
@@ -47,9 +49,11 @@ from er3a.pipeline.viewing.side_view import (
     seen_arm,
     side_view,
 )
+from er3a.references.subjects import Reach
 from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
+SEEN = "seen"  # address in the picture of what is to be done next
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
     N_("Check"),
@@ -90,21 +94,6 @@ KINDS = {
 """What a check rests on, as the page names it."""
 
 
-def _by_kind(checks: Sequence[Judged]) -> Group:
-    """How many checks of each kind pass, each with its bar."""
-    rows = []
-    for kind, title in KINDS.items():
-        own = [check for check in checks if check.kind == kind]
-        if not own:
-            continue
-        counted = Counter(check.status for check in own)
-        passed, total = counted["pass"], len(own)
-        mark: Literal["fail", "caution"] = "fail" if counted["fail"] else "caution"
-        parts, said = [Part(passed / total, 1.0, mark)], tr("{passed} of {total}", passed=passed, total=total)
-        rows.append(ListRow(mark if passed < total else "pass", tr(title), said, "#checks", length=1.0, parts=parts))
-    return Group(tr("Checks"), rows)
-
-
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
@@ -123,30 +112,29 @@ def _value(value: float, check: model.Check) -> str:
     return fixed(value, DECIMALS[check.unit])
 
 
-SHOWN_FAILURES = 12
-
-
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, summary = stored.robot, stored.results.summary
     robot, checks = model.model_of(study, name), summary.checks
     judged = [check for check in checks if not isinstance(check, model.Unjudged)]
-    failed = [check for check in judged if check.status == "fail"]
-    failed.sort(key=lambda check: check.tolerances_off, reverse=True)
+    failed = sorted((each for each in judged if each.status == "fail"), key=lambda each: -each.tolerances_off)
     source = robot.sources.get("dh")
-    contradicted = summary.verdict.status == "fail"
     corrected, _ = diagnosis_section.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
-    instead = alternative_table(study, name, stored.folder.parents[1]) if contradicted and stored.folder else None
-    evidence = evidence_section(robot, summary.evidence)
+    instead = (
+        alternative_table(study, name, stored.folder.parents[1])
+        if summary.verdict.status == "fail" and stored.folder
+        else None
+    )
+    evidence, disputed = evidence_section(robot, summary.evidence), _disputed(robot, summary.conflicts)
     render_stage(
         study,
         stored,
         output,
-        _answer(study, name, summary, instead),
+        _answer(study, name, summary, instead, disputed),
         arms=_both_arms(
-            robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}
+            robot, study.robot(instead) if instead else other_robot(robot, summary.evidence), evidence or {}, disputed
         ),
         at_side=True,
         plain_table=None if evidence else plain_table(robot),
@@ -156,17 +144,17 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
-        by_kind=[_by_kind(judged)],
-        failed=[check_row(check) for check in failed[:SHOWN_FAILURES]],
-        all_failed=len(failed),
-        columns=[tr(label) for label in COLUMNS],
+        judged=judged,
+        kinds=KINDS,
+        failed=[*map(check_row, failed)],
+        columns=COLUMNS,
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
         table_source=source and (own_title(source.source), word("grade", GRADES, source.grade)),
         convention=word("convention", CONVENTIONS, robot.convention),
     )
 
 
-def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -> Markup:
+def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[Label]) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale."""
     arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "right")]
@@ -174,8 +162,25 @@ def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any]) -
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
     off = flanges_off(arms)
     arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
-    labels = [*_entries_seen(robot, evidence), *off]
-    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=beyond(arms))
+    labels = [*_entries_seen(robot, evidence), *off, *disputed]
+    column = max([beyond(arms), *((1 + COLUMN) * label.at[0] for label in disputed)])
+    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column)
+
+
+def _disputed(robot: Robot, conflicts: Iterable[model.Conflict]) -> list[Label]:
+    """What documents contradict each other about: a reach, from axis 1 at the height of axis 2."""
+    height = entry_places(robot)["1"][1]
+    return [
+        Label(
+            with_unit(tr(" or ").join(fixed(found.expected, 1) for found in each.statements), each.unit),
+            np.array([each.measured, height]),
+            "open",
+            SEEN,
+            start=np.array([0.0, height]),
+        )
+        for each in conflicts
+        if isinstance(each.subject, Reach) and each.subject.axis == 1
+    ]
 
 
 def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
@@ -195,14 +200,15 @@ def _kind(status: str) -> LabelKind:
     return "wrong" if status == "contradicted" else "sound" if status in SETTLED else "open"
 
 
-def _answer(study: Study, robot: str, summary: model.ValidationSummary, instead: str | None) -> Answer:
+def _answer(
+    study: Study, robot: str, summary: model.ValidationSummary, instead: str | None, disputed: Sequence[Label]
+) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
     evidence = summary.evidence
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
-    passed = tr("{passed} of {total}", passed=counts.passed, total=counts.total)
-    keys = [(passed, tr("independent checks pass"))] if counts.total else []
+    keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
     if bad:
         keys.append((str(bad), tr("entries contradicted")))
     elif evidence:
@@ -212,8 +218,10 @@ def _answer(study: Study, robot: str, summary: model.ValidationSummary, instead:
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
             f"../{instead}/validation.html",
         )
+    elif disputed:
+        fix = Fix(joined([tr("measure the reach from axis 1"), disputed[0].text], tr(": ")), f"#{SEEN}", instead=False)
     elif is_one(found, "validation.left_open") and found.next_measurement:
-        fix = Fix(say(found.next_measurement), f"#entry-{found.next_measurement.entry}", instead=False)
+        fix = Fix(say(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     else:
