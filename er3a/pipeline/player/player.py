@@ -228,6 +228,7 @@ def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
     return {
         "name": motion.name,
         "text": motion.text,
+        "whole": motion.whole_s,
         "times": np.round(motion.t[rows], 4).tolist(),
         "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
         "ghosts": [q.tolist() for q in motion.ghosts],

@@ -764,6 +764,7 @@ const fix = rows.length && document.querySelector(".hero .fix[data-follows]");
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
   if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
+  fix.querySelector("b").textContent = shown.dataset.lead;
   fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown

@@ -43,7 +43,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -125,13 +125,13 @@ def answer_of(
     others = paths[len(wrong) :]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path), fix=None)
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
-        Group(tr("Repaired"), mended),
+        Group(tr("Can be repaired"), mended),
         Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
@@ -153,20 +153,23 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int
 def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
     early = sum(not path.chosen and path.sound_end is not None for path in wrong)
+    doubtful = sum(path.verdict == "safe" for path in wrong)
     if not wrong:
         return ""
     return tr(
-        "{mended} can be repaired, {early} end early, {rest} can't run.",
+        "The other {count}: {mended} can be repaired, {early} can end early, {rest} can't run.",
+        count=len(wrong),
         mended=mended,
         early=early,
-        rest=len(wrong) - mended - early,
-    )
+        rest=len(wrong) - mended - early - doubtful,
+    ) + (tr(" {count} in doubt.", count=doubtful) if doubtful else "")
 
 
 def _sound_row(path: model.PathSummary, length: float) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
+    fix = Fix(tr("{path} may run: save its program.", path=path.name), f"#{path.name}-programs", instead=False)
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=fix)
 
 
 def _programs(
