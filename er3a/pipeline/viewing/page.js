@@ -770,10 +770,7 @@ const mark = (shown) => {
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
 const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
-rows.forEach((row) => row.addEventListener("click", () => {
-  mark(row);
-  pick(row);
-}));
+rows.forEach((row) => row.addEventListener("click", () => [mark, pick].forEach((tell) => tell(row))));
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];

@@ -6,7 +6,7 @@ import numpy as np
 
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say, sentence
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
@@ -70,11 +70,11 @@ def _inside(bodies: list[str], clearance_mm: float) -> str:
     """How deep a body gets into another one while they overlap."""
     one, other = bodies
     what = body_word(other) if other.startswith("link_") else tr("the {solid}", solid=body_word(other))
-    return sentence(
-        "finding",
-        finding=tr(
-            "{one} is up to {far} mm inside {other}", one=body_word(one), far=fixed(-clearance_mm, 0), other=what
-        ),
+    return tr(
+        "{one} is up to {far} mm inside {other}",
+        one=body_word(one),
+        far=fixed(-clearance_mm, 0),
+        other=what,
     )
 
 

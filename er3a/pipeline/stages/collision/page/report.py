@@ -11,7 +11,7 @@ from markupsafe import Markup
 from er3a.collision.pairs import TRIED
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, tr, with_unit
+from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
@@ -29,7 +29,6 @@ from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
 
 PLACE_PX = 5.0
-PATHS_COLLIDE, POSES_COLLIDE = N_("{count} of {all} paths collide."), N_("{count} of {all} poses collide.")
 
 
 def most_often(pairs: model.PairShares) -> str:
@@ -117,16 +116,13 @@ def _answer(
     free, places = found.get("free_of_collisions"), summary.places
     share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
     headline = tr("{share} of joint space is free.", share=share) if share else tr("Collisions checked.")
-    touch = {kind: [each.clearance_mm < 0 for each in closest if each.kind == kind] for kind in ("path", "target")}
-    rest, below = (
-        tr(text, count=sum(touch[kind]), all=len(touch[kind])) if touch[kind] else ""
-        for kind, text in (("path", PATHS_COLLIDE), ("target", POSES_COLLIDE))
-    )
+    touch = sum(each.clearance_mm < 0 for each in closest)
+    rest = tr("{count} of {all} cases collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
     rows = [(each.kind, _row(each, unreached, bars)) for each in closest[:MAX_ROWS]]
     titles = ("path", tr("Paths")), ("target", tr("Targets"))
     groups = [Group(title, [row for own, row in rows if own == kind]) for kind, title in titles]
-    return Answer(headline, rest, below, keys, groups)
+    return Answer(headline, rest, "", keys, groups)
 
 
 def _row(found: model.Closest, unreached: set[str], bars: Mapping[str, Sequence[Part]]) -> ListRow:

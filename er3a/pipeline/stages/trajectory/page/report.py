@@ -17,15 +17,13 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import FAR
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import (
-    adjoined,
-    cause_text,
     kind_word,
     path_text,
     reasons,
     strategy_word,
 )
 from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
-from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
@@ -33,7 +31,6 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
-    kinds,
     motions,
     near_assumed,
     repaired,
@@ -210,7 +207,6 @@ def _section(
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
-        faults=_faults(path),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
@@ -250,23 +246,6 @@ def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _faults(path: model.PathSummary) -> list[list[str]]:
-    return [
-        [
-            word,
-            moment(path.name, part.t0_s, fixed(part.t0_s, 3)),
-            moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
-            fixed(part.s0_m * 1000, 1),
-            fixed(part.s1_m * 1000, 1),
-            cause_text(part),
-        ]
-        for word, part in sorted(
-            ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
-            key=lambda each: each[1].t0_s,
-        )
-    ]
-
-
 def strategies_shown(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
@@ -281,10 +260,6 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
-    if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
-        costs = ["0.00", "0.00", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
-        remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
-        rows.append([tr("the path at its fastest"), *costs, remark])
     return rows
 
 

@@ -37,7 +37,8 @@ def from_above(
     """
     reach = 1000 * results.summary.reach_m.furthest_from_axis
     size, height = AROUND * reach, letters * reach
-    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, robot.lower[0], robot.upper[0]))]
+    low, high = robot.lower[0], robot.upper[0]
+    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, low, high))]
     words = []
     for solid in scene.solids if scene else ():
         if seen := [1000 * corners for corners in outlines(solid, [0, 1])]:
@@ -53,9 +54,9 @@ def from_above(
         name = tray.name if len(trays) > 1 else tr("tray")
         at = np.array([(left + right) / 2, above + BASE * reach if number else below - height])
         words.append(_word(at, height, name, kind))
-    gap = 2 * np.pi - (robot.upper[0] - robot.lower[0])
+    gap = 2 * np.pi - (high - low)
     if gap > DEAD:
-        middle = robot.upper[0] + gap / 2
+        middle = high + gap / 2
         words.append(_word(0.78 * reach * np.array([np.cos(middle), np.sin(middle)]), height, tr("dead zone"), ""))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"

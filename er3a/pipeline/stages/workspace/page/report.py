@@ -42,7 +42,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     payload = joined([payload_text(known, robot), there], " ") if placing else ""
     context = _context(robot, results, placing, payload)
     if contradicted:
-        context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
+        context["nowhere"] = sentence("box.contradicted")
     bare = any(each.reason == "tool" for each in summary.assumed)
     render_stage(
         study,

@@ -15,8 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.spatial import ConvexHull
 
-from er3a.collision.scene import Box, Scene
-from er3a.geometry.transforms import transform
+from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
 from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
@@ -174,26 +173,12 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
             layers.append(Layer(name, corners, colour, faces=faces))
             drawn[void.kind] += 1
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
-    return turning_figure(
-        layers,
-        scale,
-        solids=[*surroundings(robot, scene), *_in_space(robot, tray)],
-        cut_m=results.summary.axis.point_m[1],
-    )
-
-
-def _in_space(robot: Robot, tray: Tray | None) -> list[Solids]:
-    """The tray and its stand, if there is one."""
-    if tray is None:
-        return []
-    middle, size = (tray.low + tray.high) / 2, tray.high - tray.low
-    solids: list[Box] = [Box("tray", transform(middle, np.zeros(3)), size)]
-    if tray.floor is not None:
-        tall = tray.low[2] - tray.floor
-        foot = np.array([*middle[:2], tray.floor + tall / 2])
-        solids.append(Box("stand", transform(foot, np.zeros(3)), np.array([4 * STAND_M, 4 * STAND_M, tall])))
-    shapes = [shape | {"colour": VERDICTS["pass"]} for shape in drawn_scene(solids, robot)]
-    return [Solids(tr("tray"), shapes, np.eye(4)[None], VERDICTS["pass"])]
+    solids = surroundings(robot, scene)
+    if tray:
+        colour = VERDICTS["pass"]
+        shapes = [shape | {"colour": colour} for shape in drawn_scene(tray.scene(None).solids, robot)]
+        solids.append(Solids(tr("tray"), shapes, np.eye(4)[None], colour))
+    return turning_figure(layers, scale, solids, cut_m=results.summary.axis.point_m[1])
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -244,17 +229,15 @@ def labelled(
     for k, tray in enumerate(trays, 1):
         kind_: LabelKind = "tray" if k == 1 else "tray other"
         outlines.append((kind_, _tray_corners(tray)))
-        labels.append(Label(tray.name if len(trays) > 1 else tr("tray"), outlines[-1][1][1], kind_, f"tray-{k}"))
+        labels.append(Label(tray.name, outlines[-1][1][1], kind_, f"tray-{k}"))
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
 def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
-    """The outline (k, 2), mm, of an open pocket, on the side of axis 1 that it is on."""
-    points = 1000 * results.void_vertices.point_m[results.void_vertices.void == number_]
-    points -= 1000 * np.array(results.summary.axis.point_m)
-    side = 1.0 if results.summary.voids[number_ - 1].centroid_m[0] >= 0 else -1.0
-    seen = np.stack([side * np.hypot(points[:, 0], points[:, 1]), points[:, 2]], axis=1)
+    """The outline (k, 2), mm, of an open pocket, seen along y."""
+    own = results.void_vertices.void == number_
+    seen = 1000 * (results.void_vertices.point_m[own] - results.summary.axis.point_m)[:, ::2]
     return seen[ConvexHull(seen).vertices] if len(seen) > 2 else seen
 
 
