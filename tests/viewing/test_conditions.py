@@ -350,4 +350,4 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert line_of(found).endswith(f"in the way of none of the 1 motions that pass without it {parts}")
     assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
     nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
-    assert nothing.line.endswith("no motion passes that it could be in the way of.")
+    assert line_of(nothing).endswith("no motion passes that it could be in the way of.")

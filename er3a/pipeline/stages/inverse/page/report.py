@@ -12,10 +12,7 @@ from markupsafe import Markup
 from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.inverse import (
-    FREE_AT,
-    NEAREST_RULE,
-)
+from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
 from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, listed, say, word

@@ -75,7 +75,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         study,
         stored,
         output,
-        answer_of(summary, wrong, played, met or {}),
+        answer_of(summary, wrong, played, met, contradicted),
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
@@ -104,6 +104,7 @@ def answer_of(
     wrong: Mapping[str, Fault],
     played: Sequence[PlayedMotion],
     met: Mapping[str, Meeting] | None = None,
+    contradicted: bool = False,
 ) -> Answer:
     """How many paths may be run, each with its bar over time, and what to do about the first of the others.
 
@@ -122,14 +123,14 @@ def answer_of(
     others = paths[len(wrong) :]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path), fix=None)
+        replace(_sound_row(path, shares[path.name], contradicted), mark="fail", note=as_expected(path), fix=None)
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Can be repaired"), mended),
-        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
+        Group(tr("May run"), [_sound_row(path, shares[path.name], contradicted) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
@@ -162,11 +163,19 @@ def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     ) + (tr(" {count} in doubt.", count=doubtful) if doubtful else "")
 
 
-def _sound_row(path: model.PathSummary, length: float) -> ListRow:
+def _sound_row(path: model.PathSummary, length: float, contradicted: bool) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    fix = Fix(tr("{path} may run: save its program.", path=path.name), f"#{path.name}-programs", instead=False)
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=fix)
+    fix = Fix(tr("{path} may run: begin slowly.", path=path.name), f"#{path.name}-programs", instead=False)
+    return ListRow(
+        "pass",
+        path.name,
+        clear or tr("passes"),
+        f"#{path.name}",
+        (path.name, 0.0),
+        length,
+        fix=None if contradicted else fix,
+    )
 
 
 def _programs(
