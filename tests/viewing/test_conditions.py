@@ -26,7 +26,7 @@ from er3a.pipeline.stages.vision.model import PathRows, VisionResults
 from er3a.pipeline.stages.workspace.entry import BoxTask
 from er3a.pipeline.stages.workspace.model import PlacementSummary, PlaceSummary, StandSummary
 from er3a.pipeline.stages.workspace.page import tray
-from er3a.pipeline.stages.workspace.page.capability_section import tray_rows
+from er3a.pipeline.stages.workspace.page.capability_section import place_row, tray_rows
 from er3a.pipeline.stages.workspace.page.tray import Meeting, first_inside, placing
 from er3a.pipeline.stages.workspace.tool_capability import task_summary
 
@@ -201,10 +201,15 @@ def test_the_index_names_what_passes_through_the_box_or_its_stand(over):
     assert said.endswith("Not compared, or not all of it: still, lost.")
     names = "below, through" if over else "through"
     count = 1 + over
-    assert found.line.endswith(f"in the way of {count} of the 4 motions that pass without it: {names}.")
+    assert line_of(found).endswith(f"in the way of {count} of the 4 motions that pass without it: {names}.")
     assert found.rows == [
         [found.tray.where, "350, 0, 400", "150 × 200 × 50", f"{int(over)} of 2 paths, 1 of 2 programs", "–", "–"]
     ]
+
+
+def line_of(found):
+    """Where the tray is put, and what it is in the way of there."""
+    return f"{found.tray.line}: {found.hindrance(found.tried[0])}."
 
 
 def test_the_place_that_fewest_motions_meet_comes_first():
@@ -216,7 +221,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
         "programs": moving(ProgramsResults, ProgramMotion, "program", programs, {"through": (0.0, 376.0)}),
     }
     sound = {"programs": ["through"]}
-    assert placing(stored, robot, {}, sound).line == (
+    assert line_of(placing(stored, robot, {}, sound)) == (
         "On a stand 275 mm high on table (z = 100 mm), centre (350, 0, 400) mm, edges 150 × 200 × 50 mm along x, y, z: "
         "in the way of 1 of the 1 motions that pass without it: through."
     )
@@ -225,7 +230,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     floor = StandSummary("floor", 0.0, None, None, "in_the_way", aside)
     stored["workspace"].results.summary.placement = replace(placement, stands=(*placement.stands, floor))
     found = placing(stored, robot, {}, sound)
-    assert found.line == (
+    assert line_of(found) == (
         "On a stand 375 mm high on floor, centre (350, 500, 400) mm, edges 150 × 200 × 50 mm along x, y, z: in the way "
         "of none of the 1 motions that pass without it (1 programs); nothing was planned around it."
     )
@@ -236,7 +241,7 @@ def test_the_place_that_fewest_motions_meet_comes_first():
     many = {"programs": ["through", "a", "b", "c"]}
     met = {name: Meeting(1.0, "link 3") for name in many["programs"]}
     crowded = replace(found, tried=(replace(found.tried[0], met={"programs": met}),), sound=many)
-    assert crowded.line.endswith("in the way of 4 of the 4 motions that pass without it.")  # too many to be named
+    assert line_of(crowded).endswith("in the way of 4 of the 4 motions that pass without it.")  # too many to be named
 
 
 def test_the_rows_of_what_meets_the_tray_lead_to_that_moment(monkeypatch, tmp_path):
@@ -290,7 +295,7 @@ def test_links_of_grasps_that_meet_the_tray_are_found_before_the_tool_point():
     assert 0 <= meeting.t - link < 0.05
     assert link < 2 * (1 - 100 / (350 * np.sin(np.radians(60))))
     assert meeting.body.startswith("link ")
-    assert found.line.endswith("in the way of 1 of the 1 motions that pass without it: can.")
+    assert line_of(found).endswith("in the way of 1 of the 1 motions that pass without it: can.")
 
 
 GRASPED = {"can": "grasped", "missed": "not graspable"}
@@ -304,8 +309,8 @@ def test_the_workspace_page_says_how_far_a_tray_can_be_moved():
     results.places = None
     found = placing({"workspace": SimpleNamespace(results=results)}, load_robot("er3a_c60"), {}, {})
     rows = dict(tray_rows(found, results, results.summary.placement, "At most 2 kg."))
-    moved = "Reach and limits allow to move it by x ±75, y −200 to 175, z −200 to 50 mm, one direction at a time; "
-    assert rows["Margins"].endswith(f"{moved}motions were compared with it at this place only.")
+    cells = place_row("best", spot, SimpleNamespace(arm_angles=1, named_branches=True))
+    assert cells[-1] == "x ±75, y −200 to 175, z −200 to 50"
     assert rows["Payload there"] == "At most 2 kg."
     assert rows["Place"].startswith("In the air: no surface is known there, centre (350, 0, 400) mm")
     assert "scene file as boxes, and run again" in rows["What to do first"]
@@ -334,7 +339,7 @@ def test_the_motions_that_the_tray_hinders_are_listed_with_links_to_the_moment()
 def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     assert placing({}, None, {}, {}) is None
     alone = placing({"workspace": placed()}, None, {}, {})
-    assert alone.line.endswith(": no path, program or grasp was compared with it.")
+    assert line_of(alone).endswith(": no path, program or grasp was compared with it.")
     assert alone.compared == ""
     clear = moving(
         ProgramsResults, ProgramMotion, "program", SimpleNamespace(programs=named("far")), {"far": (500.0, 0.0)}
@@ -342,7 +347,7 @@ def test_without_motions_or_without_a_place_nothing_is_said_to_be_free():
     found = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": ["far"]})
     assert found.met == {"programs": {}}
     parts = "(1 programs); nothing was planned around it."
-    assert found.line.endswith(f"in the way of none of the 1 motions that pass without it {parts}")
+    assert line_of(found).endswith(f"in the way of none of the 1 motions that pass without it {parts}")
     assert found.compared.startswith("Neither the tool point nor a link's shape nor what is carried was found in the")
     nothing = placing({"workspace": placed(), "programs": clear}, load_robot("er3a_c60"), {}, {"programs": []})
-    assert nothing.line.endswith("no motion passes that it could be in the way of.")
+    assert line_of(nothing).endswith("no motion passes that it could be in the way of.")

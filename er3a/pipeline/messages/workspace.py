@@ -57,7 +57,6 @@ TEXTS = texts(
             "comes within {margin} mm of the scene or of itself{in_the_way:?}]."
         ),
         "box.contradicted": "No place for the tray is recommended: evidence contradicts this table.",
-        "box.unknown": "Tray of {box} mm: [{why}][nowhere does the tool reach all of it.{why:!}]",
         "box.run_again": (
             "Before a motion is run there, put the tray, and its stand if any, into the study's scene file as boxes, "
             "and run again.[ No tool is given: repeat it with your tool's length.{bare:?}]"
@@ -91,15 +90,6 @@ def _limit(limit: Finding, at: float) -> str:
 
 FORMATS["limit"] = lambda limit: _limit(limit, limit.limit)
 FORMATS["extended"] = lambda limit: _limit(limit, limit.extended)
-
-
-def no_box_text(summary: Summary) -> str:
-    """Why there is no place for the tray of the study; empty where there is one, or none was looked for."""
-    placement = getattr(summary, "placement", None)
-    if placement is None or (isinstance(placement, model.PlacementSummary) and placement.named_places):
-        return ""
-    asked = " × ".join(as_text(value, "g") for value in placement.task.box_mm)
-    return sentence("box.unknown", box=asked, why=None if isinstance(placement, model.PlacementSummary) else placement)
 
 
 def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, served_from_m: float = 0.0) -> str:

@@ -124,6 +124,7 @@ class PlayedMotion:
     label: str = ""
     ghosts: Sequence[Reals] = ()
     loads: Reals | None = None
+    whole_s: float = 0.0
 
 
 def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:

@@ -11,6 +11,7 @@ import { constantLinks } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
+const FAINT = 0.15; // of a body that hides the arm
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
@@ -51,6 +52,7 @@ function prepared(motion) {
 
 const start = () => motion.times[0];
 const end = () => motion.times.at(-1);
+const whole = () => Math.max(end(), motion.whole); // the arm may not get there
 let asked = new URLSearchParams(location.search);
 /** Where playing ends: where the page's address says so, unless the reader is beyond that. */
 function playedUntil() {
@@ -114,16 +116,18 @@ function draw() {
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
-  ghosts.forEach((ghost, k) => (motion.ghosts[k] ? ghost.show(posesOf(arms[0], motion.ghosts[k]), new Map(), "visual", true) : ghost.hide()));
+  const others = motion.ghosts.map((q) => posesOf(arms[0], q));
+  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", true) : ghost.hide()));
+  for (const own of others) space.line(own.map((T) => column(T, 3)), page.accent, 4);
   const hiding = space.hiding(surroundings, poses.flat());
-  space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh));
+  space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
     const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
     if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
   }
-  for (const T of poses) toolFrame(T.at(-1));
+  for (const T of poses.map((own) => own.at(-1))) [0, 1, 2].forEach((c) => space.line([column(T, 3), add(column(T, 3), scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3));
   for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
@@ -172,11 +176,6 @@ function nameEnds(trail) {
   }
 }
 
-function toolFrame(T) {
-  const origin = column(T, 3);
-  for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
-}
-
 /** Time bar, clock, events and the cursors of the plots. */
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
@@ -185,7 +184,7 @@ function tell() {
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
-  const text = now.map((event) => event.text).join(words.between) || ends;
+  const text = now.filter(({ status }) => status === now[0].status).map((event) => event.text).join(words.between) || ends;
   show(nowShown, text);
   nowShown.className = `now-shown ${now[0]?.status ?? "plain"}`;
   tellJoints();
@@ -233,10 +232,11 @@ function show(element, text) {
 
 function newMotion() {
   bar.dataset.motion = chooser.value = motion.name;
-  Object.assign(bar, { min: String(start()), max: String(end()), step: "any" });
-  const ticks = motion.events.map((event) => {
+  Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
+  const beyond = { t: end(), until: whole(), status: "none", text: "" };
+  const ticks = [beyond, ...motion.events].map((event) => {
     const tick = document.createElement("button");
-    const at = (value) => Math.min(100, (100 * (value - start())) / (end() - start() || 1)); // the arm may not get to the last ones
+    const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
     tick.style.left = `${at(event.t)}%`;
     tick.style.width = `${Math.max(0, at(event.until) - at(event.t))}%`;

@@ -73,9 +73,9 @@ def player(
     data = _data(robot, shown, scene, beside, signs)
     for shape in added:
         data["carried" if shape["frame"] else "scene"].append(shape)
-    known = opened if opened and any(motion.name == opened[0] for motion in shown) else None
-    data["opened"] = known or _worst(robot, shown)
-    first = next(motion for motion in shown if motion.name == data["opened"][0])
+    named = {motion.name: motion for motion in shown}
+    data["opened"] = opened if opened and opened[0] in named else _worst(robot, shown)
+    first = named[data["opened"][0]]
     robots = (robot, *beside)
     _frame(data, robots, shown)
     return Markup(
@@ -228,6 +228,7 @@ def _motion(motion: PlayedMotion, most: int) -> dict[str, Any]:
     return {
         "name": motion.name,
         "text": motion.text,
+        "whole": motion.whole_s,
         "times": np.round(motion.t[rows], 4).tolist(),
         "values": [_packed(q[rows]) for q in (motion.q, *motion.beside)],
         "ghosts": [q.tolist() for q in motion.ghosts],

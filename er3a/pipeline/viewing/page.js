@@ -764,15 +764,13 @@ const fix = rows.length && document.querySelector(".hero .fix[data-follows]");
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
   if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
+  fix.querySelector("b").textContent = shown.dataset.lead;
   fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
 const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
-rows.forEach((row) => row.addEventListener("click", () => {
-  mark(row);
-  pick(row);
-}));
+rows.forEach((row) => row.addEventListener("click", () => [mark, pick].forEach((tell) => tell(row))));
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];

@@ -103,7 +103,7 @@ def side_view(
     floor_mm: float | None = None,
     ratio: float = 1.7,
     labels: Sequence[Label] = (),
-    trays: Sequence[Reals] = (),
+    outlines: Sequence[tuple[str, Reals]] = (),
     column_mm: float | None = None,
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
@@ -114,7 +114,7 @@ def side_view(
     floor_mm : height of the floor; None where there is none
     ratio : width of the drawing, of its height
     labels : moved up or down where they would be on each other
-    trays : corners (k, 2), mm, of what is drawn behind the arms
+    outlines : of what is drawn behind the arms: kind, and corners (k, 2), mm
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
 
     Returns
@@ -142,7 +142,7 @@ def side_view(
             )
         )
     outline = Markup('<polygon class="{}" points="{}"/>')
-    parts += [outline.format("tray other" if k else "tray", _line(corners)) for k, corners in enumerate(trays)]
+    parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
     parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]

@@ -107,7 +107,7 @@ export class Space extends Orbit {
   material(css, pale = false, marked = false) {
     const key = `${css} ${pale} ${marked}`;
     if (!this.materials.has(key)) {
-      const through = pale ? { transparent: true, opacity: PALE, depthWrite: false } : {};
+      const through = pale ? { transparent: true, opacity: pale === true ? PALE : pale, depthWrite: false } : {};
       const nearer = { polygonOffset: marked, polygonOffsetFactor: -1, polygonOffsetUnits: -4 };
       this.materials.set(key, new three.MeshStandardMaterial({ color: colourNamed(css), roughness: 0.55, ...nearer, ...through }));
     }

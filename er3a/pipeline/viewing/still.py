@@ -22,7 +22,7 @@ from er3a.pipeline.language import N_, tr
 from er3a.pipeline.viewing.painting import paint
 from er3a.pipeline.viewing.palette import GRID, rgb
 
-WIDTH, HEIGHT = 960, 540  # px
+WIDTH, HEIGHT = 800, 645  # px, as wide as a player is at the side of a list
 FINE = 2  # px of the painting along one of the picture
 FIELD = 1.9  # as in space.js: distance of the eye, in heights of the picture at the target
 WIDE = 1.2  # as in space.js: width over height of a picture that is filled on both sides

@@ -7,6 +7,7 @@ import numpy as np
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
+from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
 from er3a.robots.joint_limits import meant
@@ -19,9 +20,12 @@ def motions(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
     """The paths, as far as the arm reaches them, with the line between the nearest points at each moment."""
     motions = []
     for name in dict.fromkeys(results.paths.path.tolist()):
-        rows = results.paths.take((results.paths.path == name) & np.isfinite(results.paths.q_deg).all(axis=1))
+        own = results.paths.take(results.paths.path == name)
+        rows = own.take(np.flatnonzero(np.isfinite(own.q_deg).all(axis=1)))
         q = meant(robot, rows.q_deg)
-        motions.append(PlayedMotion(name, "", rows.t_s, q, events(results, name, rows), nearest(rows)))
+        motions.append(
+            PlayedMotion(name, "", rows.t_s, q, events(results, name, rows), nearest(rows), whole_s=own.t_s[-1])
+        )
     return motions
 
 
@@ -40,7 +44,7 @@ def _pose(robot: Robot, found: Closest) -> PlayedMotion:
 def events(results: CollisionResults, path: str, rows: PathClearances) -> list[PlayedEvent]:
     """Where a path is nearest to something, and where bodies overlap."""
     closest = [found for found in results.summary.closest if (found.kind, found.name) == ("path", path)]
-    return [*map(_least, closest[:1]), *_overlaps(rows)]
+    return [*(_least(found) for found in closest[:1] if found.clearance_mm >= 0), *_overlaps(rows)]
 
 
 def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
@@ -50,16 +54,34 @@ def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
     starts = np.union1d(starts, [0])
     ends = np.append(starts[1:], len(rows) - 1)
     return [
-        PlayedEvent(rows.t_s[i], rows.t_s[j], tr("collision"), "fail", tuple(label[i].split("/")))
+        PlayedEvent(
+            rows.t_s[i],
+            rows.t_s[j],
+            _inside(label[i].split("/"), rows.clearance_mm[i : j + 1].min()),
+            "fail",
+            tuple(label[i].split("/")),
+        )
         for i, j in zip(starts, ends)
         if label[i]
     ]
 
 
+def _inside(bodies: list[str], clearance_mm: float) -> str:
+    """How deep a body gets into another one while they overlap."""
+    one, other = bodies
+    what = body_word(other) if other.startswith("link_") else tr("the {solid}", solid=body_word(other))
+    return tr(
+        "{one} is up to {far} mm inside {other}",
+        one=body_word(one),
+        far=fixed(-clearance_mm, 0),
+        other=what,
+    )
+
+
 def _least(found: Closest) -> PlayedEvent:
     text = tr("least clearance {clearance} mm: {pair}", clearance=fixed(found.clearance_mm, 1), pair=say(found.between))
     t = found.t_s or 0.0
-    return PlayedEvent(t, t, text, "fail" if found.clearance_mm < 0 else "plain")
+    return PlayedEvent(t, t, text, "plain")
 
 
 def nearest(rows: PathClearances) -> list[Mark]:

@@ -117,7 +117,7 @@ def _answer(
     share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
     headline = tr("{share} of joint space is free.", share=share) if share else tr("Collisions checked.")
     touch = sum(each.clearance_mm < 0 for each in closest)
-    rest = tr("{count} of {all} motions collide.", count=touch, all=len(closest)) if closest else ""
+    rest = tr("{count} of {all} cases collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
     rows = [(each.kind, _row(each, unreached, bars)) for each in closest[:MAX_ROWS]]
     titles = ("path", tr("Paths")), ("target", tr("Targets"))

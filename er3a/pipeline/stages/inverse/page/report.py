@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,20 +12,16 @@ from markupsafe import Markup
 from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.inverse import (
-    FREE_AT,
-    NEAREST_RULE,
-)
+from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
 from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, listed, say, word
-from er3a.pipeline.player.motions import PlayedMotion, bar_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.robots.robot import Robot
 from er3a.selection.select import RULES
@@ -50,7 +46,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         study,
         stored,
         output,
-        _answer(summary, chosen, {motion.name: motion for motion in played}),
+        _answer(summary, chosen),
         player=player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
@@ -73,9 +69,7 @@ def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
     return min(shown, key=order).name, 0.0
 
 
-def _answer(
-    summary: model.InverseSummary, shown: Sequence[model.TargetResult], played: Mapping[str, PlayedMotion]
-) -> Answer:
+def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) -> Answer:
     """How many targets the arm can take, and of each what came of it."""
     met = [each for each in summary.targets if each.outcome == "reached"]
     caught = [each for each in summary.targets if each.outcome != "reached" and each.outcome == each.expect]
@@ -84,8 +78,13 @@ def _answer(
     clear = [each.clearance.least_mm for each in met if each.clearance]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     if summary.round_trips:
-        keys.append((number(summary.round_trips.solutions), tr("solutions confirmed by forward kinematics")))
-    rows = [_row(each, played[each.name]) for each in shown]
+        keys.append(
+            (
+                number(summary.round_trips.solutions),
+                tr("solutions of {poses} random poses confirmed", poses=number(summary.round_trips.poses)),
+            )
+        )
+    rows = [_row(each) for each in shown]
     return Answer(
         headline,
         all_caught(len(caught)),
@@ -99,7 +98,7 @@ def _answer(
     )
 
 
-def _row(target: model.TargetResult, motion: PlayedMotion) -> ListRow:
+def _row(target: model.TargetResult) -> ListRow:
     """A target: how many branches serve it, or what it came to."""
     note = (
         tr("{within} of {all} within limits", within=target.within_limits, all=target.solutions)
@@ -107,7 +106,11 @@ def _row(target: model.TargetResult, motion: PlayedMotion) -> ListRow:
         else outcome_word(target.outcome)
     )
     mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
-    parts = bar_of(motion, float(motion.t[-1])) if target.solutions else ()
+    parts = (
+        [Part(target.within_limits / target.solutions, 1.0, "rest" if mark == "pass" else "fail")]
+        if target.solutions > target.within_limits
+        else ()
+    )
     length = 1.0 if target.solutions else 0.0
     advice = listed(target.advice) if mark == "fail" else ()
     fix = Fix(advice[-1], f"#{target.name}-solutions") if advice else None
@@ -231,7 +234,7 @@ def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> st
         return refusal_in_short(branches.refusal[k])
     taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
     if turns > 1:
-        taken = tr("{taken}, {turns} turns", taken=taken, turns=turns)
+        taken = tr("{taken}; {turns} ways, ±360°", taken=taken, turns=turns)
     if (freed := float(branches.freed_turn_deg[k])) > SAME:
         taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
     kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, branches.singular[k]) if on]

@@ -61,7 +61,11 @@ def motions(
         near = near_assumed(path, results.summary)
         text = say(near) if near else path_text(path)
         seen = [*events(path), *_near_events(path, near, results.clearance), *added(path.name)]
-        motions.append(PlayedMotion(path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path)))
+        motions.append(
+            PlayedMotion(
+                path.name, text, rows.t_s, meant(robot, rows.q_deg), seen, contact(path), whole_s=path.duration_s
+            )
+        )
         if path.chosen:
             repair = avoidance.take((avoidance.path == path.name) & (avoidance.strategy == path.strategy))
             text = repair_lead(path, slowed(path, rows, repair))
@@ -262,7 +266,7 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> F
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
     faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches]
-    return [*map(_pass, path.singularities)] + [
+    return [_pass(each, "plain" if path.verdict == "safe" else "caution") for each in path.singularities] + [
         PlayedEvent(
             s.t0_s,
             s.t1_s,
@@ -275,10 +279,10 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
     ]
 
 
-def _pass(event: model.Singularity) -> PlayedEvent:
-    """A singular pose, or a pass by one."""
+def _pass(event: model.Singularity, status: Weight) -> PlayedEvent:
+    """A singular pose, or a pass by one, which harms no path that passes."""
     axes = event.axes or SINGULAR_AXES.get(event.type, ())
-    return PlayedEvent(event.t_s, event.until_s, _singular(event), "caution", axes=axes)
+    return PlayedEvent(event.t_s, event.until_s, _singular(event), status, axes=axes)
 
 
 def _few_words(part: model.Stretch) -> str:

@@ -17,15 +17,13 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import FAR
 from er3a.pipeline.messages.say import bracketed, say
 from er3a.pipeline.messages.trajectory import (
-    adjoined,
-    cause_text,
     kind_word,
     path_text,
     reasons,
     strategy_word,
 )
 from er3a.pipeline.player.motions import Fault, PlayedEvent, PlayedMotion, fix_of, opened, row_of
-from er3a.pipeline.player.player import drawing_head, moment, player
+from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
@@ -33,7 +31,6 @@ from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.stages.trajectory.page.path_figures import path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
-    kinds,
     motions,
     near_assumed,
     repaired,
@@ -43,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -78,7 +75,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         study,
         stored,
         output,
-        answer_of(summary, wrong, played, met or {}),
+        answer_of(summary, wrong, played, met, contradicted),
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
@@ -107,6 +104,7 @@ def answer_of(
     wrong: Mapping[str, Fault],
     played: Sequence[PlayedMotion],
     met: Mapping[str, Meeting] | None = None,
+    contradicted: bool = False,
 ) -> Answer:
     """How many paths may be run, each with its bar over time, and what to do about the first of the others.
 
@@ -125,14 +123,14 @@ def answer_of(
     others = paths[len(wrong) :]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        replace(_sound_row(path, shares[path.name], contradicted), mark="fail", note=as_expected(path), fix=None)
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
-        Group(tr("Repaired"), mended),
-        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
+        Group(tr("Can be repaired"), mended),
+        Group(tr("May run"), [_sound_row(path, shares[path.name], contradicted) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
@@ -153,20 +151,31 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int
 def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
     early = sum(not path.chosen and path.sound_end is not None for path in wrong)
+    doubtful = sum(path.verdict == "safe" for path in wrong)
     if not wrong:
         return ""
     return tr(
-        "{mended} can be repaired, {early} end early, {rest} can't run.",
+        "The other {count}: {mended} can be repaired, {early} can end early, {rest} can't run.",
+        count=len(wrong),
         mended=mended,
         early=early,
-        rest=len(wrong) - mended - early,
-    )
+        rest=len(wrong) - mended - early - doubtful,
+    ) + (tr(" {count} in doubt.", count=doubtful) if doubtful else "")
 
 
-def _sound_row(path: model.PathSummary, length: float) -> ListRow:
+def _sound_row(path: model.PathSummary, length: float, contradicted: bool) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
+    fix = Fix(tr("{path} may run: begin slowly.", path=path.name), f"#{path.name}-programs", instead=False)
+    return ListRow(
+        "pass",
+        path.name,
+        clear or tr("passes"),
+        f"#{path.name}",
+        (path.name, 0.0),
+        length,
+        fix=None if contradicted else fix,
+    )
 
 
 def _programs(
@@ -207,7 +216,6 @@ def _section(
         near=near is not None,
         branches=[branch_word(label) for label in path.branches],
         speed=_speed(path, summary.joint_limits),
-        faults=_faults(path),
         strategies=strategies_shown(path),
         programs=[each for each in programs if not _repairs(path, each)],
         repaired=[each for each in programs if _repairs(path, each)],
@@ -247,23 +255,6 @@ def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
     return rows.take(np.unique(np.concatenate([even, events, fast]).astype(int)))
 
 
-def _faults(path: model.PathSummary) -> list[list[str]]:
-    return [
-        [
-            word,
-            moment(path.name, part.t0_s, fixed(part.t0_s, 3)),
-            moment(path.name, part.t1_s, fixed(part.t1_s, 3)),
-            fixed(part.s0_m * 1000, 1),
-            fixed(part.s1_m * 1000, 1),
-            cause_text(part),
-        ]
-        for word, part in sorted(
-            ((word, part) for word, stretches in kinds(path) for part in adjoined(stretches)),
-            key=lambda each: each[1].t0_s,
-        )
-    ]
-
-
 def strategies_shown(path: model.PathSummary) -> list[list[str]]:
     """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
     if not path.avoidance:
@@ -278,10 +269,6 @@ def strategies_shown(path: model.PathSummary) -> list[list[str]]:
             rows.append([name, *["–"] * 6, tr("not possible: {reason}", reason=reasons(tried))])
         else:
             rows.append([name, *_costs(tried.motion), _remark(tried, tried.motion)])
-    if path.fastest_s and not (path.out_of_limits or path.collisions or path.unreachable):
-        costs = ["0.00", "0.00", "1.00", "1.00", clearance, fixed(path.fastest_s, 2)]
-        remark = tr("for comparison: only with a speed that varies along the path as the limits allow")
-        rows.append([tr("the path at its fastest"), *costs, remark])
     return rows
 
 

@@ -20,7 +20,6 @@ from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say
 from er3a.pipeline.messages.workspace import (
     millimetres,
-    no_box_text,
     reached_text,
     run_again_text,
     stand_text,
@@ -47,29 +46,10 @@ def tray_rows(
     reached = page.whole_sentence(reached_text(placement, place, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
-        (tr("Margins"), _margins(place)),
         (tr("Motions"), _hindered(placing)),
         (tr("Payload there"), payload),
         (tr("What to do first"), run_again_text(results.summary)),
     ]
-
-
-def _margins(place: model.PlaceSummary) -> str:
-    """What room a place has."""
-    room = _room(place)
-    ratio = fixed(100 * place.manipulability_ratio, 1)
-    texts = [
-        _nearest_limit(place),
-        _nearest_bodies(place),
-        tr("Least manipulability: {ratio} % of the arm's best.", ratio=ratio),
-        room
-        and tr(
-            "Reach and limits allow to move it by {room} mm, one direction at a time; motions were compared with it at "
-            "this place only.",
-            room=room,
-        ),
-    ]
-    return joined(texts, " ")
 
 
 def _hindered(placing: Placing) -> Markup:
@@ -92,22 +72,6 @@ def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
     """Links as a sentence; none where there are none."""
     lead = escape(about + tr(": ") if about else "")
     return [lead + Markup(", ").join(links) + "."] if links else []
-
-
-def _nearest_limit(place: model.PlaceSummary) -> str:
-    if place.limit_margin_deg is None:
-        return ""
-    margin = fixed(place.limit_margin_deg, 1)
-    if place.limit_joint is None:
-        return tr("Joints come within {margin} deg of their limits.", margin=margin)
-    return tr("The joint nearest to its limit is J{joint}: {margin} deg.", joint=place.limit_joint, margin=margin)
-
-
-def _nearest_bodies(place: model.PlaceSummary) -> str:
-    if place.clearance_mm is None or place.clearance_pair is None:
-        return ""
-    pair, far = say(place.clearance_pair), fixed(place.clearance_mm, 0)
-    return tr("The smallest clearance is {far} mm, between {pair}.", pair=pair, far=far)
 
 
 def _room(place: model.PlaceSummary) -> str:
@@ -239,7 +203,6 @@ def capability_context(
         "asked_text": _asked_text(capability),
         "capability_picture": _picture(robot, results, capability) if len(results.capability) else None,
         "task_text": _task_text(placement.task, capability),
-        "tray_line": placing.line if placing else no_box_text(results.summary),
         "tray_places": placing.rows if placing else [],
         "tray_rows": tray_rows(placing, results, placement, payload)
         if placing and isinstance(placement, model.PlacementSummary)
@@ -284,12 +247,8 @@ def _slices_caption(capability: model.CapabilitySummary) -> str:
         "{solutions} IK solutions on average (of {most} at most).",
         **numbers,
     )
-    averaged = tr(
-        "These solutions are averaged over the orientations reached; of random joint values, as the page of the stage "
-        "inverse draws them, more solutions are found, because poses with many are met more often."
-    )
     plan = tr("Plan work where all three are high; rims are reached only with the arm stretched, folded or twisted.")
-    return joined([first, averaged, plan], " ")
+    return joined([first, plan], " ")
 
 
 def _asked_text(capability: model.CapabilitySummary) -> str:
@@ -323,26 +282,17 @@ def _asked_text(capability: model.CapabilitySummary) -> str:
 def _roll_text(capability: model.CapabilitySummary) -> str:
     if capability.asked != "directions":
         return ""
+    roll = capability.roll
+    rolls = tr("left free") if roll.free else roll.per_direction
     if capability.arm_angles > 1:
         return tr(
             "Each pose was tried at {values} values of what it leaves open, and a direction counts if it is reached at "
             "one of them: more may be reached between them. Solutions are those of one value. Rolls about the tool's "
             "own axis: {rolls}.",
             values=capability.arm_angles,
-            rolls=tr("left free") if capability.roll.free else capability.roll.per_direction,
+            rolls=rolls,
         )
-    if capability.roll.free and not capability.roll.last_joint:
-        return tr("The roll about the tool's own axis is left out: with five joints the arm can't choose it.")
-    if capability.roll.free:
-        return tr(
-            "The roll about the tool's own axis is left free: it turns joint 6 alone, so it takes no part in whether a "
-            "direction is reached, nor in the number of solutions."
-        )
-    return tr(
-        "The tool is off the axis of joint 6, so the roll about the tool's own axis moves the wrist: {rolls} "
-        "rolls are tried, and a direction counts if one of them is reached.",
-        rolls=capability.roll.per_direction,
-    )
+    return tr("Rolls about the tool's own axis, of which one has to be reached: {rolls}.", rolls=rolls)
 
 
 def _task_text(task: model.TaskSummary, capability: model.CapabilitySummary) -> str:

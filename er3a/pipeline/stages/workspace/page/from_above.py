@@ -17,6 +17,7 @@ from er3a.pipeline.viewing.drawn import outlines
 from er3a.robots.robot import Robot
 
 AROUND = 1.15  # of the reach, that is shown to each side
+DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
@@ -36,7 +37,8 @@ def from_above(
     """
     reach = 1000 * results.summary.reach_m.furthest_from_axis
     size, height = AROUND * reach, letters * reach
-    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, robot.lower[0], robot.upper[0]))]
+    low, high = robot.lower[0], robot.upper[0]
+    parts = [Markup('<path class="reached" d="{}"/>').format(_sector(reach, low, high))]
     words = []
     for solid in scene.solids if scene else ():
         if seen := [1000 * corners for corners in outlines(solid, [0, 1])]:
@@ -51,7 +53,11 @@ def from_above(
         parts.append(Markup('<polygon class="{}" points="{}"/>').format(kind, _line(corners)))
         name = tray.name if len(trays) > 1 else tr("tray")
         at = np.array([(left + right) / 2, above + BASE * reach if number else below - height])
-        words.append(_word(at, height, name, kind, f"tray-{number + 1}"))
+        words.append(_word(at, height, name, kind))
+    gap = 2 * np.pi - (high - low)
+    if gap > DEAD:
+        middle = high + gap / 2
+        words.append(_word(0.78 * reach * np.array([np.cos(middle), np.sin(middle)]), height, tr("dead zone"), ""))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
@@ -71,7 +77,7 @@ def _line(points: Reals) -> str:
     return " ".join(f"{x:.0f},{-y:.0f}" for x, y in points)
 
 
-def _word(at: Reals, letters: float, text: str, kind: str, name: str = "") -> Markup:
-    return Markup('<text class="{}" id="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
-        kind, name, at[0], -at[1], letters, text
+def _word(at: Reals, letters: float, text: str, kind: str) -> Markup:
+    return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
+        kind, at[0], -at[1], letters, text
     )

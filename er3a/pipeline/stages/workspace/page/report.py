@@ -42,7 +42,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     payload = joined([payload_text(known, robot), there], " ") if placing else ""
     context = _context(robot, results, placing, payload)
     if contradicted:
-        context |= dict.fromkeys(("nowhere", "tray_line"), sentence("box.contradicted"))
+        context["nowhere"] = sentence("box.contradicted")
     bare = any(each.reason == "tool" for each in summary.assumed)
     render_stage(
         study,
@@ -52,7 +52,7 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         at_side=True,
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, placing, "wrong" if contradicted else "right"),
-        turning=workspace_figures.in_space(robot, results, scene),
+        turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
         **context,
@@ -67,7 +67,7 @@ def _labelled(
         return None
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
-    trays = [placing.tray] if placing else []
+    trays = [each.tray for each in placing.tried] if placing else []
     return workspace_figures.labelled(robot, results, floor_mm, trays, kind)
 
 
@@ -108,8 +108,7 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
     note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    place = f"#hole-{number_}" if void.kind == "enclosed" else "#space"
-    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, place)
+    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}")
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:

@@ -268,11 +268,6 @@ class Placing:
         return joined([tr("{count} {what}", count=count, what=what) for count, what in counts if count], ", ")
 
     @property
-    def line(self) -> str:
-        """Where to put the tray, and what it is in the way of, in one sentence."""
-        return tr("{place}: {hindrance}.", place=self.tray.line, hindrance=self.hindrance(self.tried[0]))
-
-    @property
     def compared(self) -> str:
         """What was compared with the tray, and what of it was found; empty where nothing was."""
         if not self.met:

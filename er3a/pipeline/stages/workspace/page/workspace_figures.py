@@ -13,6 +13,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from scipy.spatial import ConvexHull
 
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
@@ -20,12 +21,13 @@ from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import at_least, fixed, number
-from er3a.pipeline.player.turning import ColourScale, Layer, surroundings, turning_figure
+from er3a.pipeline.player.turning import ColourScale, Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
+from er3a.pipeline.viewing.drawn import drawn_scene
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, side_view
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE, VERDICTS
+from er3a.pipeline.viewing.side_view import Kind, Label, LabelKind, SeenArm, border_lines, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -150,7 +152,7 @@ BODY_BLOCKS = (36, 56, 60)  # of the reached body, along radius, height and arou
 SMOOTHED = 8  # times that its corners go to the mean of their neighbours
 
 
-def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None) -> Markup:
+def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, tray: Tray | None) -> Markup:
     """What is proven reachable, the cloud and the voids, the scene and the arm at zero in a figure that turns."""
     cloud, vertices, triangles = results.cloud, results.void_vertices, results.void_triangles
     value = cloud.manipulability_m3[:CLOUD_POINTS]
@@ -171,7 +173,12 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None)
             layers.append(Layer(name, corners, colour, faces=faces))
             drawn[void.kind] += 1
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
-    return turning_figure(layers, scale, solids=surroundings(robot, scene), cut_m=results.summary.axis.point_m[1])
+    solids = surroundings(robot, scene)
+    if tray:
+        colour = VERDICTS["pass"]
+        shapes = [shape | {"colour": colour} for shape in drawn_scene(tray.scene(None).solids, robot)]
+        solids.append(Solids(tr("tray"), shapes, np.eye(4)[None], colour))
+    return turning_figure(layers, scale, solids, cut_m=results.summary.axis.point_m[1])
 
 
 def _reached_body(robot: Robot, results: model.WorkspaceResults) -> tuple[Reals, Integers]:
@@ -217,16 +224,27 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    labels = [void_label(number_, void) for number_, void in enumerate(summary.voids, 1) if void.kind == "enclosed"]
-    outlines = [_tray_corners(tray) for tray in trays]
-    labels += [Label(tr("tray"), corners[1], "tray") for corners in outlines]
+    labels = [void_label(number_, void) for number_, void in enumerate(summary.voids, 1)]
+    outlines = [("pocket", _pocket(results, k)) for k, void in enumerate(summary.voids, 1) if void.kind == "open"]
+    for k, tray in enumerate(trays, 1):
+        kind_: LabelKind = "tray" if k == 1 else "tray other"
+        outlines.append((kind_, _tray_corners(tray)))
+        labels.append(Label(tray.name, outlines[-1][1][1], kind_, f"tray-{k}"))
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
 
+def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
+    """The outline (k, 2), mm, of an open pocket, seen along y."""
+    own = results.void_vertices.void == number_
+    seen = 1000 * (results.void_vertices.point_m[own] - results.summary.axis.point_m)[:, ::2]
+    return seen[ConvexHull(seen).vertices] if len(seen) > 2 else seen
+
+
 def void_label(number_: int, void: model.VoidSummary) -> Label:
     """The name of a void, at its place."""
-    name = tr("hole, {size} L", size=at_least(1000 * void.volume_m3.lower, "L"))
+    size = at_least(1000 * void.volume_m3.lower, "L")
+    name = tr("hole, {size} L", size=size) if void.kind == "enclosed" else tr("pocket, {size} L", size=size)
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
