@@ -175,7 +175,7 @@ def test_back_leads_to_where_one_was(browser, small_study):
     browser.execute_script("arguments[0].open = true; arguments[0].scrollIntoView()", fold)
     place = "return document.getElementById('judged').getBoundingClientRect().top"
     before = browser.execute_script(place)
-    browser.execute_script("document.querySelector('.before a').click()")
+    browser.execute_script("document.querySelector('.chip .caveat a').click()")
     WebDriverWait(browser, PAUSE).until(lambda _: "validation.html" in browser.current_url)
     browser.back()
     WebDriverWait(browser, PAUSE).until(lambda _: browser.find_element(By.ID, "judged").get_property("open"))
