@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 from urllib.parse import urlencode
+
+import numpy as np
 
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import first_sentence, tr
 from er3a.pipeline.messages.say import joined
 from er3a.pipeline.viewing.answer import Fix, ListRow, Part
+from er3a.robots.robot import Robot
 
 Weight = Literal["plain", "caution", "fail"]
 
@@ -127,6 +130,21 @@ class PlayedMotion:
     whole_s: float = 0.0
 
 
+def at_rest(
+    robot: Robot, name: str, text: str = "", weight: Weight = "plain", q: Reals | None = None, **more: Any
+) -> PlayedMotion:
+    """The arm for a second in one pose, of which ``text`` is said.
+
+    Parameters
+    ----------
+    q : (n,), rad or m; None for the zero pose, or what the limits leave of it
+    more : of a :class:`PlayedMotion`
+    """
+    pose = np.clip(0.0, robot.lower, robot.upper) if q is None else q
+    events = [PlayedEvent(0.0, 1.0, text, weight)] if text else []
+    return PlayedMotion(name, "", np.array([0.0, 1.0]), np.tile(pose, (2, 1)), events, **more)
+
+
 def bar_of(motion: PlayedMotion, duration_s: float) -> list[Part]:
     """What happens during a motion, as parts of a bar.
 
@@ -175,6 +193,6 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     """What to do about the first fault that can be mended; None where none can."""
     for fault in faults:
         if fault.to_do:
-            place = fault.instead[1] if fault.instead else f"#{fault.name}"
+            place = fault.instead[1] if fault.instead else fault.address
             return Fix(joined((fault.name, first_sentence(fault.to_do)[0]), ": "), place)
     return None

@@ -157,11 +157,11 @@ function singularAxis(j, T) {
 
 /** What each joint bears now, as a bar of the most that any bears on this motion. */
 function tellLoads(poses) {
-  const most = Math.max(...motion.loads.flat().map(Math.abs)) || 1;
+  const most = Math.max(...motion.loads.flat().map(Math.abs).filter(Number.isFinite)) || 1;
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
-    const text = `J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`;
-    space.word(text, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > 0.01 * most, Math.abs(load) / most);
+    if (Number.isNaN(load)) return;
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > 0.01 * most, Math.abs(load) / most);
   });
 }
 

@@ -107,7 +107,8 @@ export class SolutionList {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
     if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    return row.withinLimits ? words.within : fill(words.leaves, { reasons: beyondLimits(this.data, row.q) });
+    const [first, ...more] = beyondLimits(this.data, row.q).split(words.separator); // the rest is said when it is asked for
+    return row.withinLimits ? words.within : fill(words.leaves, { reasons: first }) + (more.length ? ` (+${more.length})` : "");
   }
 
   #button(row, parts) {

@@ -67,10 +67,9 @@ export class ArmView extends Space {
   /** The joints' axes, each from the arm outwards in its own colour. */
   #axes(poses) {
     for (const [k, { middle, half }] of this.data.rows.entries()) {
-      const axis = scaled(column(poses[k + 1], 2), this.table.direction[k] * half);
-      const tip = add(moved(poses[k + 1], middle), scaled(axis, 2));
+      const tip = add(moved(poses[k + 1], middle), scaled(column(poses[k + 1], 2), 2 * this.table.direction[k] * half));
       this.line([moved(poses[k + 1], middle), tip], this.data.colours.joints[k], 3);
-      this.word(this.rows[k], add(tip, scaled(axis, 0.5)));
+      this.word(this.rows[k], tip);
     }
   }
 
@@ -80,7 +79,7 @@ export class ArmView extends Space {
       const arrow = [0, 1, 2].map((i) => (i === c ? part * this.reach : 0));
       const tip = add(column(T, 3), turned(T, arrow));
       this.line([column(T, 3), tip], colour, 3);
-      if (names[c]) this.word(names[c], add(tip, turned(T, scaled(arrow, 0.2))));
+      if (names[c]) this.word(names[c], tip, colour);
     });
   }
 }

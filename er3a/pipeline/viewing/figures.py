@@ -240,23 +240,6 @@ def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: floa
     return figure, figure.subplots(rows, columns, **subplots)
 
 
-def row_of_panels(
-    columns: int, width: float, height: float, room: tuple[float, float, float, float, float], **subplots
-):
-    """A figure and its axes (columns,) where they are put: finding places for them takes longer than drawing.
-
-    Parameters
-    ----------
-    width, height, room : inches; ``room`` is left free at the left, below, at the right, above and between panels
-    """
-    figure = Figure(figsize=(width, height), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-    left, below, right, above, between = room
-    panel = (width - left - right - (columns - 1) * between) / columns
-    sides = {"left": left / width, "right": 1 - right / width, "wspace": between / panel}
-    figure.subplots_adjust(bottom=below / height, top=1 - above / height, **sides)
-    return figure, figure.subplots(1, columns, **subplots)
-
-
 def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:
     """Make a drawing true to scale: equal units on both axes.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from er3a.pipeline.language import tr, with_unit
-from er3a.pipeline.messages.numbers import measured, number
-from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion
+from er3a.pipeline.messages.numbers import decimals_of, fixed, number
+from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -30,18 +30,25 @@ def motions(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
 def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
     """For each joint the arm at rest in the pose in which it holds most."""
     return [
-        PlayedMotion(
+        at_rest(
+            robot,
             holding_name(each.joint),
             tr(
                 "J{joint} holds {torque} at most.",
                 joint=each.joint,
                 torque=with_unit(number(abs(each.torque), 3), each.unit),
             ),
-            np.array([0.0, 1.0]),
-            np.tile(meant(robot, np.array(each.q)), (2, 1)),
+            q=meant(robot, np.array(each.q)),
+            loads=np.where(np.arange(robot.joints) == each.joint - 1, abs(each.torque), np.tile(np.nan, (2, 1))),
         )
         for each in results.summary.holding
     ]
+
+
+def within(value: float, tolerance: float, decimals: int = 2) -> str:
+    """A value with its tolerance, two digits of that and no more decimals than ``decimals``."""
+    shown = min(decimals, decimals_of(value, tolerance, "") if value else decimals)
+    return f"{fixed(value, shown)} ± {fixed(tolerance, shown)}"
 
 
 def holding_name(joint: int) -> str:
@@ -53,6 +60,6 @@ def _peak(load: JointLoad) -> str:
     return tr(
         "J{joint} peaks: {peak} {unit}",
         joint=load.joint,
-        peak=measured(load.peak, None, load.unit),
+        peak=within(load.peak, load.tolerance),
         unit=load.unit,
     )

@@ -10,18 +10,18 @@ from markupsafe import Markup
 
 from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.dynamics import BINDING, payload_key, payload_text, quantity_word
-from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of, decimals_of_column, fixed, number
+from er3a.pipeline.messages.numbers import at_least, at_most, decimals_of_column, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, word
+from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions
+from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
-from er3a.pipeline.viewing.figures import axis_label, row_of_panels
+from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
-from er3a.pipeline.viewing.side_view import seen_arm, side_view
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -33,16 +33,10 @@ def joint_colour(joint: int) -> str:
     return JOINTS[joint % len(JOINTS)]
 
 
-def within(value: float, tolerance: float, decimals: int = 2) -> str:
-    """A value with its tolerance, two digits of that and no more decimals than ``decimals``."""
-    shown = min(decimals, decimals_of(value, tolerance, "") if value else decimals)
-    return f"{fixed(value, shown)} ± {fixed(tolerance, shown)}"
-
-
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = row_of_panels(3, 13.0, 3.4, (0.75, 0.55, 0.1, 0.15, 0.85))
+    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.9, sharex=True)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
@@ -67,13 +61,10 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
-    for ax in (torque, parts, power):
-        ax.set_xlabel(axis_label(rows, "t_s"))
+    power.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr(
-        "J{joint} needs the greatest torque, {peak} {unit} at {t:.2f} s; largest contribution: "
-        "{part}. Shaded: uncertainty of the torques from the tolerances of masses and centres. Power below 0 is"
-        " fed back to the drive.",
+        "J{joint} needs most, {peak} {unit} at {t:.2f} s; largest part: {part}. Shaded: tolerance of the masses.",
         joint=load.joint,
         peak=within(load.peak, load.tolerance),
         unit=load.unit,
@@ -103,7 +94,6 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         stored,
         output,
         _answer(robot, results),
-        arm=side_view([seen_arm(robot, own_title(robot.title), "", "right")]),
         payload=payload_text(summary, robot),
         findings=listed(summary.findings),
         links=_links(summary),
@@ -115,7 +105,7 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         figures=figures,
         player=player(
             robot,
-            [*motions(robot, results), *held(robot, results)],
+            [*motions(robot, results), *held(robot, results)] or [at_rest(robot, own_title(robot.title))],
             opened=_moment_of(results, _worst(summary.motors)) if summary.motors else None,
         ),
         drawing_head=drawing_head(),
@@ -184,7 +174,7 @@ def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> List
     limit = tr("limit {value}", value=_sized(motor.peak_limit, motor)) if motor.peak_limit else ""
     note = joined([_sized(motor.peak, motor), limit or moment[0]], ", ")
     full = motor.peak_limit or most or 1.0
-    return ListRow(_mark(motor), f"J{motor.joint}", note, "#motors", moment, 1.0, _filled(motor.peak / full))
+    return ListRow(_mark(motor), f"J{motor.joint}", note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
 
 
 def _held_row(motor: model.MotorNeed, most: float) -> ListRow:

@@ -17,7 +17,7 @@ from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.programs import rates_text, remedies, singular_cause
 from er3a.pipeline.messages.say import joined, say, say_first
-from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of
+from er3a.pipeline.player.motions import Fault, FaultMoment, PlayedEvent, PlayedMotion, Weight, address_of, at_rest
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.programs.model import FindingAt, ProgramMotion, ProgramsResults, ProgramSummary
 from er3a.planning.motion_faults import rate_ratio
@@ -42,8 +42,13 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
+        label = own_title(program.title)
+        if not len(rows):  # nothing of it was carried out: the arm rests in its zero pose
+            said = joined([in_few_words(say(each.finding)) for each in program.findings])
+            motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome], label=label))
+            continue
         q = meant(robot, rows.q_deg)
-        motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=own_title(program.title)))
+        motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=label))
     return motions
 
 

@@ -66,27 +66,25 @@ def report(study: Study, stored: Stored[model.ProgramsResults], output: Path) ->
 
 def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
-    summary, wrong, played = results.summary, faults(results), motions(robot, results)
-    shown = {motion.name: motion for motion in played if len(motion.t)}
-    known = {each.name: each for each in summary.programs}
-    ends = {name: float(shown[name].t[-1]) if name in shown else 0.0 for name in known}
+    summary, wrong = results.summary, faults(results)
+    shown = {motion.name: motion for motion in motions(robot, results)}
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    bad = {each.name: row_of(each, shown.get(each.name), ends[each.name], 1.0, notes[each.name]) for each in wrong}
+    bad = {each.name: row_of(each, shown[each.name], 0.0, 1.0, notes[each.name]) for each in wrong}
+    good = [each for each in summary.programs if each.name not in bad]
     sound = [
         ListRow(
             "pass",
-            name,
+            each.name,
             tr("{passed} of {count} motions", passed=each.passed, count=each.motions),
-            f"#{name}",
-            (name, 0.0),
+            f"#{each.name}",
+            (each.name, 0.0),
             1.0,
         )
-        for name, each in known.items()
-        if name not in bad
+        for each in good
     ]
     caught = sum(fault.meant for fault in wrong)
-    headline, rest = may_run(len(sound), len(known) - caught, caught, tr("programs"))
-    clear = [each.least_clearance_mm for name, each in known.items() if name not in bad and each.least_clearance_mm]
+    headline, rest = may_run(len(sound), len(summary.programs) - caught, caught, tr("programs"))
+    clear = [each.least_clearance_mm for each in good if each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))

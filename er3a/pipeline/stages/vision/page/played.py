@@ -14,14 +14,14 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.vision.model import ObjectResult, PoseEstimate, VisionResults, VisionSummary
 from er3a.pipeline.viewing.drawn import Shape
 from er3a.pipeline.viewing.palette import REFERENCE, VERDICTS
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-WAYS = {"move": N_("move to the approach"), "approach": N_("approach"), "retreat": N_("retreat")}
+WAYS = {"move": N_("move to the approach"), "approach": N_("straight to the grasp"), "retreat": N_("retreat")}
 OBJECT_M = (0.04, 0.04, 0.06)  # how an object is drawn: no file gives its shape
 SIGHT = 0.2  # of the farthest distance, how far the drawn pyramid reaches: a longer one would be before the arm
 CAMERA_M = (0.09, 0.07, 0.07)
@@ -35,8 +35,8 @@ def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[Play
     home, sight = meant(robot, np.array(task.home_deg)), _sight(results.summary)
     found = [_motion(robot, results, each, home) for each in results.summary.objects]
     return [
-        replace(motion, marks=[*motion.marks, *(replace(edge, t1=float(motion.t[-1])) for edge in sight)])
-        for motion in found
+        replace(motion, marks=[*motion.marks, *(replace(ray, t1=float(motion.t[-1])) for ray in own)])
+        for motion, own in zip(found, sight)
     ]
 
 
@@ -45,8 +45,7 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
     if each.grasp is None or not len(rows):
         place = _metres(each.xyz_mm)
         mark = Mark(0.0, 1.0, place, place, "")
-        event = PlayedEvent(0.0, 1.0, refusal_text(each), "fail")
-        return PlayedMotion(each.name, "", np.array([0.0, 1.0]), np.tile(home, (2, 1)), [event], [mark])
+        return at_rest(robot, each.name, refusal_text(each), "fail", home, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
     text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
@@ -97,13 +96,13 @@ def _corners(task: VisionFile, far: float) -> Reals:
     return np.array([[-x, -y, far], [x, -y, far], [x, y, far], [-x, y, far]])
 
 
-def _sight(summary: VisionSummary) -> list[Mark]:
-    """The line from a fixed camera to each object; none of a camera that moves."""
+def _sight(summary: VisionSummary) -> list[list[Mark]]:
+    """Of each object the line from a fixed camera to it; none of a camera that moves."""
     found = summary.calibration
     if found is None or found.setup != "eye_to_hand":
-        return []
+        return [[] for _ in summary.objects]
     start = _metres(found.hand_eye.xyz_mm)
-    return [Mark(0.0, 0.0, start, _metres(each.xyz_mm), "") for each in summary.objects]
+    return [[Mark(0.0, 0.0, start, _metres(each.xyz_mm), "")] for each in summary.objects]
 
 
 def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:

@@ -179,7 +179,7 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
         return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
-    note = tr("{percent} % success", percent=fixed(100 * each.grasp.probability, 1))
+    note = tr("within the gripper's tolerance: {percent} %", percent=fixed(100 * each.grasp.probability, 1))
     return ListRow("pass", each.name, note, "#objects", moment)
 
 
