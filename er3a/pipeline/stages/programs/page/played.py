@@ -44,8 +44,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
                 events += _found_event(program, each, rows)
         label = own_title(program.title)
         if len(rows):
-            q = meant(robot, rows.q_deg)
-            motions.append(PlayedMotion(program.name, "", rows.t_s, q, events, label=label))
+            motions.append(PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, label=label))
         else:  # nothing of it was carried out: the arm rests in its zero pose
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
             motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome], label=label))
