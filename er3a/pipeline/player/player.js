@@ -233,8 +233,8 @@ function show(element, text) {
 function newMotion() {
   bar.dataset.motion = chooser.value = motion.name;
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
-  const beyond = { t: end(), until: whole(), status: "none", text: "" };
-  const ticks = [beyond, ...motion.events].map((event) => {
+  const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
+  const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
     const tick = document.createElement("button");
     const at = (value) => Math.min(100, (100 * (value - start())) / (whole() - start() || 1));
     Object.assign(tick, { type: "button", className: `tick ${event.status}`, title: event.text, tabIndex: -1 });
