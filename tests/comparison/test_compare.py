@@ -580,16 +580,14 @@ def test_inches_are_recognised_where_they_are_round_millimetres(decimals, tmp_pa
 
 
 @pytest.mark.long
-@pytest.mark.filterwarnings("ignore::er3a.errors.DoubtfulUnit")
-def test_links_too_long_in_metres_are_in_inches_and_that_is_said_first_of_another_arm_too(tmp_path):
-    other, bare = with_columns(tmp_path).rename(tmp_path / "ur5.csv"), tmp_path / "ur3.csv"
+def test_lengths_of_a_small_arm_without_a_unit_are_asked_back(tmp_path):
+    bare = tmp_path / "ur3.csv"
     lengths = (0, 5.98), (-9.59, 0), (-8.4, 0), (0, 4.42), (0, 3.36), (0, 3.22)  # of a UR3
     rows = [f"{k},{a},{alpha},{d}" for k, ((a, d), alpha) in enumerate(zip(lengths, (90, 0, 0, 90, -90, 0)), 1)]
     bare.write_text("\n".join(["joint,a,alpha,d", *rows]), encoding="utf-8")
-    assert read_arm(str(bare), as_printed=True).robot.a[1] == pytest.approx(-0.24365, abs=1e-4)
-    code, said = compared(bare, other)
-    assert code == 1
-    assert re.match(r".*columns a, d: 9.59 mm at most may be inches; another arm", said)
+    with pytest.raises(InputError, match="say no unit"):
+        read_arm(str(bare), as_printed=True)
+    assert read_arm(str(bare), length_unit="in").robot.a[1] == pytest.approx(-0.24365, abs=1e-4)
 
 
 @pytest.mark.long
