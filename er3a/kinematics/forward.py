@@ -293,7 +293,7 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
                 filled[i, r, 2] = axes[3] * zs[4 * r * BLOCK + i] + 0.0
                 filled[i, r, 3] = rows[(4 * r + 3) * BLOCK + i]
             for j in range(4):
-                filled[i, 3, j] = j // 3
+                filled[i, 3, j] = j // 3  # 0, 0, 0, 1
 
 
 @np.errstate(all="ignore")  # as kernels have it

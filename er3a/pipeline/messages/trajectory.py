@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import er3a.pipeline.messages.collision  # noqa: F401
@@ -228,18 +227,6 @@ def cause_of(path: model.PathSummary) -> str:
 
 def _beside(event: model.Singularity, part: model.Stretch) -> bool:
     return part.t0_s - ADJOINING <= event.until_s and event.t_s <= part.t1_s + ADJOINING
-
-
-def adjoined(stretches: Sequence[model.Stretch]) -> list[model.Stretch]:
-    """Stretches in order of time, those of one cause that adjoin as one."""
-    found: list[model.Stretch] = []
-    for part in sorted(stretches, key=lambda part: part.t0_s):
-        k = next((k for k, each in enumerate(found) if each.cause == part.cause), None)
-        if k is not None and part.t0_s <= found[k].t1_s + ADJOINING:
-            found[k] = replace(found[k], t1_s=max(found[k].t1_s, part.t1_s), s1_m=max(found[k].s1_m, part.s1_m))
-        else:
-            found.insert(0, part)
-    return sorted(found, key=lambda part: part.t0_s)
 
 
 def _run(stretches: Sequence[model.Stretch]) -> tuple[list[model.Stretch], float | None]:

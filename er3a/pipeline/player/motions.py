@@ -137,10 +137,10 @@ def at_rest(
 
     Parameters
     ----------
-    q : (n,), rad or m; None for the zero pose, or what the limits leave of it
+    q : (n,), rad or m; None for the arm's home, or zeros where it has none
     more : of a :class:`PlayedMotion`
     """
-    pose = np.clip(0.0, robot.lower, robot.upper) if q is None else q
+    pose = next(each for each in (q, robot.home, np.zeros(robot.joints)) if each is not None)
     events = [PlayedEvent(0.0, 1.0, text, weight)] if text else []
     return PlayedMotion(name, "", np.array([0.0, 1.0]), np.tile(pose, (2, 1)), events, **more)
 

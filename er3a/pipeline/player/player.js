@@ -127,7 +127,10 @@ function draw() {
     const way = motion.trails[0].filter((_, i) => motion.times[i] >= from - 1e-4 && motion.times[i] <= until + 1e-4);
     if (status !== "plain" && way.length > 1) space.line(way, data.colours[status], 5);
   }
-  for (const T of poses.map((own) => own.at(-1))) [0, 1, 2].forEach((c) => space.line([column(T, 3), add(column(T, 3), scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3));
+  for (const T of poses.map((own) => own.at(-1))) {
+    const origin = column(T, 3);
+    for (const c of [0, 1, 2]) space.line([origin, add(origin, scaled(column(T, c), 0.09 * data.size))], data.axes[c], 3);
+  }
   for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);

@@ -99,7 +99,7 @@ function refusal(k, value) {
     const limits = { lower: inUnit(table, k, table.lower[k]), upper: inUnit(table, k, table.upper[k]) };
     return fill(words.outside, { joint: names[k], ...limits });
   }
-  return beyond.length ? fill(words.not_moved, { reasons: beyondLimits(data, q.map((old, j) => (j === k ? value : old))) }) : "";
+  return beyond.length ? fill(words.not_moved, { reasons: beyondLimits(data, q.map((old, j) => (j === k ? value : old))).join(words.separator) }) : "";
 }
 
 /** Moves one joint (rad, m) as far as its limits let it; where those of a sum of joints don't, it stays. */
@@ -169,7 +169,7 @@ function takeLink() {
   if (!location.hash.startsWith("#q=") || location.hash === fragment()) return;
   const given = location.hash.slice(3).split(",").map((word, k) => meant(table, k, word === "" ? NaN : Number(word)));
   const counted = given.length === q.length ? "" : fill(words.bad_count, { count: given.length, joints: q.length });
-  const reason = counted || JOINTS.map((k) => refusal(k, given[k])).find(Boolean) || beyondLimits(data, given);
+  const reason = counted || JOINTS.map((k) => refusal(k, given[k])).find(Boolean) || beyondLimits(data, given).join(words.separator);
   if (reason) write(byId("message"), fill(words.bad_link, { reason }));
   else moveTo(given);
 }

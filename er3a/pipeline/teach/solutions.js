@@ -107,7 +107,7 @@ export class SolutionList {
     const { words } = this.data;
     const at = this.#atLimit(row).join(", ");
     if (row.withinLimits && at) return fill(words.within_at, { joints: at });
-    const [first, ...more] = beyondLimits(this.data, row.q).split(words.separator); // the rest is said when it is asked for
+    const [first, ...more] = beyondLimits(this.data, row.q); // the rest is said when it is asked for
     return row.withinLimits ? words.within : fill(words.leaves, { reasons: first }) + (more.length ? ` (+${more.length})` : "");
   }
 
@@ -118,7 +118,7 @@ export class SolutionList {
     button.setAttribute("aria-disabled", String(!row.withinLimits));
     button.addEventListener("click", () => {
       if (row.withinLimits) this.choose(row.q);
-      write(byId("refused"), row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q) }));
+      write(byId("refused"), row.withinLimits ? "" : fill(this.data.words.not_moved, { reasons: beyondLimits(this.data, row.q).join(this.data.words.separator) }));
     });
     for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.ghost(row.q));
     for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.ghost(null));
@@ -137,12 +137,11 @@ export class SolutionList {
 /** Which joints leave their limits, and by how much. */
 export function beyondLimits(data, q) {
   const { words, table } = data;
-  const reasons = excesses(table, q).map((beyond) => {
+  return excesses(table, q).map((beyond) => {
     const { name, text } = limited(data, beyond);
     const { angle, excess, above, limit } = beyond;
     return fill(words[above ? "above" : "below"], { joint: name, angle: text(angle), excess: text(excess), limit: text(limit, 0) });
   });
-  return reasons.join(words.separator);
 }
 
 const faultWords = (words, fault, gap) =>
@@ -150,7 +149,7 @@ const faultWords = (words, fault, gap) =>
 
 /** Why the arm can't take a pose, from what was found instead of joints. */
 export function whyNot(data, { row, branch, miss }) {
-  if (row) return beyondLimits(data, row.q);
+  if (row) return beyondLimits(data, row.q).join(data.words.separator);
   if (branch) return faultWords(data.words, branch.fault, branch.gap);
   return fill(data.words.not_found, { length: inMillimetres(miss.length), angle: inDegrees(miss.angle) });
 }

@@ -8,7 +8,7 @@ from er3a.pipeline.language import tr
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
 from er3a.pipeline.stages.collision.model import Closest, CollisionResults, PathClearances
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -35,10 +35,9 @@ def poses(robot: Robot, results: CollisionResults) -> list[PlayedMotion]:
 
 
 def _pose(robot: Robot, found: Closest) -> PlayedMotion:
-    t, q = np.array([0.0, 1.0]), np.tile(meant(robot, np.array(found.q_deg)), (2, 1))
     (a, b, c), (d, e, f) = (np.array([found.from_mm, found.to_mm]) / 1000).tolist()
     mark = Mark(0.0, 1.0, (a, b, c), (d, e, f), _clearance(found.clearance_mm))
-    return PlayedMotion(found.name, _least(found).text, t, q, marks=[mark])
+    return at_rest(robot, found.name, _least(found).text, q=meant(robot, np.array(found.q_deg)), marks=[mark])
 
 
 def events(results: CollisionResults, path: str, rows: PathClearances) -> list[PlayedEvent]:
@@ -50,32 +49,19 @@ def events(results: CollisionResults, path: str, rows: PathClearances) -> list[P
 def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
     """Where the nearest bodies overlap, each stretch with one pair."""
     label = np.where(rows.clearance_mm < 0, rows.between, "")
-    starts = np.flatnonzero(label != np.roll(label, 1))
-    starts = np.union1d(starts, [0])
+    starts = np.union1d(np.flatnonzero(label != np.roll(label, 1)), [0])
     ends = np.append(starts[1:], len(rows) - 1)
     return [
-        PlayedEvent(
-            rows.t_s[i],
-            rows.t_s[j],
-            _inside(label[i].split("/"), rows.clearance_mm[i : j + 1].min()),
-            "fail",
-            tuple(label[i].split("/")),
-        )
+        PlayedEvent(rows.t_s[i], rows.t_s[j], _inside(bodies, rows.clearance_mm[i : j + 1].min()), "fail", bodies)
         for i, j in zip(starts, ends)
-        if label[i]
+        if len(bodies := tuple(label[i].split("/"))) == 2
     ]
 
 
-def _inside(bodies: list[str], clearance_mm: float) -> str:
+def _inside(bodies: tuple[str, ...], clearance_mm: float) -> str:
     """How deep a body gets into another one while they overlap."""
-    one, other = bodies
-    what = body_word(other) if other.startswith("link_") else tr("the {solid}", solid=body_word(other))
-    return tr(
-        "{one} is up to {far} mm inside {other}",
-        one=body_word(one),
-        far=fixed(-clearance_mm, 0),
-        other=what,
-    )
+    one, other = map(body_word, bodies)
+    return tr("{one} is up to {far} mm inside {other}", one=one, far=fixed(-clearance_mm, 0), other=other)
 
 
 def _least(found: Closest) -> PlayedEvent:

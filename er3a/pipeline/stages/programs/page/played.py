@@ -45,7 +45,7 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         label = own_title(program.title)
         if len(rows):
             motions.append(PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, label=label))
-        else:  # nothing of it was carried out: the arm rests in its zero pose
+        else:  # nothing of it was carried out: the arm rests
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
             motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome], label=label))
     return motions

@@ -40,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -75,7 +75,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         study,
         stored,
         output,
-        answer_of(summary, wrong, played, met, contradicted),
+        answer_of(summary, wrong, played, met),
         sections=sections,
         entered=linked(met),
         compared_with_tray=compared_with_tray,
@@ -104,7 +104,6 @@ def answer_of(
     wrong: Mapping[str, Fault],
     played: Sequence[PlayedMotion],
     met: Mapping[str, Meeting] | None = None,
-    contradicted: bool = False,
 ) -> Answer:
     """How many paths may be run, each with its bar over time, and what to do about the first of the others.
 
@@ -123,14 +122,14 @@ def answer_of(
     others = paths[len(wrong) :]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name], contradicted), mark="fail", note=as_expected(path), fix=None)
+        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Can be repaired"), mended),
-        Group(tr("May run"), [_sound_row(path, shares[path.name], contradicted) for path in sound]),
+        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
@@ -151,31 +150,21 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int
 def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
     early = sum(not path.chosen and path.sound_end is not None for path in wrong)
-    doubtful = sum(path.verdict == "safe" for path in wrong)
     if not wrong:
         return ""
     return tr(
-        "The other {count}: {mended} can be repaired, {early} can end early, {rest} can't run.",
+        "The other {count}: {mended} can be repaired, {early} can end early, {rest} neither.",
         count=len(wrong),
         mended=mended,
         early=early,
-        rest=len(wrong) - mended - early - doubtful,
-    ) + (tr(" {count} in doubt.", count=doubtful) if doubtful else "")
+        rest=len(wrong) - mended - early,
+    )
 
 
-def _sound_row(path: model.PathSummary, length: float, contradicted: bool) -> ListRow:
+def _sound_row(path: model.PathSummary, length: float) -> ListRow:
     """A path that may be run, with how near it comes to anything."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    fix = Fix(tr("{path} may run: begin slowly.", path=path.name), f"#{path.name}-programs", instead=False)
-    return ListRow(
-        "pass",
-        path.name,
-        clear or tr("passes"),
-        f"#{path.name}",
-        (path.name, 0.0),
-        length,
-        fix=None if contradicted else fix,
-    )
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
 
 
 def _programs(
@@ -256,13 +245,22 @@ def _drawn(path: model.PathSummary, rows: model.PathChecks) -> model.PathChecks:
 
 
 def strategies_shown(path: model.PathSummary) -> list[list[str]]:
-    """Rows of the comparison: the programme, each strategy, and the exact path at its fastest."""
+    """Rows of the comparison: the programme, and each strategy."""
     if not path.avoidance:
         return []
     clearance = _clearance(path.clearance.least_mm, path.clearance.between) if path.clearance else "–"
-    ratios = _ratio(path.max_joint_speed_ratio), _ratio(path.max_joint_acceleration_ratio)
-    programmed = ["0.00", "0.00", *ratios, clearance, fixed(path.duration_s, 2), tr("the path to be repaired")]
-    rows = [[tr("as programmed"), *programmed]]
+    rows = [
+        [
+            tr("as programmed"),
+            "0.00",
+            "0.00",
+            _ratio(path.max_joint_speed_ratio),
+            _ratio(path.max_joint_acceleration_ratio),
+            clearance,
+            fixed(path.duration_s, 2),
+            tr("the path to be repaired"),
+        ]
+    ]
     for tried in path.avoidance:
         name = strategy_word(tried.name) + (" ←" if tried.name == path.strategy else "")
         if tried.motion is None:

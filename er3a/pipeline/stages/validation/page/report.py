@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -31,7 +31,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     plain_table,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
@@ -112,6 +112,19 @@ def _value(value: float, check: model.Check) -> str:
     return fixed(value, DECIMALS[check.unit])
 
 
+def _by_kind(checks: Sequence[Judged]) -> Group:
+    """How many checks of each kind pass, each with its bar."""
+    rows = []
+    for kind, title in KINDS.items():
+        own = [check.status for check in checks if check.kind == kind]
+        passed, total = own.count("pass"), len(own)
+        mark: Literal["pass", "fail", "caution"] = "pass" if passed == total else "fail" if "fail" in own else "caution"
+        parts = [Part(passed / total, 1.0, mark)] if passed < total else ()
+        if own:
+            rows.append(ListRow(mark, tr(title), f"{passed}/{total}", "#checks", None, 1.0, parts))
+    return Group(tr("Checks"), rows)
+
+
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, summary = stored.robot, stored.results.summary
@@ -144,8 +157,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected=text,
         corrected_address=text_address(text),
         groups=group_rows(judged),
-        judged=judged,
-        kinds=KINDS,
+        by_kind=[_by_kind(judged)],
         failed=[*map(check_row, failed)],
         columns=COLUMNS,
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],
