@@ -21,7 +21,6 @@ from er3a.pipeline.messages.planning import times_needed
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import (
     _rates,
-    adjoined,
     cause_of,
     end_text,
     first_faults,
@@ -539,17 +538,6 @@ def test_the_player_marks_what_fails_and_says_so_of_paths_near_assumed_shapes_to
     during = (measured.t_s >= event.t) & (measured.t_s <= event.until)
     assert (measured.clearance_mm[during] < 20).all()
     assert (measured.clearance_mm[measured.t_s < event.t][-1:] >= 20).all()
-
-
-def test_stretches_of_one_cause_that_adjoin_are_told_once():
-    open_, other = fact("undecided"), rate_fault(1, 1, 20.0, 10.0)
-    parts = [stretch(open_, 1.97, 2.03), stretch(open_, 1.945, 1.967), stretch(other, 1.95, 1.96)]
-    found = adjoined([*parts, stretch(open_, 2.9, 3.0)])
-    assert [(each.cause, each.t0_s, each.t1_s) for each in found] == [
-        (open_, 1.945, 2.03),
-        (other, 1.95, 1.96),
-        (open_, 2.9, 3.0),
-    ]
 
 
 def test_a_motion_on_another_solution_says_how_far_its_start_is_and_that_the_way_was_not_checked():
