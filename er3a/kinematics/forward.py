@@ -11,15 +11,16 @@ import numpy as np
 
 from er3a.errors import ArgumentError, ShapeError
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts, row_values
-from er3a.numerics.arrays import Flags, Reals, as_floats, for_kernel
+from er3a.numerics.arrays import Reals, as_floats, for_kernel
 from er3a.numerics.fast_math import LARGEST_ANGLE, cos_sin
 from er3a.numerics.jit import inner_kernel, is_compiled, kernel
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 
 Row = tuple[float, float, float, float]
 Axes = tuple[int, int, float, float]  # the columns in scratch memory that hold y and z, and their signs there
 
 BLOCK = 64  # poses; a row of 64 numbers fills whole vectors
+_SIGN, _START, _SLIDES = 0, 1, 2  # rows of the kernels' ``joint``
 _COS, _SIN = 12, 13  # rows of scratch memory after the 3 x 4 entries of a block of poses
 
 
@@ -68,7 +69,7 @@ def forward_of_rows(robot: Robot, u: Reals) -> Reals:
     T : (N, 4, 4), T_base_tool, m
     """
     out = np.empty((len(u), 4, 4))
-    _fill_poses(for_kernel(u), robot.direction, joint_starts(robot), robot.sliding, constant_links(robot), out)
+    _fill_poses(for_kernel(u), _joints(robot), constant_links(robot), out)
     return out
 
 
@@ -146,11 +147,17 @@ def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:
     return q
 
 
-def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals, Reals, Flags]:
-    """Kernel arguments: each row's motion u (N, m), its direction, the start value of x, and whether it slides."""
+def _motion(robot: Robot, q: Reals) -> tuple[Reals, Reals]:
+    """Kernel arguments: each row's motion u (N, m), and :func:`_joints`."""
     u = row_values(robot, q).reshape(-1, robot.rows)
     u.setflags(write=False)  # as kernels take arrays; this view, not q
-    return u, robot.direction, joint_starts(robot), robot.sliding
+    return u, _joints(robot)
+
+
+@derived
+def _joints(robot: Robot) -> Reals:
+    """Each row's direction, start value of x, and 1 if it slides: (3, m), one array, as each costs a call 0.2 us."""
+    return for_kernel(np.array([robot.direction, joint_starts(robot), robot.sliding]))
 
 
 @inner_kernel
@@ -270,7 +277,7 @@ def _slide_rows(q: Reals, sign: float, k: int, rows: Reals, axes: Axes) -> None:
 
 
 @kernel
-def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+def _forward(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 4, 4) with tool poses, block by block."""
     rows = np.empty((_SIN + 1) * BLOCK)
     for start in range(0, q.shape[0], BLOCK):
@@ -279,10 +286,10 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
         axes = _fill_start(rows, count, links[0])
         for k in range(links.shape[0] - 1):
             far = False
-            if sliding[k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
-                _slide_rows(block, direction[k], k, rows, axes)
+            if joint[_SLIDES, k]:  # here, not in a kernel of its own, through which each pose took 12 % longer
+                _slide_rows(block, joint[_SIGN, k], k, rows, axes)
             else:
-                far = _cos_sin_rows(block, direction[k], start_at[k], k, axes[2], rows)
+                far = _cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, axes[2], rows)
             axes = _turn_and_step(rows, count, links[k + 1], axes, far)
         ys, zs = rows[axes[0] * BLOCK :], rows[axes[1] * BLOCK :]
         for i in range(count):
@@ -297,16 +304,16 @@ def _forward(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links:
 
 
 @np.errstate(all="ignore")  # as kernels have it
-def _forward_by_arrays(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+def _forward_by_arrays(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """What :func:`_forward` fills, by numpy's loops: where nothing is compiled, its own are slow."""
     out[:] = links[0]
     entries, (x, y, z, place) = out.reshape(-1, 4), np.moveaxis(out, 2, 0)
     for k, link in enumerate(links[1:]):
-        u = direction[k] * q[:, k, None]
-        if sliding[k]:
+        u = joint[_SIGN, k] * q[:, k, None]
+        if joint[_SLIDES, k]:
             place += u * z
         else:
-            cosine, sine = np.cos(u + start_at[k]), np.sin(u + start_at[k])
+            cosine, sine = np.cos(u + joint[_START, k]), np.sin(u + joint[_START, k])
             x[:], y[:] = cosine * x + sine * y, cosine * y - sine * x
         entries[:] = entries @ link
     out[:, 3] = 0.0, 0.0, 0.0, 1.0
@@ -352,14 +359,14 @@ def _turn_and_step(rows: Reals, count: int, link: Reals, axes: Axes, dense: bool
 
 
 @kernel
-def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+def _frames(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, m + 1, 4, 4) with the frames that move with each row, and the tool's."""
     joints = q.shape[1]
     for n in range(q.shape[0]):
         x, y, z = rows_of(links[0])
         for k in range(joints):
-            moved, link = direction[k] * q[n, k] + start_at[k], links[k + 1]
-            if sliding[k]:
+            moved, link = joint[_SIGN, k] * q[n, k] + joint[_START, k], links[k + 1]
+            if joint[_SLIDES, k]:
                 x, y, z = slide_row(x, moved), slide_row(y, moved), slide_row(z, moved)
             else:
                 c, s = np.cos(moved), np.sin(moved)
@@ -370,7 +377,7 @@ def _frames(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: 
 
 
 @kernel
-def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links: Reals, out: Reals) -> None:
+def _jacobian(q: Reals, joint: Reals, links: Reals, out: Reals) -> None:
     """Fill ``out`` (N, 6, m) with Jacobians by rows, block by block."""
     joints = q.shape[1]
     rows, columns = np.empty((_SIN + 1) * BLOCK), np.empty((joints, 6 * BLOCK))
@@ -380,15 +387,15 @@ def _jacobian(q: Reals, direction: Reals, start_at: Reals, sliding: Flags, links
         axes = _fill_start(rows, count, links[0])
         for k in range(joints):
             # Until the tool point is known, the linear rows hold a point on the axis.
-            _keep_axis(rows, count, axes, direction[k], columns[k])
+            _keep_axis(rows, count, axes, joint[_SIGN, k], columns[k])
             far = False
-            if sliding[k]:
-                _slide_rows(block, direction[k], k, rows, axes)
+            if joint[_SLIDES, k]:
+                _slide_rows(block, joint[_SIGN, k], k, rows, axes)
             else:
-                far = _cos_sin_rows(block, direction[k], start_at[k], k, axes[2], rows)
+                far = _cos_sin_rows(block, joint[_SIGN, k], joint[_START, k], k, axes[2], rows)
             axes = _turn_and_step(rows, count, links[k + 1], axes, far)
         for k in range(joints):
-            if sliding[k]:
+            if joint[_SLIDES, k]:
                 _along(count, columns[k])
             else:
                 _lever(rows, count, columns[k])
