@@ -94,7 +94,7 @@ class CalibrationSet(ByValue, Displayed):
         numbers: Integers = scipy.sparse.csgraph.connected_components(near, directed=False)[1]
         return numbers
 
-    @property
+    @cached_property
     def hand(self) -> Reals:
         """F (N, 4, 4) of F X B = Y: T_base_flange for a camera on the flange, T_flange_base for a fixed one."""
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -206,7 +206,7 @@ def compute(study: Study, name: str) -> model.VisionResults:
     doubt = _doubt(calibration, found.touch)
     limits = (limits_of(robot, motions), study.seed)
     planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
-    objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
+    objects = tuple(_object(robot, entry, places[entry.name], plan) for entry, plan in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     open_points = (
@@ -359,7 +359,7 @@ def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding 
     return touch.contradiction if touch else None
 
 
-Planned = list[tuple[ObjectEntry, GraspPlan, SeenPoseError | None]]
+Planned = list[tuple[ObjectEntry, GraspPlan]]
 
 
 def _planned(
@@ -389,13 +389,8 @@ def _planned(
     for entry in task_file.objects:
         target = entry.detected()
         error_at = partial(_error_at, found, target, accuracy, (robot, picture))
-        plan = plan_grasp(task, target, camera @ target.T_camera_object, partial(_covariance_at, error_at))
-        rows.append((entry, plan, error_at(plan.chosen.q) if plan.chosen else None))
+        rows.append((entry, plan_grasp(task, target, camera @ target.T_camera_object, error_at)))
     return rows
-
-
-def _covariance_at(error_at: Callable[[Reals], SeenPoseError], q: Reals) -> Reals:
-    return error_at(q).whole
 
 
 def _error_at(
@@ -404,19 +399,13 @@ def _error_at(
     return seen_pose_error(found, target.T_camera_object, target.covariance, accuracy, (arm[0], q, arm[1]))
 
 
-def _object(
-    robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None
-) -> model.ObjectResult:
-    parts = (
-        None
-        if error is None
-        else np.array(
-            [
-                error_sizes(part)
-                for part in (error.camera, error.calibration, error.repeatability, error.table, error.whole)
-            ]
-        )
-    )
+def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> model.ObjectResult:
+    error_mm = error_deg = None
+    if (error := plan.error) is not None:
+        causes = error.camera, error.calibration, error.repeatability, error.table, error.whole
+        distances, angles = zip(*map(error_sizes, causes))
+        error_mm = model.ErrorParts(*(1000 * np.array(distances)).tolist())
+        error_deg = model.ErrorParts(*np.degrees(angles).tolist())
     return stated(
         model.ObjectResult,
         plan,
@@ -425,8 +414,8 @@ def _object(
         **_pose(T),
         outcome="grasped" if plan.chosen else "not graspable",
         expect=entry.expect,
-        error_mm=None if parts is None else model.ErrorParts(*(1000 * parts[:, 0]).tolist()),
-        error_deg=None if parts is None else model.ErrorParts(*np.degrees(parts[:, 1]).tolist()),
+        error_mm=error_mm,
+        error_deg=error_deg,
         grasp=_grasp(robot, plan.chosen) if plan.chosen else None,
     )
 
@@ -521,7 +510,7 @@ def figures_of(
 
 def _all_ways(robot: Robot, planned: Planned) -> model.PathRows:
     """The motions of all grasps."""
-    found = (_ways(robot, entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen)
+    found = (_ways(robot, entry.name, plan.chosen) for entry, plan in planned if plan.chosen)
     return model.PathRows.stacked(found).of_joints(robot.slides)
 
 
