@@ -20,7 +20,7 @@ import numpy as np
 from er3a.by_value import Displayed, ReadOnly, Sheet
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import NotOfArm, Pose, Quantity, Unit
-from er3a.references.subjects import ReferenceSubject
+from er3a.references.subjects import Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
 NO_DOCUMENT = "none"
@@ -179,7 +179,7 @@ class Reference:
         :func:`er3a.references.predict.with_rounding` has added what they leave open to the uncertainty
     """
 
-    subject: ReferenceSubject
+    subject: Subject
     group: str
     quantity: Quantity
     expected: float | None
@@ -206,7 +206,7 @@ class Reference:
         return self.grade in AUTHORITATIVE_GRADES
 
 
-Scalar = tuple[ReferenceSubject, str, Quantity, float | None, float]
+Scalar = tuple[Subject, str, Quantity, float | None, float]
 """Subject, group, quantity, expected value and uncertainty of a reference."""
 
 
@@ -217,12 +217,11 @@ class Row(ABC):
     ``gaussian``: its uncertainties are standard deviations, and not half-widths. ``rounding``: half of the last digit
     of each joint value, deg or mm; empty if these are exact.
 
-    A kind of reference is a row class: ``kind`` is the name of its tables, ``groups`` those of its references, and
-    ``scalars`` splits a row into them. :data:`er3a.references.rows.KINDS` lists all kinds.
+    A kind of reference is a row class: ``kind`` is the name of its tables, and ``scalars`` splits
+    a row into references. :data:`er3a.references.rows.KINDS` lists all kinds.
     """
 
     kind: ClassVar[str]
-    groups: ClassVar[tuple[str, ...]]
     line: int
     source: str
     grade: Grade
