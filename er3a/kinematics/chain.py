@@ -95,8 +95,7 @@ def row_values(robot: Robot, q: Reals) -> Reals:
     """
     if robot.coupling is None:
         return q
-    u: Reals = np.ascontiguousarray(q @ robot.coupling.T)
-    return u
+    return np.ascontiguousarray(q @ robot.coupling.T)
 
 
 def moving_tip(links: Reals, sliding: Flags | None = None) -> tuple[int, Reals]:

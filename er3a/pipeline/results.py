@@ -348,8 +348,7 @@ def read_status(folder: Path) -> Status:
     ResultError
         as :func:`read_stage`
     """
-    status: Status = _record(folder)["verdict"]["status"]
-    return status
+    return _record(folder)["verdict"]["status"]
 
 
 def read_foundation(folder: Path) -> Foundation:

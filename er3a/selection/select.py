@@ -520,8 +520,7 @@ def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
     Control*, section 4.2.1.
     """
     short = angle < speed**2 / acceleration
-    time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
-    return time
+    return np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
 
 
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:

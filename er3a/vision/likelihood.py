@@ -112,8 +112,7 @@ class Refined:
         """(12 + k, 12 + k), the inverse of J^T J, by columns of unit length so that units don't matter."""
         size = np.linalg.norm(self.J, axis=(0, 1))
         J = self.J / size
-        found: Reals = np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
-        return found
+        return np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
 
     @cached_property
     def leverage(self) -> Reals:
@@ -237,8 +236,7 @@ def stated_whitening(seen: CalibrationSet, X: Reals, Y: Reals) -> Reals:
     if seen.flange_covariance is not None:
         G = flange_to_camera(seen.setup, seen.hand, X, Y)
         S = S + G @ seen.flange_covariance @ G.mT
-    W: Reals = np.linalg.inv(np.linalg.cholesky(S))
-    return W
+    return np.linalg.inv(np.linalg.cholesky(S))
 
 
 def refine(
@@ -323,8 +321,7 @@ class _Noise:
         """(N, 6, 6), of residuals at the board's origin."""
         to_middle = np.tile(np.eye(6), (len(self.B), 1, 1))
         to_middle[:, :3, 3:] = -skew(self.B[:, :3, :3] @ self.middle)
-        W: Reals = self.axes / self.deviations[GROUPS, None] @ to_middle
-        return W
+        return self.axes / self.deviations[GROUPS, None] @ to_middle
 
     def again(self, fit: Refined) -> _Noise:
         """The noise estimated from the residuals of a fit.

@@ -348,8 +348,7 @@ def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float
 
 def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
     """T_base_camera (4, 4) when the objects were seen."""
-    placed: Reals = seen_pose(found, np.eye(4), None if picture is None else forward(robot.without_tool(), picture))
-    return placed
+    return seen_pose(found, np.eye(4), None if picture is None else forward(robot.without_tool(), picture))
 
 
 def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding | None:
