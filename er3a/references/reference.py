@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
 from typing import Any, ClassVar, TypeVar
 
@@ -138,24 +139,10 @@ class Documents:
         -------
         names : of one circle; empty if there is none
         """
-        for name in self.by_name:
-            path = self._way_back(name)
-            if path:
-                return path
-        return ()
-
-    def _way_back(self, start: str) -> tuple[str, ...]:
-        """Documents from one back to itself, each made from the next; empty if there is no such way."""
-        ways: list[tuple[str, ...]] = [(start,)]
-        seen: set[str] = set()
-        while ways:
-            way = ways.pop()
-            for parent in self.by_name[way[-1]].derived_from if way[-1] in self.by_name else ():
-                if parent == start:
-                    return way
-                if parent not in seen:
-                    seen.add(parent)
-                    ways.append((*way, parent))
+        try:
+            TopologicalSorter({each.name: each.derived_from for each in self}).prepare()
+        except CycleError as error:
+            return tuple(error.args[1][:0:-1])
         return ()
 
 
