@@ -1,7 +1,8 @@
 """Upper bounds of a maximum over all poses within the limits, by branch and bound [1]_.
 
 **Search** (:func:`max_over_poses`): the largest value that is found, for several objectives at once. It starts from
-evenly spread poses and climbs from the best few (:mod:`er3a.numerics.peaks`).
+evenly spread poses and improves the best few: it sets one joint after another to the best value of a grid over its
+whole range, then refines the grid about it.
 
 **Bound** (:func:`bounded_torque`, :func:`bounded_moment`): a box of joint values has a bound from the corners of its
 hulls. Boxes that can't exceed the largest value found are dropped. The others are halved, the highest bound first.
@@ -30,7 +31,7 @@ import numpy as np
 from er3a.dynamics.arm_model import ArmModel, flange_in_last_link
 from er3a.kinematics.chain import constant_links, joint_starts
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.peaks import box_points, peak
+from er3a.numerics.quasi_random import quasi_random_points
 from er3a.robots.joint_limits import within
 from er3a.robots.masses import Load
 from er3a.robots.robot import Robot
@@ -470,7 +471,12 @@ def _may_be_within(robot: Robot, low: Reals, high: Reals) -> Flags:
     return found
 
 
-POSES = 1000  # evenly spread, from the best of which the search climbs
+POSES = 1000  # evenly spread, of which the best few are improved
+CLIMBS = 4  # poses of each objective that are improved
+GRID = 21  # values of a joint over its range
+REFINEMENTS = 3  # of the grid about the best value
+MAX_ROUNDS = 12  # over all joints
+NO_BETTER = 1e-9  # of the value: a round that gains less is the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -492,12 +498,40 @@ def max_over_poses(robot: Robot, objective: Callable[[Reals], Reals]) -> Maxima:
     -------
     maxima : found, not proven; the starts are not random, so equal inputs give equal numbers
     """
-    points = box_points(robot.lower, robot.upper, POSES)
-    points = points[kept] if (kept := within(robot, points)).any() else (robot.lower + robot.upper)[None] / 2
-    sampled, found = objective(points), []
-    for k, best in enumerate(sampled.argmax(axis=0)):
-        top = peak(lambda q, k=k: objective(q)[:, k], robot.lower, robot.upper, points)  # type: ignore[misc]
-        # A climb may leave limits of sums of joints.
-        found.append(top if within(robot, top[0]) else (points[best], sampled[best, k]))
-    q, values = zip(*found)
-    return Maxima(np.array(values), np.array(q))
+    q = quasi_random_points(robot.lower, robot.upper, POSES)
+    q = q[within(robot, q)]
+    if not len(q):
+        q = ((robot.lower + robot.upper) / 2)[None]
+    values = objective(q)
+    k = values.shape[1]
+    best = np.argsort(-values, axis=0, kind="stable")[:CLIMBS]
+    targets = np.broadcast_to(np.arange(k), best.shape).ravel()
+    poses, reached = q[best.ravel()], values[best.ravel(), targets]
+    for _ in range(MAX_ROUNDS):
+        before = reached
+        for joint in range(robot.joints):
+            poses, reached = _along(robot, objective, poses, targets, joint)
+        if (reached <= before + NO_BETTER * np.abs(before)).all():
+            break
+    chosen = reached.reshape(-1, k).argmax(axis=0) * k + np.arange(k)
+    return Maxima(reached[chosen], poses[chosen])
+
+
+def _along(
+    robot: Robot, objective: Callable[[Reals], Reals], poses: Reals, targets: Integers, joint: int
+) -> tuple[Reals, Reals]:
+    """Each pose with one joint at the best value found in its range, and what its objective is there."""
+    low = np.full(len(poses), robot.lower[joint])
+    high = np.full(len(poses), robot.upper[joint])
+    rows = np.arange(len(poses))
+    for _ in range(REFINEMENTS + 1):
+        tried = np.repeat(poses[:, None], GRID + 1, axis=1)
+        tried[:, 1:, joint] = np.linspace(low, high, GRID, axis=1)
+        flat = tried.reshape(-1, robot.joints)
+        values = objective(flat).reshape(len(poses), GRID + 1, -1)[rows, :, targets]
+        values[~within(robot, flat).reshape(values.shape)] = -np.inf
+        best = values.argmax(axis=1)
+        poses, step = tried[rows, best], (high - low) / (GRID - 1)
+        low = np.maximum(poses[:, joint] - step, robot.lower[joint])
+        high = np.minimum(poses[:, joint] + step, robot.upper[joint])
+    return poses, values[rows, best]

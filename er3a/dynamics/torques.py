@@ -12,10 +12,11 @@ import numpy as np
 import scipy
 
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of
-from er3a.dynamics.pose_bound import Bounded, bounded_torque, max_over_poses
+from er3a.dynamics.pose_bound import Bounded, Size, bounded_torque, max_over_poses
 from er3a.errors import ShapeError
 from er3a.kinematics.forward import checked_joints
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import within
 from er3a.robots.masses import Drives, Load
 from er3a.robots.robot import Robot
 
@@ -357,10 +358,18 @@ def worst_holding(model: ArmModel) -> WorstHolding:
         def own(q: Reals) -> Reals:
             return size(q)[:, joint]
 
-        start = Bounded(float(climbed.values[joint]), climbed.q[joint], np.inf)
-        return bounded_torque(model, joint, own, start)
+        return bounded_torque(model, joint, own, _polished(model.robot, own, climbed.q[joint]))
 
     climbed = max_over_poses(model.robot, size)
     found = [bounded(joint) for joint in range(model.robot.joints)]
     q = np.array([each.q for each in found])
     return WorstHolding(np.diagonal(holding_torques(model, q)).copy(), q, np.array([each.bound for each in found]))
+
+
+def _polished(robot: Robot, size: Size, q: Reals) -> Bounded:
+    """The top near a pose (n,) that was climbed to one joint at a time: all joints together, within the limits."""
+    start, ends = float(size(q[None])[0]), list(zip(robot.lower, robot.upper))
+    top = scipy.optimize.minimize(lambda x: -size(x[None])[0], q, bounds=ends, method="L-BFGS-B")
+    if -top.fun > start and within(robot, top.x):
+        return Bounded(float(-top.fun), top.x, np.inf)
+    return Bounded(start, q, np.inf)

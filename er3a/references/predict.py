@@ -2,8 +2,12 @@
 
 Largest and smallest values over the joint limits, by optimisation.
 
-Points spread evenly over the box are evaluated in one batch; from the best of them the search climbs
-(:mod:`er3a.numerics.peaks`). Nothing is random: equal inputs give equal numbers.
+Points spread evenly over the box are evaluated in one batch; its best points and an equal number of others start a
+bounded truncated-Newton search each [1]_. Nothing is random: equal inputs give equal numbers.
+
+References
+----------
+.. [1] S. G. Nash, "Newton-type minimization via the Lanczos method", SIAM J. Numer. Anal. 21(4), 1984.
 """
 
 from __future__ import annotations
@@ -19,7 +23,6 @@ from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import frames
 from er3a.kinematics.table_batch import Tables, frames_of
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import peak
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import (
     MM,
@@ -40,7 +43,7 @@ STEP = 1e-6  # rad or m, of central differences: their error is least near the c
 
 
 def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
-    """Find an extreme of a measure over all joint values within the limits.
+    """Find an extreme of a measure over all joint values within the limits [1]_.
 
     The robot's tool does not count. Joint 1 stays at 0 if it turns: none of the measures changes with it, or the side
     view is drawn there. Limits of sums of joints are kept. A joint without influence on the result is given as 0 (or
@@ -60,15 +63,34 @@ def search(robot: Robot, quantity: Extreme, starts: int) -> tuple[float, Reals]:
     lower, upper = robot.lower.copy(), robot.upper.copy()
     if not robot.slides[0]:
         lower[0] = upper[0] = 0.0
+    joints = robot.joints
     sign = -1.0 if quantity.extreme == "greatest" else 1.0
 
     def cost(q: Reals) -> Reals:
         return sign * quantity.measure(frames(robot, q))
 
+    offsets = np.vstack([np.zeros(joints), STEP * np.eye(joints), -STEP * np.eye(joints)])
+
+    def cost_and_slope(q: Reals) -> tuple[float, Reals]:
+        values = cost(q + offsets)
+        return values[0], (values[1 : joints + 1] - values[joints + 1 :]) / (2 * STEP)
+
     scan = quasi_random_points(lower, upper, SCAN)
     if robot.combined:
-        return _within_sums(robot, scan, cost, starts, sign)
-    q, _ = peak(lambda q: -cost(q), lower, upper, scan, starts)
+        return _within_sums(robot, scan, cost, cost_and_slope, starts, sign)
+    best = scan[np.argsort(cost(scan), kind="stable")[: (starts + 1) // 2]]
+    results = [
+        scipy.optimize.minimize(
+            cost_and_slope,
+            start,
+            jac=True,
+            method="TNC",
+            bounds=list(zip(lower, upper)),
+            options={"ftol": 1e-15, "xtol": 1e-12, "gtol": 1e-12, "maxfun": 100},
+        )
+        for start in (*best, *scan[: starts // 2])
+    ]
+    q = min(results, key=lambda result: result.fun).x
     q = _without_idle_joints(q, lower, upper, cost)
     return float(sign * cost(q) * MM), q
 
@@ -77,6 +99,7 @@ def _within_sums(
     robot: Robot,
     scan: Reals,
     cost: Callable[[Reals], Reals],
+    cost_and_slope: Callable[[Reals], tuple[float, Reals]],
     starts: int,
     sign: float,
 ) -> tuple[float, Reals]:
@@ -89,13 +112,6 @@ def _within_sums(
     bounds = list(zip(robot.lower, robot.upper))
     if not robot.slides[0]:
         bounds[0] = (0.0, 0.0)
-    joints = robot.joints
-    offsets = np.vstack([np.zeros(joints), STEP * np.eye(joints), -STEP * np.eye(joints)])
-
-    def cost_and_slope(q: Reals) -> tuple[float, Reals]:
-        values = cost(q + offsets)
-        return values[0], (values[1 : joints + 1] - values[joints + 1 :]) / (2 * STEP)
-
     order = np.argsort(cost(scan), kind="stable")[:starts]
     found = [scan[order[0]]]
     for start in scan[order]:

@@ -78,9 +78,6 @@ TEXTS = texts(
         "more": "{count} more",
         "stage.not_computed": "Not computed: {reason}",
         "stage.not_examined": "This stage has not been computed yet.",
-        "page.last_run": (
-            "The last run of this study did not end well, so this page may tell of what was before: {problem}"
-        ),
         "stage.outdated": "Changed since, so this tells of what was before (run the study again): {names}. {text}",
     }
 )
