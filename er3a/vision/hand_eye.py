@@ -143,8 +143,6 @@ def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
     deviation = min(float(np.median(mismatch)) / 0.674, MAX_DEVIATION)
     if samples.camera_covariance is not None:
         stated = np.linalg.eigvalsh(samples.camera_covariance[:, 3:, 3:])[:, -1].mean()
-        if samples.flange_covariance is not None:
-            stated += np.linalg.eigvalsh(samples.flange_covariance[3:, 3:])[-1]
         # A sample can be bad in so many pairs that the median is, too; what is stated then holds it down.
         deviation = min(deviation, 3 * float(np.sqrt(2 * stated)))
         deviation = max(deviation, float(np.sqrt(2 * stated)))
@@ -384,7 +382,6 @@ class HandEye(ByValue, Displayed):
     residual : (N, 6), m and rad, by the camera's axes, of all samples
     scatter : root mean square of the whitened residuals; 1 is as stated, and where nothing is stated
     deviations : (2,), m and rad, of T_camera_board's position and rotation by axis, stated or estimated
-    without_suspects : (2,), m and rad: how far X moves if the samples taken out are left in; None if there are none
     """
 
     samples: CalibrationSet
@@ -400,7 +397,6 @@ class HandEye(ByValue, Displayed):
     axes_apart: float
     suspects: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
-    without_suspects: Reals | None
     touch: TouchCheck | None
     mismatch: Reals
 
@@ -485,7 +481,6 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         axes_apart=apart,
         suspects=tuple(suspects),
         warnings=tuple(warnings),
-        without_suspects=None if used.all() else _shift_with_all(samples, refined),
         touch=None,
         mismatch=angles.mismatch,
     )
@@ -600,11 +595,6 @@ def _warnings(
 
 
 _PARTS = (slice(3), slice(3, 6))
-
-
-def _shift_with_all(samples: CalibrationSet, refined: Refined) -> Reals:
-    step = step_between(refined.X, _fitted(samples).X)
-    return np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])])
 
 
 def _touch(found: HandEye, touched: Reals) -> TouchCheck:

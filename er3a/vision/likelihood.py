@@ -1,10 +1,9 @@
 """Maximum-likelihood refinement of hand-eye and board pose, with intervals that hold whatever the samples' noise is.
 
 A sample predicts T_camera_board = X^-1 F^-1 Y. Its six residuals are the position seen less the one predicted, and the
-rotation vector from predicted to seen, both by the camera's axes. They scatter by the camera's covariance and, carried
-into the camera to first order, the flange's. Hand-eye X and board Y change by twelve numbers: positions (m) and small
-rotations (rad) about the axes of their parent frames; derivatives with respect to these are in closed form. Steps are
-those of Levenberg and Marquardt [1]_.
+rotation vector from predicted to seen, both by the camera's axes, by whose covariance they scatter. Hand-eye X and
+board Y change by twelve numbers: positions (m) and small rotations (rad) about the axes of their parent frames;
+derivatives with respect to these are in closed form. Steps are those of Levenberg and Marquardt [1]_.
 
 **Noise.** Where no covariance is stated, it is estimated. A flat board's corners give its position across the line of
 sight better than along it, and its turn about its own normal better than its tilt. Errors of position and of rotation
@@ -36,7 +35,7 @@ import scipy
 
 from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
 from er3a.numerics.arrays import Reals
-from er3a.vision.calibration_set import CalibrationSet, Setup
+from er3a.vision.calibration_set import CalibrationSet
 
 UNKNOWNS = 12  # position and rotation of both poses
 CONFIDENCE = 0.95  # of all intervals
@@ -49,7 +48,6 @@ MIN_FREE = 1e-6  # of a sample's residuals that the fit pulls to zero whatever t
 GROUPS = np.array([0, 0, 1, 2, 2, 3])  # across and along the sight, tilt, turn about the board's normal
 POOLED = np.kron(np.eye(2), np.ones((2, 2)))  # of position, and of rotation
 START_DEVIATIONS = np.array([1e-3, 1e-3, 5e-3, 5e-3])  # m, rad
-WEIGHT_ROUNDS = 3
 PRIOR_RESIDUALS = 24.0  # over samples: draw the two variances of position, and of rotation, together in small sets
 MIDDLE = 0.07  # m, standard deviation of the board's middle from its origin, before residuals tell it
 NOISE_NUMBERS = 6  # four variances and the middle
@@ -195,50 +193,6 @@ def residuals(F: Reals, B: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals]:
     return np.concatenate([B[..., :3, 3] - position, turn], axis=-1), derivative
 
 
-def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
-    """How errors of T_base_flange move T_camera_board, to first order.
-
-    Parameters
-    ----------
-    F : (..., N, 4, 4), m, T_base_flange, or T_flange_base for a fixed camera
-    X, Y : (..., 4, 4), m, hand-eye and board pose
-
-    Returns
-    -------
-    G : (..., N, 6, 6), from m and rad by the base's axes to m and rad by the camera's
-    """
-    Rxt, Rf = transposed(X[..., None, :3, :3]), F[..., :3, :3]
-    ty, tf = Y[..., None, :3, 3], F[..., :3, 3]
-    G = np.zeros((*F.shape[:-2], 6, 6))
-    if setup == "eye_in_hand":
-        M = Rxt @ transposed(Rf)
-        G[..., :3, :3], G[..., :3, 3:], G[..., 3:, 3:] = -M, M @ skew(ty - tf), -M
-    else:  # F is T_flange_base
-        G[..., :3, :3] = G[..., 3:, 3:] = Rxt
-        G[..., :3, 3:] = -Rxt @ skew((transposed(Rf) @ ty[..., None])[..., 0])
-    return G
-
-
-def stated_whitening(seen: CalibrationSet, X: Reals, Y: Reals) -> Reals:
-    """Matrices that give residuals unit covariance, by what is stated of camera and flange.
-
-    Parameters
-    ----------
-    seen : N samples with a camera covariance
-    X, Y : (4, 4), m, poses at which the flange's errors are carried into the camera
-
-    Returns
-    -------
-    W : (N, 6, 6), inverse Cholesky factors, 1/m and 1/rad
-    """
-    assert seen.camera_covariance is not None
-    S = seen.camera_covariance
-    if seen.flange_covariance is not None:
-        G = flange_to_camera(seen.setup, seen.hand, X, Y)
-        S = S + G @ seen.flange_covariance @ G.mT
-    return np.linalg.inv(np.linalg.cholesky(S))
-
-
 def refine(
     seen: CalibrationSet, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
 ) -> Refined:
@@ -260,10 +214,7 @@ def refine(
     if W is not None:
         return fitted(W, start)
     if seen.camera_covariance is not None:
-        fit = fitted(stated_whitening(seen, X, Y), start)
-        for _ in range(0 if seen.flange_covariance is None else WEIGHT_ROUNDS):
-            fit = fitted(stated_whitening(seen, fit.X, fit.Y), fit.unknowns)
-        return fit
+        return fitted(np.linalg.inv(np.linalg.cholesky(seen.camera_covariance)), start)
     noise, change = _Noise(seen.target, seen.places.max() + 1), np.inf
     fit = fitted(noise.whitening, start)
     for _ in range(ROUNDS):

@@ -154,7 +154,7 @@ def test_a_camera_is_calibrated_from_images_alone_and_those_without_a_board_are_
     assert "assumed: the intrinsics are exact" in done.stdout
     record = json.loads(call("hand-eye", tmp_path / "set.yaml", "--json").stdout)
     assert record["samples"] == 12
-    assert [each["sample"] for each in record["left_out"]] == [f"row {k + 2}" for k in blank]
+    assert [each["params"]["sample"] for each in record["boardless"]] == [f"row {k + 2}" for k in blank]
 
 
 def test_without_any_board_in_the_images_there_is_one_error(tmp_path):

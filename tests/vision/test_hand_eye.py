@@ -21,7 +21,7 @@ from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.classic_methods import park
 from er3a.vision.hand_eye import CONVENTIONS, calibrate_hand_eye, other_conventions
-from er3a.vision.likelihood import flange_to_camera, refine, residuals
+from er3a.vision.likelihood import refine, residuals
 from er3a.vision.typical_causes import moved_between, wrong_distances
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 from testing.hand_eye_coverage import board_coverage, pose_coverage
@@ -83,18 +83,6 @@ def test_derivatives_are_those_of_differences():
         step[k] = 1e-6
         ends = [residuals(flange, B, moved(X_TRUE, s * step[:6]), moved(Y_TRUE, s * step[6:]))[0] for s in (1, -1)]
         np.testing.assert_allclose(J[..., k], (ends[0] - ends[1]) / 2e-6, atol=1e-8)
-
-
-@pytest.mark.parametrize("setup", SETUPS)
-def test_errors_of_the_flange_reach_the_camera(setup):
-    flange = flange_poses(np.random.default_rng(3), 4)
-    G = flange_to_camera(setup, flange if setup == "eye_in_hand" else np.linalg.inv(flange), X_TRUE, Y_TRUE)
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = 1e-6
-        ends = [seen(setup, moved(flange, s * step)) for s in (1, -1)]
-        found = np.stack([off(a, b) for a, b in zip(*ends)]) / 2e-6
-        np.testing.assert_allclose(G[..., k], found, atol=1e-8)
 
 
 def test_the_refinement_ends_where_scipy_finds_the_least_squares():
@@ -164,8 +152,6 @@ def test_a_board_turned_by_half_is_named_and_left_out(setup):
     assert [(each.sample, each.kind) for each in found.suspects] == [("5", "half_turn_z")]
     assert not found.used[4]
     assert np.linalg.norm(off(found.X, X_TRUE)[:3]) < 2e-3
-    assert found.without_suspects is not None
-    assert found.without_suspects[0] > 5e-4
 
 
 @pytest.mark.long
