@@ -258,25 +258,6 @@ def size_of(links: Reals) -> float:
     return 0.5 * float(np.linalg.norm(links[1:, :3, 3], axis=1).sum()) or 1.0
 
 
-def inverse_rigid(K: Reals) -> Reals:
-    """Inverses of rigid transforms.
-
-    Parameters
-    ----------
-    K : (..., 4, 4)
-
-    Returns
-    -------
-    inverse : (..., 4, 4)
-    """
-    out = np.zeros_like(K)
-    R = np.swapaxes(K[..., :3, :3], -1, -2)
-    out[..., :3, :3] = R
-    out[..., :3, 3] = -(R @ K[..., :3, 3:])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
-
-
 @inner_kernel
 def multiply_rigid(A: Reals, B: Reals, out: Reals) -> None:
     """Multiply rigid transforms. Kernel.

@@ -7,7 +7,7 @@ texts.
 ``drawing_corner`` (``q2_deg``, ``q3_deg``, ``coordinate``), ``drawing_extent`` (``extreme``, ``axis``), ``reach``
 (``extreme``, ``point``, ``axis``), ``joint_limit`` (``joint``, ``side``), ``joint_speed`` (``joint``),
 ``motion_of_joint`` (``joint``, ``point``, ``seen``), ``entry_of_table`` (``column``, ``joint``). A coordinate of None
-stands for the whole vector.
+means the whole vector.
 """
 
 from __future__ import annotations
