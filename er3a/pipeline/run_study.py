@@ -9,6 +9,7 @@ its own log into ``.snakemake/log/`` besides.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -34,7 +35,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file, read_status
+from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -181,8 +182,9 @@ def _error_line(text: str) -> str:
 
 def _verdict(robot: str, stage: str) -> str:
     try:
-        return read_status(Path("results", robot, stage))
-    except ResultError:
+        summary = json.loads(Path("results", robot, stage, "summary.json").read_bytes())
+        return str(summary["verdict"]["status"])
+    except (OSError, ValueError, KeyError):
         return "no result"
 
 
