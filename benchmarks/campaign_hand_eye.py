@@ -21,9 +21,9 @@ def table() -> str:
     lines = [
         "# Hand-eye calibration: coverage of the 95 % intervals",
         "",
-        f"The twelve numbers of hand-eye and board pose, from {SAMPLES} samples with normal errors of camera (where",
-        f"deviations are stated, of the flange too): {SETS * RUNS} runs a row, {RUNS} at each of {SETS} sets of",
-        f"poses. The standard error of a share is {_error(SETS * RUNS)}. Written by `make campaigns ARGS=hand_eye`.",
+        f"The twelve numbers of hand-eye and board pose, from {SAMPLES} samples with normal errors of the camera:",
+        f"{SETS * RUNS} runs a row, {RUNS} at each of {SETS} sets of poses.",
+        f"The standard error of a share is {_error(SETS * RUNS)}. Written by `make campaigns ARGS=hand_eye`.",
         "",
         "| camera | deviations | all numbers | lowest of one | highest of one |",
         "|---|---|---|---|---|",

@@ -12,23 +12,19 @@ How objects print in Python: a few lines of text, or a table in a notebook.
 
 An object prints as a :class:`Sheet` of codes and numbers, because the library contains no sentences. A sheet is always
 short, whatever the size of the object.
-
-Coded values (:class:`Coded`): their texts are made in ``er3a.pipeline.messages``, as those of findings.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from html import escape
-from inspect import get_annotations
 from itertools import islice
 from types import MethodType
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar, dataclass_transform
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -209,11 +205,8 @@ def shortly(value: Any) -> str:
         return shortly(value.item())
     if isinstance(value, float):
         return ABSENT if math.isnan(value) else f"{round(value, 9) + 0.0:.6g}"
-    if is_dataclass(value) and not isinstance(value, type) and hasattr(value, "code"):
-        params = getattr(value, "params", None)
-        if params is None:
-            params = {each.name: getattr(value, each.name) for each in fields(value) if each.name != "code"}
-        values = [f"{name}={shortly(part)}" for name, part in params.items()]
+    if hasattr(value, "code") and hasattr(value, "params"):
+        values = [f"{name}={shortly(part)}" for name, part in value.params.items()]
         return _cut(value.code + (f" ({', '.join(values)})" if values else ""))
     if isinstance(value, tuple | list):
         return _cut(", ".join(shortly(each) for each in islice(value, MAX_ROWS)) or ABSENT)
@@ -256,31 +249,3 @@ def _left_out(sheet: Sheet) -> tuple[str, ...]:
 def _cut(text: str) -> str:
     text = "".join(letter if letter.isprintable() else " " for letter in text)
     return text if len(text) <= MAX_LETTERS else text[: MAX_LETTERS - 3] + "..."
-
-
-KINDS: dict[str, type[Any]] = {}
-"""Classes of coded values, by their codes."""
-
-
-@dataclass_transform(frozen_default=True)
-class Coded:
-    """Base of coded values that are data of their own: subjects of references, pairs of bodies, parts of a table.
-
-    What was found is a :class:`er3a.finding.Finding`. Each subclass becomes a frozen dataclass. Its last field is its
-    ``code``, the stable identifier that summaries hold: the name of the class in lower case with underscores, unless
-    ``class WholeGroup(Coded, code="group")`` gives another. ``code=""`` marks a base that only holds shared fields.
-    """
-
-    code: ClassVar[str]
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
-
-    def __init_subclass__(cls, code: str | None = None) -> None:
-        if code != "":
-            cls.code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
-            cls.__annotations__ = get_annotations(cls) | {"code": Literal[cls.code]}
-            KINDS[cls.code] = cls
-        dataclass(frozen=True)(cls)

@@ -9,7 +9,7 @@ import os
 import stat
 from pathlib import Path
 
-from er3a.finding import AnyFinding
+from er3a.finding import Finding
 
 
 class Er3aError(Exception):
@@ -184,7 +184,7 @@ class PathError(Er3aError, ValueError):
 class NotWristPartitionedError(Er3aError):
     """The closed-form inverse does not apply to this arm; ``property_missing`` says which property it lacks."""
 
-    def __init__(self, robot: str, property_missing: AnyFinding):
+    def __init__(self, robot: str, property_missing: Finding):
         self.robot, self.property_missing = robot, property_missing
         super().__init__(
             f"{robot}: no closed-form inverse ({property_missing.code.replace('_', ' ')}); it needs parallel axes 2 "

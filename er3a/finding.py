@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeGuard
 
 import numpy as np
 
-from er3a.by_value import KINDS, Coded, ReadOnly, crude_hash
+from er3a.by_value import ReadOnly, crude_hash
 
 Basis = Literal["documented", "assumed"]
 
@@ -136,8 +136,6 @@ def revived(value: Any) -> Any:
         return value
     if value.keys() == {"value", "unit"}:
         return Amount(**value)
-    if (kind := KINDS.get(value.get("code", ""))) is not None:
-        return kind(**{name: revived(part) for name, part in value.items()})
     if "code" in value:
         return Finding(**value)
     return {name: revived(part) for name, part in value.items()}
@@ -153,7 +151,3 @@ def turned_or_moved(value: float, slides: bool, per: str = "") -> Amount:
     per : of a rate ``/s``, ``/s²`` or ``/s³``
     """
     return Amount(value, ("mm" if slides else "deg") + per)
-
-
-AnyFinding = Coded | Finding
-"""What has a code and a text."""

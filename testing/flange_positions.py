@@ -7,7 +7,7 @@ import numpy as np
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import COORDINATES, PointCoordinate
 from er3a.references.reference import Reference
-from er3a.references.subjects import PointAtPose
+from testing.reference_subjects import point_at_pose
 
 POSES = np.array(
     [
@@ -41,7 +41,7 @@ def references_to(stated: Reals) -> list[Reference]:
     """Positions (15,) in mm as a drawing would state them."""
     return [
         Reference(
-            PointAtPose(f"pose {i // 3}", "flange", COORDINATES[i % 3]),
+            point_at_pose(f"pose {i // 3}", "flange", COORDINATES[i % 3]),
             "key_poses",
             PointCoordinate(tuple(POSES[i // 3].tolist()), "flange", COORDINATES[i % 3]),
             float(value),

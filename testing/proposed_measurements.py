@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from er3a.finding import is_one
+from er3a.finding import fact, is_one
 from er3a.identifiability.proposals import Proposal
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference
 from er3a.references.seen import COARSE_DEG, Seen, SeenMotion, TableEntry
-from er3a.references.subjects import EntryOfTable, JointLimit, JointSpeed, MotionOfJoint, ReferenceSubject
+from er3a.references.subjects import Subject
 from er3a.robots.robot import Robot
 
 MEASURED = "measured"
@@ -25,7 +25,7 @@ def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Referenc
     if is_one(proposal, "look_at_motion"):
         if expected > 90.0 and isinstance(quantity, SeenMotion):
             quantity = replace(quantity, seen=opposite(proposal.seen))
-            subject = replace(cast(MotionOfJoint, subject), seen=quantity.seen)
+            subject = subject.but(seen=quantity.seen)
         expected = 0.0
     elif is_one(proposal, "measure_length"):
         width = proposal.half_width_mm
@@ -44,17 +44,17 @@ def opposite(seen: Seen) -> Seen:
     return cast(Seen, f"{stem}_{turned[last]}" if stem else turned[last])
 
 
-def _about(proposal: Proposal) -> tuple[ReferenceSubject, Quantity, str]:
+def _about(proposal: Proposal) -> tuple[Subject, Quantity, str]:
     joint = proposal.joint
     if is_one(proposal, "look_at_motion"):
         motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)
-        return MotionOfJoint(joint, proposal.point, proposal.seen), motion, "key_poses"
+        return fact("motion_of_joint", joint=joint, point=proposal.point, seen=proposal.seen), motion, "key_poses"
     if is_one(proposal, "read_limit"):
-        return JointLimit(joint, proposal.side), Limit(joint, proposal.side), "limits"
+        return fact("joint_limit", joint=joint, side=proposal.side), Limit(joint, proposal.side), "limits"
     if is_one(proposal, "time_joint"):
-        return JointSpeed(joint), Speed(joint), "speeds"
-    return EntryOfTable(proposal.column, joint), TableEntry(proposal.column, joint), "axes"
+        return fact("joint_speed", joint=joint), Speed(joint), "speeds"
+    return fact("entry_of_table", column=proposal.column, joint=joint), TableEntry(proposal.column, joint), "axes"
 
 
-def _plain(quantity: Quantity, subject: ReferenceSubject, group: str) -> Reference:
+def _plain(quantity: Quantity, subject: Subject, group: str) -> Reference:
     return Reference(subject, group, quantity, 0.0, 1.0, MEASURED, "measured")

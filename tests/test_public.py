@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import er3a
@@ -483,7 +484,8 @@ def test_evidence_is_a_table_of_a_screen(arm):
 def test_a_table_of_results_is_read_back(tmp_path):
     table = Border.of_rows([(1.0, 2.0, 3), (4.0, 5.0, 6)])
     table.write(tmp_path / "border.parquet")
-    assert table.frame().attrs["columns"]["rho_m"] == {"unit": "m", "meaning": "distance from axis 1"}
+    described = pq.read_schema(tmp_path / "border.parquet").field("rho_m").metadata
+    assert described == {b"unit": b"m", b"meaning": b"distance from axis 1"}
     assert Border.read((tmp_path / "border.parquet").read_bytes()) == table
 
 

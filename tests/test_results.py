@@ -96,7 +96,7 @@ def test_results_come_back_as_written(tmp_path, study):
     assert (stored.robot, stored.stage, stored.status) == ("er3_600", "workspace", "pass")
     assert stored.results.summary.verdict.finding == fact("made.solid", apart_from=fact("made.hollow", volume_m3=1.5))
     assert stored.results.summary.figures == SUMMARY.figures
-    pd.testing.assert_frame_equal(stored.results.rows.frame(), ROWS.frame())
+    assert stored.results.rows == ROWS
     assert np.signbit(stored.results.rows.x_m[2])
     assert stored.results.rows.q_deg.shape == (3, 6)
     names = ["x_m", "count", "label", *(f"q{joint}_deg" for joint in range(1, 7)), "x_mm", "y_mm", "z_mm"]

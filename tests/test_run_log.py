@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
-import os
-import re
-from html import escape
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from er3a.pipeline.run_study import RunLog, RunLogSettings, mark_pages
+from er3a.pipeline.run_study import RunLog, RunLogSettings
 
 
 @pytest.fixture
@@ -94,19 +91,3 @@ def test_what_snakemake_does_not_know_is_one_line(log, capsys):
     assert unknown.startswith("error: my.yaml: no stage (validation, ")
     assert unknown.endswith("a study is given by --study")
     assert other == "error: WorkflowError: no such profile"
-
-
-@pytest.mark.parametrize(("lang", "told"), [("en", "The last run of this study did not end well"), ("zh-CN", "")])
-def test_pages_say_that_the_last_run_ended_badly_until_the_next_begins(lang, told, tmp_path):
-    page = tmp_path / "arm" / "reach.html"
-    page.parent.mkdir()
-    before = f'<!doctype html>\n<html lang="{lang}">\n<head></head>\n<body class="wide">\n<p>Reach</p></body></html>\n'
-    page.write_text(before, encoding="utf-8")
-    os.utime(page, ns=(10**18, 10**18))
-    for problem in ("paths.yaml: paths[0]: no <kind>", "Ended by SIGTERM"):
-        mark_pages(tmp_path, problem)
-        assert page.read_text(encoding="utf-8").count(escape(problem)) == 1
-        assert re.search(rf'<body class="wide"><!-- last run --><p .*>{told}.*</p>', page.read_text(encoding="utf-8"))
-    assert "no &lt;kind&gt;" not in page.read_text(encoding="utf-8")
-    mark_pages(tmp_path, None)
-    assert (page.read_text(encoding="utf-8"), page.stat().st_mtime_ns) == (before, 10**18)

@@ -17,6 +17,7 @@ from er3a.geometry.transforms import posed, rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import MM
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 LEVELS: tuple[LevelName, ...] = ("lengths", "lengths_and_offsets", "all_entries")
@@ -179,7 +180,7 @@ def whole_length_mm(robot: Robot) -> float:
     length : mm
     """
     strokes = (robot.upper - robot.lower)[robot.slides]
-    return MM * float(np.abs(robot.a).sum() + np.abs(robot.d).sum() + strokes.sum())
+    return MM * float(size_of(robot) + strokes.sum())
 
 
 def coupled(robot: Robot, errors: Mapping[tuple[int, int], float]) -> Robot:

@@ -37,6 +37,7 @@ from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.chain import ALONG_Z, TO_NEXT_AXIS, constant_links, joint_starts, link_parts
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import ConvexPiece, Envelope, Grade, LinkMesh, Robot, derived
 
 RADIUS_RATIOS = (0.055, 0.055, 0.05, 0.045, 0.04, 0.035, 0.03)
@@ -246,11 +247,6 @@ def _hulls(shapes: ArmShapes, links: set[int]) -> list[tuple[int, Reals, float]]
     return hulls + [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in links]
 
 
-def _size(robot: Robot) -> float:
-    """The sum of all lengths in the table, m."""
-    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
-
-
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> Finding | None:
     """The remark on collisions where the arm's shapes are assumed.
 
@@ -282,7 +278,7 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     -------
     envelopes : in the links' frames, m; links without length get none
     """
-    size = _size(robot)
+    size = size_of(robot)
     parts, found = link_parts(robot), []
     last = robot.rows
     for k in range(last):

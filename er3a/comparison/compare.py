@@ -29,6 +29,7 @@ from er3a.kinematics.chain import row_values
 from er3a.kinematics.forward import forward, forward_of_rows
 from er3a.numerics.arrays import Reals
 from er3a.numerics.peaks import box_points, peak
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import CombinedLimit, Robot, Source
 
 VerdictWord = Literal["equal", "in_doubt", "same_arm", "other_arm", "other_joint_count"]
@@ -263,7 +264,7 @@ def _compared(robot_a: Robot, robot_b: Robot, tolerances: mechanism.Tolerances, 
         differs = _other_kinds(robot_a, kinds)
         return Comparison("other_arm", geometry=differs, joints=counts, not_examined=beside)
     printed = robot_a, robot_b
-    size = max(float(np.abs(robot.a).sum() + np.abs(robot.d).sum()) for robot in printed)
+    size = max(map(size_of, printed))
     if 0 < size < TINY:
         tolerances = replace(tolerances, length=min(tolerances.length, FINEST * size))
     slips = _unit_slips(robot_a, robot_b, tolerances, explained)

@@ -97,8 +97,7 @@ class ArmModel:
         pool = pin.ModelPool(self.model, 1)
         rows = [np.asfortranarray(values.T) for values in (self._x(q), qd @ self.to_rows.T, qdd @ self.to_rows.T)]
         found = np.asarray(pin.rneaInParallel(1, pool, *rows))  # one row or one sample comes back as a vector
-        tau: Reals = found.reshape(self.robot.rows, len(q)).T @ self.to_rows
-        return tau
+        return found.reshape(self.robot.rows, len(q)).T @ self.to_rows
 
     def mass_matrix(self, q: Reals) -> Reals:
         """Mass matrices, by the composite rigid body algorithm [1]_, without rotors.
@@ -171,8 +170,7 @@ class ArmModel:
 
     def _x(self, q: Reals) -> Reals:
         """Motion (N, m) of Pinocchio's joints."""
-        x: Reals = self.robot.direction * row_values(self.robot, q) + joint_starts(self.robot)
-        return x
+        return self.robot.direction * row_values(self.robot, q) + joint_starts(self.robot)
 
 
 @derived

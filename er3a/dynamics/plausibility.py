@@ -12,6 +12,7 @@ import numpy as np
 from er3a.dynamics.arm_model import WATER, LinkShape, drives_of, link_shapes
 from er3a.finding import Finding, fact, is_one
 from er3a.numerics.arrays import Reals
+from er3a.robots.joint_limits import size_of
 from er3a.robots.masses import MassBody, about, no_body, six_moments
 from er3a.robots.robot import Robot
 
@@ -42,7 +43,7 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     findings : at most a few for each link; empty if nothing is implausible
     """
     shapes = link_shapes(robot)
-    beyond = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
+    beyond = size_of(robot)
     armature = drives_of(robot).armature
     moved_by_one = robot.coupling is None
     found: list[MassFinding] = []

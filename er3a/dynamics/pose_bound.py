@@ -145,8 +145,7 @@ def _wrench(robot: Robot, load: Load) -> tuple[Reals, Reals]:
 
 def _alone(vector: Reals) -> Reals:
     """A vector (3,) as the only one, (1, 1, 3)."""
-    found: Reals = vector[None, None]
-    return found
+    return vector[None, None]
 
 
 def carried(robot: Robot, own: list[Hanging], at: list[Reals], row: int) -> Hanging:
@@ -216,8 +215,7 @@ def _rotated(vectors: Reals, corner: Reals) -> Reals:
 
 def _joined(vectors: Reals) -> Reals:
     """Vectors (B, c, K, 3) as (B, c K, 3)."""
-    found: Reals = vectors.reshape(len(vectors), vectors.shape[1] * vectors.shape[2], 3)
-    return found
+    return vectors.reshape(len(vectors), vectors.shape[1] * vectors.shape[2], 3)
 
 
 def row_torques(robot: Robot, row: int, outer: Hanging, pull: Reals) -> Reals:
@@ -238,8 +236,7 @@ def row_torques(robot: Robot, row: int, outer: Hanging, pull: Reals) -> Reals:
         found = -outer.mass * z - outer.force[:, None, :, 2]
     else:
         found = outer.first[:, None, :, 1] * x - outer.first[:, None, :, 0] * y - outer.moment[:, None, :, 2]
-    torques: Reals = found.reshape(len(found), found.shape[1] * found.shape[2])
-    return torques
+    return found.reshape(len(found), found.shape[1] * found.shape[2])
 
 
 def torque_caps(robot: Robot, row: int, outer: Hanging, gravity: float) -> Reals:
@@ -376,8 +373,7 @@ def _bounded_norm(
         return values, np.full(len(values), np.inf)
 
     def size(q: Reals) -> Reals:
-        found: Reals = norms(_at(robot, np.zeros(robot.rows, bool), q, q))[:, 0]
-        return found
+        return norms(_at(robot, np.zeros(robot.rows, bool), q, q))[:, 0]
 
     return _branch_and_bound(robot, at_corners, size, Bounded(float(size(q[None])[0]), q, np.inf), close, useless)
 

@@ -44,8 +44,7 @@ class TorqueParts:
     @property
     def total(self) -> Reals:
         """Their sum: what the drives give."""
-        whole: Reals = self.gravity + self.inertia + self.velocity + self.friction + self.tool
-        return whole
+        return self.gravity + self.inertia + self.velocity + self.friction + self.tool
 
 
 def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = None) -> Reals:
@@ -71,8 +70,7 @@ def torques(robot: Robot, q: Reals, qd: Reals, qdd: Reals, load: Load | None = N
         if the robot's links have no masses, or impossible ones
     """
     (q, qd, qdd), shape = _flat(robot, {"q": q, "qd": qd, "qdd": qdd})
-    tau: Reals = torque_parts(arm_model(robot, load), q, qd, qdd).total.reshape(shape)
-    return tau
+    return torque_parts(arm_model(robot, load), q, qd, qdd).total.reshape(shape)
 
 
 def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
@@ -94,8 +92,7 @@ def mass_matrix(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
     """
     (q,), shape = _flat(robot, {"q": q})
     M = arm_model(robot, load).mass_matrix(q) + np.diag(known(drives_of(robot).armature))
-    matrices: Reals = M.reshape(*shape, robot.joints)
-    return matrices
+    return M.reshape(*shape, robot.joints)
 
 
 def gravity(robot: Robot, q: Reals, load: Load | None = None) -> Reals:
@@ -161,8 +158,7 @@ def holding_torques(model: ArmModel, q: Reals) -> Reals:
     tau : (N, n), N m or N, forces at the tool included
     """
     rest = np.zeros_like(q)
-    held: Reals = model.rigid_torques(q, rest, rest) + model.tool_torques(q)
-    return held
+    return model.rigid_torques(q, rest, rest) + model.tool_torques(q)
 
 
 def friction_torques(drives: Drives, qd: Reals) -> Reals:
@@ -181,8 +177,7 @@ def friction_torques(drives: Drives, qd: Reals) -> Reals:
     -----
     A joint slower than :data:`AT_REST` is at rest, because rounding has no direction.
     """
-    against: Reals = known(drives.viscous) * qd + known(drives.coulomb) * direction_of(qd)
-    return against
+    return known(drives.viscous) * qd + known(drives.coulomb) * direction_of(qd)
 
 
 def direction_of(qd: Reals) -> Reals:
@@ -196,8 +191,7 @@ def direction_of(qd: Reals) -> Reals:
     -------
     direction : (..., n), -1, 0 or 1
     """
-    moving: Reals = np.where(np.abs(qd) > AT_REST, np.sign(qd), 0.0)
-    return moving
+    return np.where(np.abs(qd) > AT_REST, np.sign(qd), 0.0)
 
 
 def known(values: Reals) -> Reals:

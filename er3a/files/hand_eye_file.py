@@ -155,19 +155,9 @@ class HandEyeFile(InputFile):
     samples: Text
     images: ImageEntry | None = None
     camera_standard_deviation: StandardDeviations | None = None
-    flange_standard_deviation: StandardDeviations | None = None
     board_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     touched: Text | None = None
     touch_standard_deviation_mm: Positive = 0.1
-
-    @model_validator(mode="after")
-    def _one_source_of_noise(self) -> Self:
-        if self.flange_standard_deviation and not (self.camera_standard_deviation or self.images):
-            raise ValueError(
-                "flange_standard_deviation: can't be used while the camera's is estimated from the same residuals | "
-                "State camera_standard_deviation too, or remove it"
-            )
-        return self
 
 
 def load_hand_eye(path: str | Path, arm: Robot | None = None) -> CalibrationSet:
@@ -230,7 +220,6 @@ def read_calibration(path: str | Path, robot: Robot | None) -> tuple[Calibration
         target=target,
         names=names,
         camera_covariance=per_sample,
-        flange_covariance=head.flange_standard_deviation.covariance() if head.flange_standard_deviation else None,
         q=q,
         touched=_touched(path.parent / head.touched, robot) if head.touched else None,
         touch_deviation=head.touch_standard_deviation_mm / 1000,

@@ -41,8 +41,9 @@ from er3a.references.quantities import (
     rotation_vectors_deg,
 )
 from er3a.references.reference import NO_DOCUMENT, Document, Documents, Reference, ReferenceSet, Row, conflicts
-from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, check_complete, reference_set
+from er3a.references.rows import ENVELOPE_CORNERS, ENVELOPE_EXTENTS, KINDS, reference_set
 from er3a.references.seen import COARSE_DEG, SEEN
+from er3a.references.subjects import key_of
 from er3a.robots.robot import GRADES, MAX_JOINTS, Robot
 
 Fields = dict[str, Any]
@@ -303,9 +304,6 @@ def row_of(kind: str, fields: Mapping[str, Any]) -> Row:
     values["gaussian"] = values.pop(STATED_AS) == STANDARD_DEVIATION
     del values[UNITS_CHECKED]
     return KINDS[kind](**values)
-
-
-check_complete("kinds of reference tables", KINDS, FORMATS)
 
 
 FILE = "documents.csv"
@@ -631,9 +629,9 @@ def _check_repeats(path: Path, rows: tuple[Row, ...]) -> None:
             if line == row.line:
                 continue
             if _same(first, reference):
-                problem = f"repeats row {line} of the same document ({reference.subject.key})"
+                problem = f"repeats row {line} of the same document ({key_of(reference.subject)})"
             elif conflicts((first, reference)):
-                problem = f"contradicts row {line} of the same document ({reference.subject.key})"
+                problem = f"contradicts row {line} of the same document ({key_of(reference.subject)})"
             else:
                 continue
             raise InputError(path, f"row {row.line}", problem, "Keep one of the two, or name the document of each")

@@ -264,8 +264,7 @@ def inverse_right_jacobian(v: Reals) -> Reals:
     safe = np.where(angle < SMALL_TURN, 1.0, angle)
     factor = np.where(angle < SMALL_TURN, 1 / 12, 1 / safe**2 - 1 / (2 * safe * np.tan(safe / 2)))
     S = skew(v)
-    J: Reals = np.eye(3) + S / 2 + factor * (S @ S)
-    return J
+    return np.eye(3) + S / 2 + factor * (S @ S)
 
 
 def frame_along(axis: Reals) -> Reals:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import overload
+from typing import Any
 
 import numpy as np
 
@@ -320,13 +320,7 @@ class LazySelfMotions(Sequence[SelfMotionCurve]):
         """The self-motions, nearest to the reference first."""
         return all_motions(self.robot, self.T, self.q_ref, self.values).motions
 
-    @overload
-    def __getitem__(self, index: int) -> SelfMotionCurve: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[SelfMotionCurve]: ...
-
-    def __getitem__(self, index: int | slice) -> SelfMotionCurve | Sequence[SelfMotionCurve]:
+    def __getitem__(self, index: Any) -> Any:
         return self.traced[index]
 
     def __len__(self) -> int:

@@ -95,8 +95,7 @@ def row_values(robot: Robot, q: Reals) -> Reals:
     """
     if robot.coupling is None:
         return q
-    u: Reals = np.ascontiguousarray(q @ robot.coupling.T)
-    return u
+    return np.ascontiguousarray(q @ robot.coupling.T)
 
 
 def moving_tip(links: Reals, sliding: Flags | None = None) -> tuple[int, Reals]:
@@ -257,25 +256,6 @@ def size_of(links: Reals) -> float:
     size : m; 1 if there is no distance
     """
     return 0.5 * float(np.linalg.norm(links[1:, :3, 3], axis=1).sum()) or 1.0
-
-
-def inverse_rigid(K: Reals) -> Reals:
-    """Inverses of rigid transforms.
-
-    Parameters
-    ----------
-    K : (..., 4, 4)
-
-    Returns
-    -------
-    inverse : (..., 4, 4)
-    """
-    out = np.zeros_like(K)
-    R = np.swapaxes(K[..., :3, :3], -1, -2)
-    out[..., :3, :3] = R
-    out[..., :3, 3] = -(R @ K[..., :3, 3:])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
 
 
 @inner_kernel

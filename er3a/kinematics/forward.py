@@ -118,8 +118,7 @@ def jacobian(robot: Robot, q: Reals) -> Reals:
     _jacobian(*_motion(robot, q), constant_links(robot), out.reshape(-1, 6, rows))
     if robot.coupling is None:
         return out
-    coupled: Reals = out @ robot.coupling
-    return coupled
+    return out @ robot.coupling
 
 
 def checked_joints(robot: Robot, q: Reals, argument: str = "q") -> Reals:

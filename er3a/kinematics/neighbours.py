@@ -12,6 +12,7 @@ from er3a.geometry.transforms import rpy_of, transform
 from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
+from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
 DIRECTIONS = 400  # axes about which the tool is turned: one for each 10 deg
@@ -167,7 +168,7 @@ def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
 
 def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
     """Position (3,) nearest to that of T with a usable solution in its orientation, on a grid refined step by step."""
-    half = np.abs(robot.a).sum() + np.abs(robot.d).sum() + np.linalg.norm(robot.last_to_tool[:3, 3])
+    half = size_of(robot) + np.linalg.norm(robot.last_to_tool[:3, 3])
     centre, count = robot.base[:3, 3], COARSE_GRID
     for _ in range(1 + REFINEMENTS):
         ticks = np.linspace(-half, half, count)

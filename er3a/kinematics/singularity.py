@@ -491,8 +491,7 @@ class NearSingular:
         -------
         near : (...) bool, False for NaN
         """
-        near: Flags = distance < self.of(kind)
-        return near
+        return distance < self.of(kind)
 
     def ratios(self, factors: DeterminantFactors) -> Reals:
         """Distances from the three singular sets in parts of their thresholds.

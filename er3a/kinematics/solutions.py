@@ -191,8 +191,7 @@ class Solutions(ByValue, Displayed):
         if not names:
             return np.full(self.branch.shape, "found_arm", dtype=object)
         padded = [*names, *["found_arm"] * max(0, int(self.branch.max(initial=0)) + 1 - len(names))]
-        named: NDArray[np.object_] = np.array(padded, dtype=object)[self.branch]
-        return named
+        return np.array(padded, dtype=object)[self.branch]
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:

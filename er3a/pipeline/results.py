@@ -38,7 +38,7 @@ from er3a.pipeline.stages.stage import Stage
 from er3a.pipeline.study import STAGES, Study
 from er3a.pipeline.tables import adapter, table_types
 
-FORMAT_VERSION = 11
+FORMAT_VERSION = 12
 """Of results as they are stored. Rises, at the latest before a release, if a field or column of an earlier release
 goes, or gets another name, unit or meaning. What is only added does not raise it: changed code computes results again.
 """
@@ -348,8 +348,7 @@ def read_status(folder: Path) -> Status:
     ResultError
         as :func:`read_stage`
     """
-    status: Status = _record(folder)["verdict"]["status"]
-    return status
+    return _record(folder)["verdict"]["status"]
 
 
 def read_foundation(folder: Path) -> Foundation:

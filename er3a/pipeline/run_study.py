@@ -19,8 +19,6 @@ from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, suppress
 from dataclasses import dataclass
-from functools import partial
-from html import escape
 from io import StringIO
 from itertools import chain
 from logging import WARNING, LogRecord
@@ -35,10 +33,8 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from er3a.errors import Er3aError, ResultError
-from er3a.files.kept_files import ROOT, half_written, write_atomically
-from er3a.pipeline import language
+from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.messages.say import sentence
 from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
@@ -257,52 +253,20 @@ def refuse_links_outside(*written: Path) -> None:
 
 
 def _report_error(reports: Path, problem: str) -> None:
-    """Have people and continuous integration find an error, not the verdicts of an earlier run, if they find any.
+    """Have continuous integration find an error, not the verdicts of an earlier run, if it finds any.
 
-    The report gets no checksum, so that the next run makes it again; it takes the error off the pages.
+    The report gets no checksum, so that the next run makes it again.
     """
     report = reports / JUNIT
-    with suppress(Er3aError, OSError):
-        mark_pages(reports, problem)
     if report.is_file():
         with suppress(Er3aError, OSError):  # what went wrong first is what a person is told
             checksum_file(report).unlink(missing_ok=True)
             write_junit_error(problem, report)
 
 
-_LAST_RUN = re.compile(rb"<!-- last run -->.*?<!-- /last run -->", re.DOTALL)
-_BODY = re.compile(rb"<html lang=\"(\w+).*?<body[^>]*>", re.DOTALL)
-
-
-def mark_pages(reports: Path, problem: str | None) -> None:
-    """Say on each page that is there how the last run ended badly; without a problem, take that off again.
-
-    Parameters
-    ----------
-    reports : folder of all pages
-    problem : what went wrong; None after a good run
-
-    Notes
-    -----
-    The pages' times and checksums stay: no page is made again for it.
-    """
-    for page in reports.rglob("*.html"):
-        before, times = page.read_bytes(), page.stat()
-        after = _LAST_RUN.sub(b"", before)
-        if problem is not None and (found := _BODY.search(after)):
-            with language.using(next((each for each in language.LANGUAGES if each == found[1].decode()), "en")):
-                text = escape(sentence("page.last_run", problem=problem)).encode()
-            notice = b'<!-- last run --><p class="decision fail" role="alert">' + text + b"</p><!-- /last run -->"
-            after = after[: found.end()] + notice + after[found.end() :]
-        if after != before:
-            write_atomically(page, partial(Path.write_bytes, data=after))
-            os.utime(page, ns=(times.st_atime_ns, times.st_mtime_ns))
-
-
 def _run(study_file: Path, results: Path, reports: Path, words: Sequence[str], asked: Namespace) -> bool:
     """Check a study and run it; whether all jobs were done."""
     study = check_study(study_file)
-    mark_pages(reports, None)
     if not checksum_file(reports / JUNIT).is_file():
         (reports / JUNIT).unlink(missing_ok=True)
     for path in (*half_written(results), *half_written(reports)):

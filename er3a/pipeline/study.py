@@ -78,13 +78,6 @@ class RobotEntry(StrictModel):
         return self
 
     @model_validator(mode="after")
-    def _check_expected_stages(self):
-        for stage in self.expect:
-            if stage not in REGISTRY:
-                raise ValueError(f"expect.{stage}: there is no such stage | Known: {', '.join(REGISTRY)}")
-        return self
-
-    @model_validator(mode="after")
     def _placements_plausible(self):
         check_placement("base", self.base)
         check_placement("tool", self.tool)

@@ -23,7 +23,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
+from typing import Any, ClassVar, Self, dataclass_transform, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,6 @@ from pydantic import TypeAdapter
 from er3a.by_value import ByValue
 from er3a.finding import plain, revived
 from er3a.numerics.si_units import filled, split_unit, unit_text
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Texts = NDArray[np.object_]
 Findings = NDArray[np.object_]
@@ -317,18 +314,6 @@ class Table(ByValue):
         if self.slides:
             object.__setattr__(taken, "slides", self.slides)
         return taken
-
-    def frame(self) -> pd.DataFrame:
-        """The table for pandas, with the names and the values of the file.
-
-        ``frame.attrs["columns"]`` has unit and meaning of each column by its name.
-        """
-        import pandas as pd  # slow to import, and pages and recordings need none
-
-        flat = list(self._flat())
-        frame = pd.DataFrame({name: values for name, values, _ in flat})
-        frame.attrs["columns"] = {name: self._described(name, spec) for name, _, spec in flat}
-        return frame
 
     def _described(self, name: str, spec: Column) -> dict[str, str]:
         """Unit and meaning of a column of the file."""

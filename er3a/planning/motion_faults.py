@@ -17,7 +17,7 @@ from typing import Generic, Literal, TypeVar
 
 import numpy as np
 
-from er3a.finding import AnyFinding, Finding, fact, turned_or_moved
+from er3a.finding import Finding, fact, turned_or_moved
 from er3a.kinematics import singularity
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
@@ -116,7 +116,7 @@ def rate_ratio(cause: RateCause) -> float:
 
 
 OVER = 1e-6  # relative, by which rounding may exceed a limit of rates
-CauseT = TypeVar("CauseT", bound=AnyFinding)
+CauseT = TypeVar("CauseT", bound=Finding)
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, cast
 
 import numpy as np
-import scipy
 
-from er3a.geometry.transforms import skew_part
+from er3a.geometry.transforms import log_rotation
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 
@@ -36,7 +35,6 @@ Extremity = Literal["greatest", "least"]
 ZERO_POSE: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 MM = 1000.0
 SIX = 6  # rows of an arm with a wrist centre
-NEARLY_OPPOSITE = 1e-5  # twice the sine: 5e-6 rad from half a turn, the skew part has ten digits left
 SECTION_AXES: tuple[SectionAxis, ...] = ("x", "z")
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z")
 FRAME_OF_POINT: Mapping[Point, int] = {"wrist_centre": 4, "flange": -1}
@@ -753,21 +751,8 @@ def rotation_vectors_deg(R: Reals) -> Reals:
     Returns
     -------
     vectors : (..., 3), deg, at most 180 long
-
-    Notes
-    -----
-    The axis is the skew part of R, whose length is twice the sine. Near half a turn that vanishes, and SciPy takes
-    over.
     """
-    skew = skew_part(R)
-    cosine = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2] - 1.0  # this and the sine twice
-    sine = np.sqrt(_dot(skew, skew))
-    per_sine = np.arctan2(sine, cosine) / np.where(sine > 0, sine, 1.0)
-    vectors: Reals = np.degrees(np.where(sine > 0, per_sine, 0.5)[..., None] * skew)
-    opposite = (cosine < 0) & (sine < NEARLY_OPPOSITE)  # the skew part has few digits left there
-    if opposite.any():
-        vectors[opposite] = scipy.spatial.transform.Rotation.from_matrix(R[opposite]).as_rotvec(degrees=True)
-    return vectors
+    return np.degrees(log_rotation(R))
 
 
 class TurnedApart:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
 from typing import Any, ClassVar, TypeVar
 
@@ -20,7 +21,7 @@ import numpy as np
 from er3a.by_value import Displayed, ReadOnly, Sheet
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import NotOfArm, Pose, Quantity, Unit
-from er3a.references.subjects import ReferenceSubject
+from er3a.references.subjects import Subject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Grade
 
 NO_DOCUMENT = "none"
@@ -138,24 +139,10 @@ class Documents:
         -------
         names : of one circle; empty if there is none
         """
-        for name in self.by_name:
-            path = self._way_back(name)
-            if path:
-                return path
-        return ()
-
-    def _way_back(self, start: str) -> tuple[str, ...]:
-        """Documents from one back to itself, each made from the next; empty if there is no such way."""
-        ways: list[tuple[str, ...]] = [(start,)]
-        seen: set[str] = set()
-        while ways:
-            way = ways.pop()
-            for parent in self.by_name[way[-1]].derived_from if way[-1] in self.by_name else ():
-                if parent == start:
-                    return way
-                if parent not in seen:
-                    seen.add(parent)
-                    ways.append((*way, parent))
+        try:
+            TopologicalSorter({each.name: each.derived_from for each in self}).prepare()
+        except CycleError as error:
+            return tuple(error.args[1][:0:-1])
         return ()
 
 
@@ -179,7 +166,7 @@ class Reference:
         :func:`er3a.references.predict.with_rounding` has added what they leave open to the uncertainty
     """
 
-    subject: ReferenceSubject
+    subject: Subject
     group: str
     quantity: Quantity
     expected: float | None
@@ -206,7 +193,7 @@ class Reference:
         return self.grade in AUTHORITATIVE_GRADES
 
 
-Scalar = tuple[ReferenceSubject, str, Quantity, float | None, float]
+Scalar = tuple[Subject, str, Quantity, float | None, float]
 """Subject, group, quantity, expected value and uncertainty of a reference."""
 
 
@@ -217,12 +204,11 @@ class Row(ABC):
     ``gaussian``: its uncertainties are standard deviations, and not half-widths. ``rounding``: half of the last digit
     of each joint value, deg or mm; empty if these are exact.
 
-    A kind of reference is a row class: ``kind`` is the name of its tables, ``groups`` those of its references, and
-    ``scalars`` splits a row into them. :data:`er3a.references.rows.KINDS` lists all kinds.
+    A kind of reference is a row class: ``kind`` is the name of its tables, and ``scalars`` splits
+    a row into references. :data:`er3a.references.rows.KINDS` lists all kinds.
     """
 
     kind: ClassVar[str]
-    groups: ClassVar[tuple[str, ...]]
     line: int
     source: str
     grade: Grade

@@ -7,11 +7,12 @@ words in :mod:`er3a.pipeline.messages.references`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from er3a.references import quantities, subjects
+from er3a.finding import fact
+from er3a.references import quantities
 from er3a.references.reference import Documents, Reference, ReferenceSet, Row, Scalar
 from er3a.references.seen import Seen, SeenMotion, TableEntry
 
@@ -34,7 +35,6 @@ class AxisRow(Row):
     """
 
     kind: ClassVar[str] = "axes"
-    groups: ClassVar[tuple[str, ...]] = ("axes",)
     joint: int
     direction: quantities.Vector
     point_mm: quantities.Vector | None
@@ -50,11 +50,17 @@ class AxisRow(Row):
         scalar : 0 deg from the direction, then mm
         """
         angle = quantities.AxisAngle(self.joint, self.direction, self.signed)
-        yield subjects.AxisDirection(self.joint, self.signed), "axes", angle, 0.0, self.uncertainty_deg
+        yield fact("axis_direction", joint=self.joint, signed=self.signed), "axes", angle, 0.0, self.uncertainty_deg
         for coordinate, along, expected in zip(quantities.COORDINATES, self.direction, self.point_mm or ()):
             if self.point_mm and abs(along) < ALONG:
                 quantity = quantities.AxisCoordinate(self.joint, coordinate, self.point_mm)
-                yield subjects.AxisPosition(self.joint, coordinate), "axes", quantity, expected, self.uncertainty_mm
+                yield (
+                    fact("axis_position", joint=self.joint, coordinate=coordinate),
+                    "axes",
+                    quantity,
+                    expected,
+                    self.uncertainty_mm,
+                )
 
 
 @dataclass(frozen=True)
@@ -63,7 +69,6 @@ class PositionRow(Row):
     matrix), that aren't given. Without any, the row says only that the pose lies within the limits."""
 
     kind: ClassVar[str] = "positions"
-    groups: ClassVar[tuple[str, ...]] = ("zero_pose", "key_poses")
     name: str
     point: quantities.Point
     pose: quantities.Pose
@@ -86,13 +91,19 @@ class PositionRow(Row):
         """
         for coordinate, expected in zip(quantities.COORDINATES, self.xyz_mm):
             if expected is not None:
-                subject = subjects.PointAtPose(self.name, self.point, coordinate)
+                subject = fact("point_at_pose", pose=self.name, point=self.point, coordinate=coordinate)
                 quantity = quantities.PointCoordinate(self.pose, self.point, coordinate)
                 yield subject, self.group, quantity, expected, self.uncertainty_mm
         if self.orientation is not None:
             for coordinate in quantities.COORDINATES:
                 turn = quantities.FlangeTurn(self.pose, self.orientation, coordinate)
-                yield subjects.OrientationAtPose(self.name, coordinate), self.group, turn, 0.0, self.uncertainty_deg
+                yield (
+                    fact("orientation_at_pose", pose=self.name, coordinate=coordinate),
+                    self.group,
+                    turn,
+                    0.0,
+                    self.uncertainty_deg,
+                )
         if self.xyz_mm == (None, None, None) and self.orientation is None:
             yield self.within_limits()
 
@@ -103,7 +114,7 @@ class PositionRow(Row):
         -------
         scalar : an excess of 0 deg, with a slack of ``POSE_SLACK_DEG``
         """
-        return subjects.PoseExcess(self.name), self.group, quantities.LimitExcess(self.pose), 0.0, POSE_SLACK_DEG
+        return fact("pose_excess", pose=self.name), self.group, quantities.LimitExcess(self.pose), 0.0, POSE_SLACK_DEG
 
 
 @dataclass(frozen=True)
@@ -111,7 +122,6 @@ class DirectionRow(Row):
     """Angle of an arm segment from the vertical in the zero pose: 0 upright, 90 level."""
 
     kind: ClassVar[str] = "directions"
-    groups: ClassVar[tuple[str, ...]] = ("zero_pose",)
     segment: quantities.Segment
     angle_from_vertical_deg: float
     uncertainty_deg: float
@@ -124,11 +134,11 @@ class DirectionRow(Row):
         scalar : deg
         """
         quantity = quantities.SegmentAngle(self.segment)
-        subject = subjects.SegmentInclination(self.segment)
+        subject = fact("segment_inclination", segment=self.segment)
         yield subject, "zero_pose", quantity, self.angle_from_vertical_deg, self.uncertainty_deg
 
 
-ENVELOPE_CORNERS: Mapping[str, subjects.CornerLabel] = {"x": "x", "abs_x": "abs_x", "z": "z"}
+ENVELOPE_CORNERS = ("x", "abs_x", "z")
 ENVELOPE_EXTENTS: Mapping[str, tuple[quantities.Extremity, quantities.SectionAxis]] = {
     "greatest_x": ("greatest", "x"),
     "least_x": ("least", "x"),
@@ -145,7 +155,6 @@ class EnvelopeRow(Row):
     """
 
     kind: ClassVar[str] = "envelope"
-    groups: ClassVar[tuple[str, ...]] = ("envelope",)
     quantity: str
     corner_deg: tuple[float, float] | None
     value_mm: float
@@ -161,14 +170,26 @@ class EnvelopeRow(Row):
         if self.corner_deg is None:
             extreme, axis = ENVELOPE_EXTENTS[self.quantity]
             extent = quantities.SectionExtent("wrist_centre", extreme, axis)
-            yield subjects.DrawingExtent(extreme, axis), "envelope", extent, self.value_mm, self.uncertainty_mm
+            yield (
+                fact("drawing_extent", extreme=extreme, axis=axis),
+                "envelope",
+                extent,
+                self.value_mm,
+                self.uncertainty_mm,
+            )
             return
         q2, q3 = self.corner_deg
-        label = ENVELOPE_CORNERS[self.quantity]
+        label = self.quantity
         corner = quantities.SectionCoordinate(
             (0.0, q2, q3, 0.0, 0.0, 0.0), "z" if label == "z" else "x", label == "abs_x"
         )
-        yield subjects.DrawingCorner(q2, q3, label), "envelope", corner, self.value_mm, self.uncertainty_mm
+        yield (
+            fact("drawing_corner", q2_deg=q2, q3_deg=q3, coordinate=label),
+            "envelope",
+            corner,
+            self.value_mm,
+            self.uncertainty_mm,
+        )
 
 
 @dataclass(frozen=True)
@@ -176,7 +197,6 @@ class ReachRow(Row):
     """Largest or smallest distance of a point from axis 1 or 2, over all joint angles within the limits."""
 
     kind: ClassVar[str] = "reach"
-    groups: ClassVar[tuple[str, ...]] = ("reach",)
     point: quantities.Point
     from_axis: int
     extreme: quantities.Extremity
@@ -190,7 +210,7 @@ class ReachRow(Row):
         ------
         scalar : mm
         """
-        subject = subjects.Reach(self.extreme, self.point, self.from_axis)
+        subject = fact("reach", extreme=self.extreme, point=self.point, axis=self.from_axis)
         quantity = quantities.AxisDistance(self.point, self.extreme, self.from_axis)
         yield subject, "reach", quantity, self.value_mm, self.uncertainty_mm
 
@@ -200,7 +220,6 @@ class LimitRow(Row):
     """A joint's limits, deg, or mm of one that ``slides``; None where the source gives none."""
 
     kind: ClassVar[str] = "limits"
-    groups: ClassVar[tuple[str, ...]] = ("limits",)
     joint: int
     lower: float | None
     upper: float | None
@@ -217,7 +236,7 @@ class LimitRow(Row):
         sides: tuple[tuple[quantities.Side, float | None], ...] = (("lower", self.lower), ("upper", self.upper))
         for side, expected in sides:
             quantity = quantities.Limit(self.joint, side, slides=self.slides)
-            yield subjects.JointLimit(self.joint, side), "limits", quantity, expected, self.uncertainty
+            yield fact("joint_limit", joint=self.joint, side=side), "limits", quantity, expected, self.uncertainty
 
 
 @dataclass(frozen=True)
@@ -225,7 +244,6 @@ class SpeedRow(Row):
     """A joint's maximum speed, deg/s, or mm/s of one that ``slides``; None where the source gives none."""
 
     kind: ClassVar[str] = "speeds"
-    groups: ClassVar[tuple[str, ...]] = ("speeds",)
     joint: int
     speed: float | None
     uncertainty: float
@@ -239,7 +257,7 @@ class SpeedRow(Row):
         scalar : deg/s, or mm/s of a joint that slides; without value where the source gives none
         """
         quantity = quantities.Speed(self.joint, slides=self.slides)
-        yield subjects.JointSpeed(self.joint), "speeds", quantity, self.speed, self.uncertainty
+        yield fact("joint_speed", joint=self.joint), "speeds", quantity, self.speed, self.uncertainty
 
 
 @dataclass(frozen=True)
@@ -247,7 +265,6 @@ class ObservationRow(Row):
     """Where to a point moves, or how the tool tilts or turns, while one joint is jogged in + from a pose."""
 
     kind: ClassVar[str] = "observations"
-    groups: ClassVar[tuple[str, ...]] = ("key_poses",)
     pose: quantities.Pose
     joint: int
     point: quantities.Point
@@ -263,7 +280,7 @@ class ObservationRow(Row):
         """
         quantity = SeenMotion(self.pose, self.joint, self.point, self.seen)
         yield (
-            subjects.MotionOfJoint(self.joint, self.point, self.seen),
+            fact("motion_of_joint", joint=self.joint, point=self.point, seen=self.seen),
             "key_poses",
             quantity,
             0.0,
@@ -276,7 +293,6 @@ class LengthRow(Row):
     """A length of the table, measured on the arm: a between two axes, or d along an axis."""
 
     kind: ClassVar[str] = "lengths"
-    groups: ClassVar[tuple[str, ...]] = ("axes",)
     joint: int
     length: Literal["a", "d"]
     value_mm: float
@@ -290,7 +306,13 @@ class LengthRow(Row):
         scalar : mm
         """
         quantity = TableEntry(self.length, self.joint)
-        yield subjects.EntryOfTable(self.length, self.joint), "axes", quantity, self.value_mm, self.uncertainty_mm
+        yield (
+            fact("entry_of_table", column=self.length, joint=self.joint),
+            "axes",
+            quantity,
+            self.value_mm,
+            self.uncertainty_mm,
+        )
 
 
 @dataclass(frozen=True)
@@ -298,7 +320,6 @@ class AngleRow(Row):
     """An angle of the table, measured on the arm: alpha between two axes, or the offset at the zero mark."""
 
     kind: ClassVar[str] = "angles"
-    groups: ClassVar[tuple[str, ...]] = ("axes",)
     joint: int
     angle: Literal["alpha", "offset"]
     value_deg: float
@@ -312,7 +333,13 @@ class AngleRow(Row):
         scalar : deg
         """
         quantity = TableEntry(self.angle, self.joint)
-        yield subjects.EntryOfTable(self.angle, self.joint), "axes", quantity, self.value_deg, self.uncertainty_deg
+        yield (
+            fact("entry_of_table", column=self.angle, joint=self.joint),
+            "axes",
+            quantity,
+            self.value_deg,
+            self.uncertainty_deg,
+        )
 
 
 KINDS: dict[str, type[Row]] = {
@@ -330,23 +357,6 @@ KINDS: dict[str, type[Row]] = {
         AngleRow,
     )
 }
-
-
-def check_complete(what: str, wanted: Iterable[str], present: Iterable[str]) -> None:
-    """Reject a registry that lacks a name, or has one that is registered nowhere else.
-
-    Parameters
-    ----------
-    what : the registry, for the message
-    wanted, present : names that must be the same
-
-    Raises
-    ------
-    LookupError
-        naming those that are in one of them only
-    """
-    if differing := set(wanted) ^ set(present):
-        raise LookupError(f"{what}: {', '.join(sorted(differing))} listed in one place and missing in the other")
 
 
 def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Documents | None = None) -> ReferenceSet:
@@ -371,6 +381,3 @@ def reference_set(name: str, rows: Mapping[str, tuple[Row, ...]], documents: Doc
             if key not in said:
                 reached.setdefault(key, row.reference(row.within_limits()))
     return ReferenceSet(name, (*stated, *reached.values()), rows, documents or Documents())
-
-
-check_complete("groups of references", GROUPS, {group for row in KINDS.values() for group in row.groups})

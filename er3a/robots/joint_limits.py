@@ -348,8 +348,7 @@ def shown(robot: Robot, q: Reals) -> Reals:
     -------
     values : (..., n), deg, or mm of prismatic joints
     """
-    values: Reals = np.where(robot.slides, 1000.0 * q, np.degrees(q)) if robot.sliding.any() else np.degrees(q)
-    return values
+    return np.where(robot.slides, 1000.0 * q, np.degrees(q)) if robot.sliding.any() else np.degrees(q)
 
 
 def joint_shown(robot: Robot, joint: int, value: float) -> tuple[float, bool]:

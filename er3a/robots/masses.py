@@ -288,5 +288,4 @@ def about(offset: Reals) -> Reals:
     -------
     inertia : (3, 3), m^2 (kg m^2 per kg)
     """
-    shift: Reals = offset @ offset * np.eye(3) - np.outer(offset, offset)
-    return shift
+    return offset @ offset * np.eye(3) - np.outer(offset, offset)

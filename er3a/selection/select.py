@@ -15,7 +15,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from numbers import Real
 from typing import Literal, get_args
@@ -422,7 +422,6 @@ def select_sequence(
     q_ref: Reals,
     rule: MoveRule = "nearest",
     scene: Scene | None = None,
-    acceleration: Reals | None = None,
 ) -> SequenceChoice:
     """Choose one solution of each pose that minimises the total cost of the moves [1]_.
 
@@ -432,7 +431,6 @@ def select_sequence(
     q_ref : (n,), rad or m, joint values at the start
     rule : the cost of a move: "nearest" (largest joint move), "weighted" or "time"
     scene : obstacles; None for the arm and its own shapes only
-    acceleration : (n,), rad/s^2; then "time" moves run from rest to rest, otherwise at full speed throughout
 
     Returns
     -------
@@ -450,34 +448,11 @@ def select_sequence(
     usable = [_usable(robot, solutions, scene, number) for number, solutions in enumerate(poses)]
     q_ref = checked_reference(robot, q_ref)
     sets = [solutions.q[rows] for solutions, rows in zip(poses, usable)]
-    found = best_of_sets(robot, sets, q_ref, rule, acceleration)
-    return replace(
-        found,
-        rows=np.array([rows[k] for rows, k in zip(usable, found.rows)]),
-        greedy_rows=np.array([rows[k] for rows, k in zip(usable, found.greedy_rows)]),
-    )
-
-
-def best_of_sets(
-    robot: Robot, sets: Sequence[Reals], q_ref: Reals, rule: MoveRule, acceleration: Reals | None = None
-) -> SequenceChoice:
-    """As :func:`select_sequence`, of sets of joint values of which all may be taken.
-
-    Parameters
-    ----------
-    sets : for each pose (k, n), rad or m, k of at least 1
-    q_ref : (n,), rad or m, joint values at the start
-    rule, acceleration : as for :func:`select_sequence`
-
-    Returns
-    -------
-    choice : its rows are indices within the sets
-    """
-    total = _move_costs(robot, q_ref[None], sets[0], rule, acceleration)[0]
+    total = _move_costs(robot, q_ref[None], sets[0], rule)[0]
     # Bellman's recursion forwards: ``total`` is the least cost to reach each member of the current set.
     came_from = []
     for before, after in pairwise(sets):
-        through = total[:, None] + _move_costs(robot, before, after, rule, acceleration)
+        through = total[:, None] + _move_costs(robot, before, after, rule)
         came_from.append(through.argmin(axis=0))
         total = through.min(axis=0)
     best = [int(total.argmin())]
@@ -486,42 +461,18 @@ def best_of_sets(
     best.reverse()
     greedy, greedy_cost, at = [], 0.0, q_ref
     for q in sets:
-        costs = _move_costs(robot, at[None], q, rule, acceleration)[0]
+        costs = _move_costs(robot, at[None], q, rule)[0]
         greedy.append(int(costs.argmin()))
         greedy_cost += float(costs.min())
         at = q[greedy[-1]]
     return SequenceChoice(
         robot=robot,
-        rows=np.array(best),
+        rows=np.array([rows[k] for rows, k in zip(usable, best)]),
         q=np.array([q[k] for q, k in zip(sets, best)]),
         cost=float(total.min()),
-        greedy_rows=np.array(greedy),
+        greedy_rows=np.array([rows[k] for rows, k in zip(usable, greedy)]),
         greedy_cost=greedy_cost,
     )
-
-
-def rest_to_rest(angle: Reals, speed: Reals, acceleration: Reals) -> Reals:
-    """Smallest time of joint moves from rest to rest, with a triangle or trapezoid of speed.
-
-    Parameters
-    ----------
-    angle : (..., n), rad or m, at least 0
-    speed : (n,), rad/s or m/s, above 0
-    acceleration : (n,), rad/s^2 or m/s^2, above 0
-
-    Returns
-    -------
-    time : (..., n), s
-
-    Notes
-    -----
-    A move shorter than ``speed^2 / acceleration`` never reaches full speed: ``2 sqrt(angle / acceleration)``. Any other
-    takes ``angle / speed + speed / acceleration``. See B. Siciliano et al., *Robotics: Modelling, Planning and
-    Control*, section 4.2.1.
-    """
-    short = angle < speed**2 / acceleration
-    time: Reals = np.where(short, 2 * np.sqrt(angle / acceleration), angle / speed + speed / acceleration)
-    return time
 
 
 def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int) -> Integers:
@@ -534,10 +485,6 @@ def _usable(robot: Robot, solutions: Solutions, scene: Scene | None, number: int
     return rows
 
 
-def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule, acceleration: Reals | None) -> Reals:
-    """Cost (n, m) of each move from joint values (n, joints) to (m, joints)."""
-    if rule == "time" and acceleration is not None:
-        times = rest_to_rest(np.abs(after[None] - before[:, None]), robot.speed, acceleration)
-        slowest: Reals = times.max(axis=-1, initial=0.0)
-        return slowest
+def _move_costs(robot: Robot, before: Reals, after: Reals, rule: MoveRule) -> Reals:
+    """Cost (n, m) of each move from joint values (n, joints) to (m, joints); by time at full speed throughout."""
     return RULES[rule].measure(robot, after[None], before[:, None], None)

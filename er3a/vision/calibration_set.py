@@ -34,7 +34,6 @@ class CalibrationSet(ByValue, Displayed):
         if it is unknown: then it is estimated
     shared : (N, 6, k), m and rad in the camera's axes: the change of T_camera_board by one standard deviation of each
         of k independent errors that all samples share (intrinsics estimated from their images); None if there are none
-    flange_covariance : (6, 6) of T_base_flange, in the base's axes
     q : (N, n), rad, joint angles, if they were recorded
     of_joints : whether ``flange`` was computed from joint values by the robot's table, also where these are not kept
     touched : (M, 2, 3), m: points in the frame of a fixed camera, or on a fixed board, and the same points in the
@@ -52,7 +51,6 @@ class CalibrationSet(ByValue, Displayed):
     target: Reals
     names: tuple[str, ...] = ()
     camera_covariance: Reals | None = None
-    flange_covariance: Reals | None = None
     q: Reals | None = None
     touched: Reals | None = None
     touch_deviation: float = 0.0
@@ -94,7 +92,7 @@ class CalibrationSet(ByValue, Displayed):
         numbers: Integers = scipy.sparse.csgraph.connected_components(near, directed=False)[1]
         return numbers
 
-    @property
+    @cached_property
     def hand(self) -> Reals:
         """F (N, 4, 4) of F X B = Y: T_base_flange for a camera on the flange, T_flange_base for a fixed one."""
         return self.flange if self.setup == "eye_in_hand" else inverted(self.flange)

@@ -1,16 +1,14 @@
-"""Hand-eye calibration in closed form: starts for the refinement.
+"""Hand-eye calibration in closed form: the start of the refinement.
 
-All take ``F`` and ``B`` (..., N, 4, 4) with F_i X B_i = Y, and return X and Y. With the camera on the flange F is
+It takes ``F`` and ``B`` (..., N, 4, 4) with F_i X B_i = Y, and returns X and Y. With the camera on the flange F is
 T_base_flange, X is T_flange_camera and Y T_base_board; with a fixed camera F is T_flange_base, X is T_base_camera and
 Y T_flange_board. B is T_camera_board. The rotation follows from motions between all pairs of samples,
-F_j^-1 F_i X = X B_j B_i^-1, after Park [1]_, or from the samples themselves, after Shah [2]_.
+F_j^-1 F_i X = X B_j B_i^-1, after Park [1]_.
 
 References
 ----------
 .. [1] F. C. Park, B. J. Martin, "Robot sensor calibration: solving AX=XB on the Euclidean group", IEEE T-RA
    10(5), 1994.
-.. [2] M. Shah, "Solving the robot-world/hand-eye calibration problem using the Kronecker product", J. Mechanisms and
-   Robotics 5(3), 2013.
 """
 
 from __future__ import annotations
@@ -78,34 +76,3 @@ def park(F: Reals, B: Reals) -> Unknowns:
     t = np.linalg.solve(normal, np.einsum("...pki,...pk->...i", left, right)[..., None])[..., 0]
     X = posed(R, t)
     return X, mean_pose(F @ X @ B)
-
-
-def shah(F: Reals, B: Reals) -> Unknowns:
-    """Hand-eye and board pose after Shah [2]_, who takes the samples as B Y^-1 = X^-1 F^-1.
-
-    Parameters
-    ----------
-    F, B : (N, 4, 4), m, see the module's text
-
-    Returns
-    -------
-    X, Y : (4, 4), m
-
-    Raises
-    ------
-    LinAlgError
-        where the samples determine no rotation
-    """
-    G = inverted(F)
-    U, S, Vt = np.linalg.svd(np.einsum("nij,nkl->ikjl", G[:, :3, :3], B[:, :3, :3]).reshape(9, 9))
-    if S[0] - S[1] < 1e-9 * S[0]:
-        raise np.linalg.LinAlgError("the rotations determine no rotation")
-    R_W, R_Z = (_signed(M.reshape(3, 3).T) for M in (Vt[0], U[:, 0]))
-    left = np.concatenate([-B[:, :3, :3], np.broadcast_to(np.eye(3), G[:, :3, :3].shape)], axis=2).reshape(-1, 6)
-    t = np.linalg.lstsq(left, (B[:, :3, 3] - G[:, :3, 3] @ R_Z.T).ravel())[0]
-    return inverted(posed(R_Z, t[3:])), inverted(posed(R_W, t[:3]))
-
-
-def _signed(M: Reals) -> Reals:
-    """The rotation nearest to a matrix that is known up to its sign."""
-    return nearest_rotations(M * np.sign(np.linalg.det(M)))

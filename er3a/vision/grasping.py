@@ -31,7 +31,7 @@ from er3a.planning.way_around import PlanningTask
 from er3a.robots.joint_limits import limit_margin
 from er3a.robots.robot import Robot
 from er3a.vision.grasp_motion import GraspLeg, Part, min_clearance, tool_leg, transfer
-from er3a.vision.point_error import draws
+from er3a.vision.point_error import SeenPoseError, draws
 
 ANY_TURN = 12  # turns tried of an object that looks alike from all sides
 WAYPOINTS = 13
@@ -128,13 +128,17 @@ class ChosenGrasp:
 
 @dataclass(frozen=True, eq=False)
 class GraspPlan:
-    """What becomes of an object: a grasp, or why none; counts of poses, solutions, and those followed."""
+    """What becomes of an object: a grasp, or why none; counts of poses, solutions, and those followed.
+
+    ``error``: of the object's pose, as the chosen grasp meets it.
+    """
 
     chosen: ChosenGrasp | None
     refusal: Finding | None
     poses: int
     solutions: int
     followed: int
+    error: SeenPoseError | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,14 +172,14 @@ def plan_grasp(
     task: GraspTask,
     target: DetectedObject,
     T_base_object: Reals,
-    covariance_at: Callable[[Reals], Reals],
+    error_at: Callable[[Reals], SeenPoseError],
 ) -> GraspPlan:
     """Choose a grasp of one object, by the largest of the smallest margins (see the module's text).
 
     Parameters
     ----------
     T_base_object : (4, 4), m
-    covariance_at : from joint angles (n,) of a grasp to the covariance (6, 6) of the object's pose as the tool meets it
+    error_at : from joint angles (n,) of a grasp to the error of the object's pose as the tool meets it
 
     Returns
     -------
@@ -193,10 +197,11 @@ def plan_grasp(
     good = [plan for plan in plans if isinstance(plan, ChosenGrasp)]
     counts, likeliest = (len(poses), len(candidates), len(followed)), 0.0
     for best in sorted(good, key=lambda plan: -round(plan.margin, TIE)):
-        probability = success_probability(best, target, T_base_object, covariance_at(best.q), task.needs)
+        error = error_at(best.q)
+        probability = success_probability(best, target, T_base_object, error.whole, task.needs)
         if probability >= task.needs.probability:
             deviation = float(np.sqrt(probability * (1 - probability) / len(draws(np.eye(6)))))
-            return GraspPlan(replace(best, probability=probability, deviation=deviation), None, *counts)
+            return GraspPlan(replace(best, probability=probability, deviation=deviation), None, *counts, error)
         likeliest = max(likeliest, probability)
     if good:
         return GraspPlan(None, fact("grasp_unlikely", probability=likeliest, needed=task.needs.probability), *counts)

@@ -41,12 +41,9 @@ from er3a.geometry.transforms import (
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.robot import Robot
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.classic_methods import mean_pose, park, shah
+from er3a.vision.classic_methods import mean_pose, park
 from er3a.vision.likelihood import (
-    GROUPS,
-    START_DEVIATIONS,
     UNKNOWNS,
-    PoseObservations,
     Refined,
     half_width,
     refine,
@@ -146,8 +143,6 @@ def _tolerance(samples: CalibrationSet, mismatch: Reals) -> float:
     deviation = min(float(np.median(mismatch)) / 0.674, MAX_DEVIATION)
     if samples.camera_covariance is not None:
         stated = np.linalg.eigvalsh(samples.camera_covariance[:, 3:, 3:])[:, -1].mean()
-        if samples.flange_covariance is not None:
-            stated += np.linalg.eigvalsh(samples.flange_covariance[3:, 3:])[-1]
         # A sample can be bad in so many pairs that the median is, too; what is stated then holds it down.
         deviation = min(deviation, 3 * float(np.sqrt(2 * stated)))
         deviation = max(deviation, float(np.sqrt(2 * stated)))
@@ -387,7 +382,6 @@ class HandEye(ByValue, Displayed):
     residual : (N, 6), m and rad, by the camera's axes, of all samples
     scatter : root mean square of the whitened residuals; 1 is as stated, and where nothing is stated
     deviations : (2,), m and rad, of T_camera_board's position and rotation by axis, stated or estimated
-    without_suspects : (2,), m and rad: how far X moves if the samples taken out are left in; None if there are none
     """
 
     samples: CalibrationSet
@@ -403,7 +397,6 @@ class HandEye(ByValue, Displayed):
     axes_apart: float
     suspects: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
-    without_suspects: Reals | None
     touch: TouchCheck | None
     mismatch: Reals
 
@@ -454,14 +447,14 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
     once = ~_copies(samples)
     used = angles.used & once
     suspects: list[Finding] = list(angles.found)
-    greatest, apart = _check_determined(samples.take(used))
-    refined = _fitted(samples.take(used))
-    while used.sum() > FEW_SAMPLES and (worst := worst_sample(samples.take(used), refined)):
+    while True:
+        kept = samples.take(used)
+        greatest, apart = _check_determined(kept)
+        refined = _fitted(kept)
+        if len(kept) <= FEW_SAMPLES or (worst := worst_sample(kept, refined)) is None:
+            break
         used[np.flatnonzero(used)[worst[0]]] = False
         suspects.append(worst[1])
-        greatest, apart = _check_determined(samples.take(used))
-        refined = _fitted(samples.take(used))
-    kept = samples.take(used)
     warnings: list[Finding] = [angles.warning] if angles.warning else []
     distances = wrong_distances(kept, refined)
     warnings += _warnings(kept, refined, greatest, apart, distances)
@@ -482,13 +475,12 @@ def calibrate_hand_eye(samples: CalibrationSet) -> HandEye:
         covariance=covariance * np.outer(wider, wider),
         half_width=half * wider,
         residual=residuals(samples.hand, samples.target, refined.X, refined.Y)[0],
-        scatter=float(refined.scatter),
+        scatter=refined.scatter,
         deviations=refined.deviations,
         greatest_turn=greatest,
         axes_apart=apart,
         suspects=tuple(suspects),
         warnings=tuple(warnings),
-        without_suspects=None if used.all() else _shift_with_all(samples, refined),
         touch=None,
         mismatch=angles.mismatch,
     )
@@ -507,7 +499,7 @@ def zeros_tried(found: HandEye, robot: Robot) -> tuple[HandEye, tuple[str, ...],
     found, unseen, smallest : see :class:`er3a.vision.typical_causes.ZerosTried`
     """
     used = found.samples.take(found.used)
-    tried = wrong_zero(found.samples, used, refine(PoseObservations.of(used), found.X, found.Y), robot)
+    tried = wrong_zero(found.samples, used, refine(used, found.X, found.Y), robot)
     explained = {each.code for each in grave_warnings(found.warnings)} <= EXPLAINED_BY_A_ZERO
     if tried.zero and tried.mended and explained:
         with suppress(HandEyeError):
@@ -522,40 +514,19 @@ EXPLAINED_BY_A_ZERO = {
 }
 
 
-def _best_closed_form(F: Reals, B: Reals) -> tuple[Reals, Reals]:
-    """The closed-form answer with the smallest residuals, of Park's and Shah's: X and Y (4, 4), m, from F and B
-    (N, 4, 4), m, see :mod:`er3a.vision.classic_methods`."""
-    best: tuple[float, Reals, Reals] | None = None
-    for solve in (park, shah):
-        try:
-            X, Y = solve(F, B)
-        except np.linalg.LinAlgError:
-            continue
-        if np.isfinite(X).all() and np.isfinite(Y).all():
-            cost = float(((residuals(F, B, X, Y)[0] / START_DEVIATIONS[GROUPS]) ** 2).sum())
-            best = min(best or (np.inf, X, Y), (cost, X, Y), key=lambda each: each[0])
-    if best is None:
-        raise HandEyeError(fact("nothing_fits"))
-    return best[1], best[2]
-
-
 def _fitted(samples: CalibrationSet) -> Refined:
-    seen = PoseObservations.of(samples)
-    try:
-        found = refine(seen, *_best_closed_form(samples.hand, samples.target))
-    except np.linalg.LinAlgError:
-        raise HandEyeError(fact("nothing_fits")) from None
-    if not np.isfinite(found.covariance).all() or (np.diag(found.covariance) <= 0).any():
-        raise HandEyeError(fact("nothing_fits"))
-    return found
+    with suppress(np.linalg.LinAlgError):
+        found = refine(samples, *park(samples.hand, samples.target))
+        if np.isfinite(found.covariance).all() and (np.diag(found.covariance) > 0).all():
+            return found
+    raise HandEyeError(fact("nothing_fits"))
 
 
 def _shared_covariance(samples: CalibrationSet, refined: Refined) -> Reals:
     """What errors that all samples share add to the covariance of the two poses, (12, 12)."""
     if samples.shared is None:
         return np.zeros((UNKNOWNS, UNKNOWNS))
-    J = refined.W @ residuals(samples.hand, samples.target, refined.X, refined.Y)[1]
-    moves = np.linalg.solve(np.einsum("nki,nkj->ij", J, J), np.einsum("nki,nkj->ij", J, refined.W @ samples.shared))
+    moves = refined.inverse @ np.einsum("nki,nkj->ij", refined.J, refined.W @ samples.shared)
     added: Reals = moves @ moves.T
     return added
 
@@ -613,7 +584,7 @@ def _warnings(
     free = 6 * len(samples) - 12
     largest = float(np.sqrt(scipy.special.chdtri(free, EXCLUDED) / free))
     if samples.camera_covariance is not None and refined.scatter > largest:
-        found.append(fact("more_scatter", scatter=float(refined.scatter), largest=largest))
+        found.append(fact("more_scatter", scatter=refined.scatter, largest=largest))
     if read := other_conventions(samples, refined.residual):
         return [*found, *read]
     found += [each.finding for each in distances if each.sure]
@@ -624,11 +595,6 @@ def _warnings(
 
 
 _PARTS = (slice(3), slice(3, 6))
-
-
-def _shift_with_all(samples: CalibrationSet, refined: Refined) -> Reals:
-    step = step_between(refined.X, _fitted(samples).X)
-    return np.array([np.linalg.norm(step[:3]), np.linalg.norm(step[3:])])
 
 
 def _touch(found: HandEye, touched: Reals) -> TouchCheck:

@@ -1,10 +1,9 @@
 """Maximum-likelihood refinement of hand-eye and board pose, with intervals that hold whatever the samples' noise is.
 
 A sample predicts T_camera_board = X^-1 F^-1 Y. Its six residuals are the position seen less the one predicted, and the
-rotation vector from predicted to seen, both by the camera's axes. They scatter by the camera's covariance and, carried
-into the camera to first order, the flange's. Hand-eye X and board Y change by twelve numbers: positions (m) and small
-rotations (rad) about the axes of their parent frames; derivatives with respect to these are in closed form. Steps are
-those of Levenberg and Marquardt [1]_.
+rotation vector from predicted to seen, both by the camera's axes, by whose covariance they scatter. Hand-eye X and
+board Y change by twelve numbers: positions (m) and small rotations (rad) about the axes of their parent frames;
+derivatives with respect to these are in closed form. Steps are those of Levenberg and Marquardt [1]_.
 
 **Noise.** Where no covariance is stated, it is estimated. A flat board's corners give its position across the line of
 sight better than along it, and its turn about its own normal better than its tilt. Errors of position and of rotation
@@ -35,8 +34,8 @@ import numpy as np
 import scipy
 
 from er3a.geometry.transforms import frame_along, inverse_right_jacobian, log_rotation, moved, skew, transposed
-from er3a.numerics.arrays import Integers, Reals
-from er3a.vision.calibration_set import CalibrationSet, Setup
+from er3a.numerics.arrays import Reals
+from er3a.vision.calibration_set import CalibrationSet
 
 UNKNOWNS = 12  # position and rotation of both poses
 CONFIDENCE = 0.95  # of all intervals
@@ -49,7 +48,6 @@ MIN_FREE = 1e-6  # of a sample's residuals that the fit pulls to zero whatever t
 GROUPS = np.array([0, 0, 1, 2, 2, 3])  # across and along the sight, tilt, turn about the board's normal
 POOLED = np.kron(np.eye(2), np.ones((2, 2)))  # of position, and of rotation
 START_DEVIATIONS = np.array([1e-3, 1e-3, 5e-3, 5e-3])  # m, rad
-WEIGHT_ROUNDS = 3
 PRIOR_RESIDUALS = 24.0  # over samples: draw the two variances of position, and of rotation, together in small sets
 MIDDLE = 0.07  # m, standard deviation of the board's middle from its origin, before residuals tell it
 NOISE_NUMBERS = 6  # four variances and the middle
@@ -59,70 +57,35 @@ Model = Callable[[Reals, Reals, Reals], tuple[Reals, Reals]]
 
 
 @dataclass(frozen=True, eq=False)
-class PoseObservations:
-    """Samples (N, 4, 4) of a set; see :class:`er3a.vision.calibration_set.CalibrationSet`.
-
-    ``places`` (N,), numbers of the places that share their errors; None: each sample has its own.
-    """
-
-    setup: Setup
-    F: Reals
-    B: Reals
-    camera_covariance: Reals | None = None
-    flange_covariance: Reals | None = None
-    places: Integers | None = None
-
-    @property
-    def numbers(self) -> Integers:
-        """Of the place of each sample, (N,)."""
-        return np.arange(len(self.F)) if self.places is None else self.places
-
-    @classmethod
-    def of(cls, samples: CalibrationSet) -> PoseObservations:
-        """Samples of a set, with what it states of their scatter.
-
-        Parameters
-        ----------
-        samples : N of them
-
-        Returns
-        -------
-        seen : F and B (N, 4, 4), m
-        """
-        stated = samples.camera_covariance, samples.flange_covariance
-        return cls(samples.setup, samples.hand, samples.target, *stated, samples.places)
-
-
-@dataclass(frozen=True, eq=False)
 class Refined:
-    """The likeliest hand-eye and board poses, with k more unknowns if a model has some.
+    """The likeliest hand-eye and board poses of N samples, with k more unknowns if a model has some.
 
     Attributes
     ----------
     X, Y : (4, 4); values : (k,), the other unknowns
-    covariance : (12 + k, 12 + k) of X's six numbers, Y's, m and rad, and the others
-    freedom : (12 + k,), degrees of freedom of each number's interval
     W : (N, 6, 6), which give the residuals unit covariance, as stated or estimated
-    whitened : (N, 6), residuals in standard deviations
     residual : (N, 6), m and rad, by the camera's axes
-    leverage : (N, 6), how far each whitened residual is pulled to zero by its own sample, 0 to 1
-    scatter : root mean square of the whitened residuals, by degrees of freedom
-    deviations : (2,), m and rad: of the board's position and rotation, root mean square by axis
-    converged : whether the steps ended, and the deviations with them
+    whitened : (N, 6), residuals in standard deviations
+    J : (N, 6, 12 + k), derivatives of the whitened residuals
+    noise_numbers : how many numbers of the noise were estimated, too
+    converged : whether the steps ended, and the noise with them
     """
 
+    samples: CalibrationSet
     X: Reals
     Y: Reals
     values: Reals
-    covariance: Reals
-    freedom: Reals
     W: Reals
-    whitened: Reals
     residual: Reals
-    leverage: Reals
-    scatter: float
-    deviations: Reals
-    converged: bool
+    whitened: Reals
+    J: Reals
+    noise_numbers: int = 0
+    converged: bool = False
+
+    @property
+    def unknowns(self) -> tuple[Reals, Reals, Reals]:
+        """X, Y (4, 4), m, and the other unknowns (k,)."""
+        return self.X, self.Y, self.values
 
     @property
     def squares(self) -> float:
@@ -130,10 +93,56 @@ class Refined:
         return float((self.whitened**2).sum())
 
     @property
+    def scatter(self) -> float:
+        """Root mean square of the whitened residuals, by degrees of freedom."""
+        return float(np.sqrt(self.squares / (self.whitened.size - len(self.inverse))))
+
+    @property
+    def deviations(self) -> Reals:
+        """Of the board's position (m) and rotation (rad), (2,): root mean square by axis, stated or estimated."""
+        spread = np.linalg.inv(self.W)
+        S = spread @ spread.mT if self.samples.camera_covariance is None else self.samples.camera_covariance
+        found: Reals = np.sqrt(np.diagonal(S, axis1=1, axis2=2).reshape(-1, 2, 3).mean(axis=(0, 2)))
+        return found
+
+    @cached_property
+    def inverse(self) -> Reals:
+        """(12 + k, 12 + k), the inverse of J^T J, by columns of unit length so that units don't matter."""
+        size = np.linalg.norm(self.J, axis=(0, 1))
+        J = self.J / size
+        return np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
+
+    @cached_property
+    def leverage(self) -> Reals:
+        """How far each whitened residual is pulled to zero by its own sample, (N, 6), 0 to 1."""
+        found: Reals = np.einsum("nki,ij,nkj->nk", self.J, self.inverse, self.J)
+        return found
+
+    @cached_property
+    def _intervals(self) -> tuple[Reals, Reals]:
+        """Covariance and degrees of freedom, from the scatter of whole places."""
+        at = np.eye(self.samples.places.max() + 1)[self.samples.places]
+        variances, freedom = _clustered(self, at)
+        free = max(6 * at.shape[1] - len(self.inverse), 1)
+        least = MIN_DEVIATION * np.diag(self.inverse)
+        variances = np.maximum(variances, least) * free / max(free - self.noise_numbers, 1)
+        scale = np.sqrt(variances / np.diag(self.inverse))
+        return self.inverse * np.outer(scale, scale), freedom
+
+    @property
+    def covariance(self) -> Reals:
+        """(12 + k, 12 + k), of X's six numbers, Y's, m and rad, and the others."""
+        return self._intervals[0]
+
+    @property
+    def freedom(self) -> Reals:
+        """Degrees of freedom of each number's interval, (12 + k,)."""
+        return self._intervals[1]
+
+    @property
     def half_width(self) -> Reals:
         """Half the 95 % intervals (12 + k,)."""
-        half: Reals = half_width(self.covariance, self.freedom)
-        return half
+        return half_width(*self._intervals)
 
 
 def half_width(covariance: Reals, freedom: Reals) -> Reals:
@@ -184,53 +193,8 @@ def residuals(F: Reals, B: Reals, X: Reals, Y: Reals) -> tuple[Reals, Reals]:
     return np.concatenate([B[..., :3, 3] - position, turn], axis=-1), derivative
 
 
-def flange_to_camera(setup: Setup, F: Reals, X: Reals, Y: Reals) -> Reals:
-    """How errors of T_base_flange move T_camera_board, to first order.
-
-    Parameters
-    ----------
-    F : (..., N, 4, 4), m, T_base_flange, or T_flange_base for a fixed camera
-    X, Y : (..., 4, 4), m, hand-eye and board pose
-
-    Returns
-    -------
-    G : (..., N, 6, 6), from m and rad by the base's axes to m and rad by the camera's
-    """
-    Rxt, Rf = transposed(X[..., None, :3, :3]), F[..., :3, :3]
-    ty, tf = Y[..., None, :3, 3], F[..., :3, 3]
-    G = np.zeros((*F.shape[:-2], 6, 6))
-    if setup == "eye_in_hand":
-        M = Rxt @ transposed(Rf)
-        G[..., :3, :3], G[..., :3, 3:], G[..., 3:, 3:] = -M, M @ skew(ty - tf), -M
-    else:  # F is T_flange_base
-        G[..., :3, :3] = G[..., 3:, 3:] = Rxt
-        G[..., :3, 3:] = -Rxt @ skew((transposed(Rf) @ ty[..., None])[..., 0])
-    return G
-
-
-def stated_whitening(seen: PoseObservations, X: Reals, Y: Reals) -> Reals:
-    """Matrices that give residuals unit covariance, by what is stated of camera and flange.
-
-    Parameters
-    ----------
-    seen : N samples with a camera covariance
-    X, Y : (4, 4), m, poses at which the flange's errors are carried into the camera
-
-    Returns
-    -------
-    W : (N, 6, 6), inverse Cholesky factors, 1/m and 1/rad
-    """
-    assert seen.camera_covariance is not None
-    S = seen.camera_covariance
-    if seen.flange_covariance is not None:
-        G = flange_to_camera(seen.setup, seen.F, X, Y)
-        S = S + G @ seen.flange_covariance @ G.mT
-    W: Reals = np.linalg.inv(np.linalg.cholesky(S))
-    return W
-
-
 def refine(
-    seen: PoseObservations, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
+    seen: CalibrationSet, X: Reals, Y: Reals, model: Model | None = None, more: int = 0, W: Reals | None = None
 ) -> Refined:
     """The likeliest hand-eye and board pose, by Levenberg and Marquardt's steps [1]_.
 
@@ -243,86 +207,44 @@ def refine(
 
     Returns
     -------
-    refined : with covariance, and residuals in m and rad
-
-    Raises
-    ------
-    LinAlgError
-        where the samples leave some of the unknowns open
+    refined : what it gives of intervals raises LinAlgError where the samples leave some of the unknowns open
     """
-    at = model or (lambda X, Y, _: residuals(seen.F, seen.B, X, Y))
-    start = X, Y, np.zeros(more)
+    at = model or (lambda X, Y, _: residuals(seen.hand, seen.target, X, Y))
+    fitted, start = partial(_fit, seen, at), (X, Y, np.zeros(more))
     if W is not None:
-        return _refined(seen, _fit(at, W, start), 0)
+        return fitted(W, start)
     if seen.camera_covariance is not None:
-        fit = _fit(at, stated_whitening(seen, X, Y), start)
-        for _ in range(0 if seen.flange_covariance is None else WEIGHT_ROUNDS):
-            fit = _fit(at, stated_whitening(seen, fit.X, fit.Y), fit.unknowns)
-        return _refined(seen, fit, 0)
-    noise, change = _Noise(seen.B, len(set(seen.numbers.tolist()))), np.inf
-    fit = _fit(at, noise.whitening, start)
+        return fitted(np.linalg.inv(np.linalg.cholesky(seen.camera_covariance)), start)
+    noise, change = _Noise(seen.target, seen.places.max() + 1), np.inf
+    fit = fitted(noise.whitening, start)
     for _ in range(ROUNDS):
         again = noise.again(fit)
         change = float(np.abs(again.deviations / noise.deviations - 1).max())
         noise = again
-        fit = _fit(at, noise.whitening, fit.unknowns)
+        fit = fitted(noise.whitening, fit.unknowns)
         if change < SETTLED / 100:
             break
-    return _refined(seen, replace(fit, ended=fit.ended and change < SETTLED), NOISE_NUMBERS)
+    return replace(fit, converged=fit.converged and change < SETTLED, noise_numbers=NOISE_NUMBERS)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Unknowns, and at them whitened residuals (N, 6), derivatives (N, 6, p), and the inverse (p, p) of J^T J."""
-
-    X: Reals
-    Y: Reals
-    values: Reals
-    W: Reals
-    raw: Reals
-    white: Reals
-    J: Reals
-    ended: bool = False
-
-    @property
-    def unknowns(self) -> tuple[Reals, Reals, Reals]:
-        """X, Y (4, 4), m, and the other unknowns (k,)."""
-        return self.X, self.Y, self.values
-
-    @cached_property
-    def inverse(self) -> Reals:
-        """(p, p), the inverse of J^T J, by columns of unit length so that units don't matter."""
-        size = np.linalg.norm(self.J, axis=(0, 1))
-        J = self.J / size
-        found: Reals = np.linalg.inv(np.einsum("nki,nkj->ij", J, J)) / np.outer(size, size)
-        return found
-
-    @cached_property
-    def leverage(self) -> Reals:
-        """Of each whitened residual, (N, 6)."""
-        found: Reals = np.einsum("nki,ij,nkj->nk", self.J, self.inverse, self.J)
-        return found
-
-
-def _at(model: Model, W: Reals, X: Reals, Y: Reals, values: Reals) -> _Fit:
-    raw, J = model(X, Y, values)
-    return _Fit(X, Y, values, W, raw, (W @ raw[..., None])[..., 0], W @ J)
-
-
-def _fit(model: Model, W: Reals, start: tuple[Reals, Reals, Reals]) -> _Fit:
+def _fit(seen: CalibrationSet, model: Model, W: Reals, start: tuple[Reals, Reals, Reals]) -> Refined:
     """The least squares with weights W, by Levenberg and Marquardt's steps."""
-    fit, damping = _at(model, W, *start), 1e-6
+
+    def at(X: Reals, Y: Reals, values: Reals) -> Refined:
+        residual, J = model(X, Y, values)
+        return Refined(seen, X, Y, values, W, residual, (W @ residual[..., None])[..., 0], W @ J)
+
+    fit, damping = at(*start), 1e-6
     for _ in range(MAX_STEPS):
-        H, g = np.einsum("nki,nkj->ij", fit.J, fit.J), np.einsum("nki,nk->i", fit.J, fit.white)
+        H, g = np.einsum("nki,nkj->ij", fit.J, fit.J), np.einsum("nki,nk->i", fit.J, fit.whitened)
         size = np.sqrt(np.diag(H))
         step = -np.linalg.solve(H / np.outer(size, size) + damping * np.eye(len(H)), g / size) / size
-        X, Y = moved(fit.X, step[:6]), moved(fit.Y, step[6:UNKNOWNS])
-        new = _at(model, W, X, Y, fit.values + step[UNKNOWNS:])
-        before, after = (fit.white**2).sum(), (new.white**2).sum()
+        new = at(moved(fit.X, step[:6]), moved(fit.Y, step[6:UNKNOWNS]), fit.values + step[UNKNOWNS:])
+        before, after = fit.squares, new.squares
         fit = new if after <= before else fit
         damping = np.clip(damping * (0.1 if after <= before else 10), 1e-12, 1e12)
         if np.abs(step).max() < STEP_ENDS or abs(before - after) <= 1e-14 * before:
-            return replace(fit, ended=True)
+            return replace(fit, converged=True)
     return fit
 
 
@@ -350,10 +272,9 @@ class _Noise:
         """(N, 6, 6), of residuals at the board's origin."""
         to_middle = np.tile(np.eye(6), (len(self.B), 1, 1))
         to_middle[:, :3, 3:] = -skew(self.B[:, :3, :3] @ self.middle)
-        W: Reals = self.axes / self.deviations[GROUPS, None] @ to_middle
-        return W
+        return self.axes / self.deviations[GROUPS, None] @ to_middle
 
-    def again(self, fit: _Fit) -> _Noise:
+    def again(self, fit: Refined) -> _Noise:
         """The noise estimated from the residuals of a fit.
 
         Deviations are pooled where few residuals give them; the middle is where turns explain most of the position.
@@ -367,7 +288,7 @@ class _Noise:
         noise : with new deviations (m, rad) and middle (m)
         """
         by_group = np.eye(4)[GROUPS]
-        squares = (fit.white**2).sum(axis=0) @ by_group * self.deviations**2
+        squares = (fit.whitened**2).sum(axis=0) @ by_group * self.deviations**2
         free = np.maximum((1 - fit.leverage).sum(axis=0) @ by_group, MIN_FREE)
         pooled = (squares @ POOLED) / (free @ POOLED)
         prior = PRIOR_RESIDUALS * len(self.B) / self.places**2
@@ -375,38 +296,13 @@ class _Noise:
         deviations = np.maximum(np.sqrt(variances), MIN_DEVIATION)
         # The part of the position's residuals that the rotation's explain, as turns about the middle.
         weights = self.axes[:, :3, :3] / deviations[GROUPS[:3], None]
-        lever = (weights @ skew(fit.raw[:, 3:]) @ self.B[:, :3, :3])[..., :2].reshape(-1, 2)
-        shift = (weights @ fit.raw[:, :3, None]).ravel()
+        lever = (weights @ skew(fit.residual[:, 3:]) @ self.B[:, :3, :3])[..., :2].reshape(-1, 2)
+        shift = (weights @ fit.residual[:, :3, None]).ravel()
         middle = -np.linalg.solve(lever.T @ lever + np.eye(2) / MIDDLE**2, lever.T @ shift)
         return _Noise(self.B, self.places, deviations, np.append(middle, 0.0))
 
 
-def _refined(seen: PoseObservations, fit: _Fit, noise_numbers: int) -> Refined:
-    """A fit with its intervals; ``noise_numbers``: how many numbers of the noise were estimated with it."""
-    at = np.eye(seen.numbers.max() + 1)[seen.numbers]
-    variances, freedom = _clustered(fit, at)
-    free = max(6 * at.shape[1] - len(fit.inverse), 1)
-    variances = np.maximum(variances, MIN_DEVIATION * np.diag(fit.inverse)) * free / max(free - noise_numbers, 1)
-    scale = np.sqrt(variances / np.diag(fit.inverse))
-    spread = np.linalg.inv(fit.W)
-    S = spread @ spread.mT if seen.camera_covariance is None else seen.camera_covariance
-    return Refined(
-        X=fit.X,
-        Y=fit.Y,
-        values=fit.values,
-        covariance=fit.inverse * np.outer(scale, scale),
-        freedom=freedom,
-        W=fit.W,
-        whitened=fit.white,
-        residual=fit.raw,
-        leverage=fit.leverage,
-        scatter=float(np.sqrt((fit.white**2).sum() / (fit.white.size - len(fit.inverse)))),
-        deviations=np.sqrt(np.diagonal(S, axis1=1, axis2=2).reshape(-1, 2, 3).mean(axis=(0, 2))),
-        converged=fit.ended,
-    )
-
-
-def _clustered(fit: _Fit, at: Reals) -> tuple[Reals, Reals]:
+def _clustered(fit: Refined, at: Reals) -> tuple[Reals, Reals]:
     """Variances (p,) of the unknowns from the scatter of whole places, and their degrees of freedom (p,), after [3]_.
 
     With H_n = J_n (J^T J)^-1 J_n^T, an unknown's error is the sum of g_n e_n over samples, where
@@ -417,7 +313,7 @@ def _clustered(fit: _Fit, at: Reals) -> tuple[Reals, Reals]:
     left, axes = np.linalg.eigh(np.eye(6) - pulls)
     adjusted = axes / np.sqrt(np.maximum(left, MIN_FREE))[:, None] @ axes.mT
     g = np.einsum("pq,nkq,nkl->pnl", fit.inverse, fit.J, adjusted)
-    variances = ((np.einsum("pnl,nl->pn", g, fit.white) @ at) ** 2).sum(axis=1)
+    variances = ((np.einsum("pnl,nl->pn", g, fit.whitened) @ at) ** 2).sum(axis=1)
     own, pull = (g**2).sum(axis=2) @ at, np.einsum("pnl,nlq,nc->pcq", g, fit.J, at, optimize=True)
     shared = np.einsum("pnq,qr,pnr->pn", pull, fit.inverse, pull)
     both = np.einsum("pnq,pnr->pqr", pull, pull) @ fit.inverse

@@ -171,8 +171,7 @@ def _stacked(left: Reals, right: Reals, corner: Reals | None = None) -> Reals:
 
 
 def _carried(J: Reals, covariance: Reals) -> Reals:
-    out: Reals = J @ covariance @ np.swapaxes(J, -1, -2)
-    return out
+    return J @ covariance @ np.swapaxes(J, -1, -2)
 
 
 @lru_cache(maxsize=1)

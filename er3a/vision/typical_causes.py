@@ -35,7 +35,6 @@ from er3a.vision.likelihood import (
     GROUPS,
     START_DEVIATIONS,
     UNKNOWNS,
-    PoseObservations,
     Refined,
     refine,
     residuals,
@@ -107,7 +106,7 @@ class TypicalCause:
         LinAlgError
             where the samples leave some of the unknowns open
         """
-        return refine(PoseObservations.of(samples), start.X, start.Y, self.at, self.count, W)
+        return refine(samples, start.X, start.Y, self.at, self.count, W)
 
     def drop(self, refined: Refined) -> float | None:
         """By how much the numbers lower the sum of squares of a fit, to first order.
@@ -197,7 +196,7 @@ def wrong_distances(samples: CalibrationSet, refined: Refined) -> tuple[Distance
     """
     if len(samples) < LEAST_SAMPLES:
         return ()
-    plain, found = refine(PoseObservations.of(samples), refined.X, refined.Y, W=_alike(samples)), []
+    plain, found = refine(samples, refined.X, refined.Y, W=_alike(samples)), []
     free = plain.whitened.size - UNKNOWNS - 1
     for name in MATRICES:
         fit = fitted_distances(name, samples, refined)

@@ -12,7 +12,7 @@ from er3a.finding import fact, is_one
 from er3a.geometry.transforms import rot_z, translation
 from er3a.references.quantities import MM, Limit, LimitExcess, PointCoordinate
 from er3a.references.reference import Reference
-from er3a.references.subjects import JointLimit, PointAtPose, PoseExcess
+from testing.reference_subjects import joint_limit, point_at_pose, pose_excess
 
 
 def other_conventions(robot: er3a.Robot, seed: int) -> er3a.Robot:
@@ -60,7 +60,7 @@ def test_poses_that_are_shown_outside_of_limits_are_a_matter_of_limits():
     upper = right.upper.copy()
     upper[2] -= 1.0
     shown = (LimitExcess(tuple(np.degrees(right.upper).round(3).tolist())), 0.0, 0.001, "manual", "official", "manual")
-    pose = Reference(PoseExcess("p"), "key_poses", *shown)
+    pose = Reference(pose_excess("p"), "key_poses", *shown)
     wrong = other_conventions(right, 0).replace(upper=upper)
     best = er3a.diagnose(wrong, [*er3a.load_references("er3_600").references, pose])[0]
     assert best.explains
@@ -122,13 +122,13 @@ def test_a_sheet_that_counts_a_joint_from_the_ground_is_named(name, joint, sign)
         x = er3a.forward(right.without_tool(), np.radians(q))[:3, 3] * MM
         q[joint - 1] -= sign * q[1]
         for c, value in zip("xyz", x):
-            about = PointAtPose(f"p{k}", "flange", c), "key_poses", PointCoordinate(tuple(q), "flange", c)
+            about = point_at_pose(f"p{k}", "flange", c), "key_poses", PointCoordinate(tuple(q), "flange", c)
             stated.append(Reference(*about, float(value), 0.1, "sheet", "official", "sheet"))
     assert er3a.diagnose(right, stated)[0].faults == (fact("counted_from_ground", joint=joint, along=(2,), sign=sign),)
     lower, upper = np.degrees(right.lower), np.degrees(right.upper)
     ends = (lower[1], upper[1]) if sign < 0 else (-upper[1], -lower[1])
     for side, value in (("lower", lower[joint - 1] + ends[0]), ("upper", upper[joint - 1] + ends[1])):
-        about = JointLimit(joint, side), "limits", Limit(joint, side)
+        about = joint_limit(joint, side), "limits", Limit(joint, side)
         stated.append(Reference(*about, float(value), 0.5, "sheet", "official", "sheet"))
     assert er3a.diagnose(right, stated)[0].faults == (fact("counted_from_ground", joint=joint, along=(2,), sign=sign),)
     other = Reference(*about, float(value) - 30, 0.5, "sheet", "official", "sheet")  # as the linkage has it

@@ -16,9 +16,9 @@ from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
 from er3a.finding import fact, is_one
 from er3a.references.reference import expected_of
-from er3a.references.subjects import PointAtPose
 from er3a.robots.robot import to_modified
 from testing.known_faults import mutations_of, noisy, rank, try_mutation
+from testing.reference_subjects import point_at_pose
 
 TRUSTED = ("er3a_c60", "er3_600")
 OFFSET_MISSING = fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0)
@@ -177,7 +177,7 @@ def test_faults_that_references_see_are_ranked_first(name, noise_mm, every, rand
 
 
 def test_too_few_references_leave_many_hypotheses():
-    stated = [r for r in usable(load_references("er3a_c60")) if r.subject == PointAtPose("zero pose", "flange", "z")][
+    stated = [r for r in usable(load_references("er3a_c60")) if r.subject == point_at_pose("zero pose", "flange", "z")][
         :1
     ]
     first = er3a.diagnose(changed("er3a_c60", d=(1, 0.2)), stated)[0]
@@ -192,7 +192,7 @@ def test_an_unknown_reference_set_is_one_clear_error():
 def test_references_that_contradict_each_other_accuse_no_table():
     robot = load_robot("er3_600")
     stated = usable(load_references("er3_600"))
-    flange = next(r for r in stated if r.subject == PointAtPose("zero pose", "flange", "x"))
+    flange = next(r for r in stated if r.subject == point_at_pose("zero pose", "flange", "x"))
     rumour = replace(flange, expected=flange.expected + 10, source="another catalogue")
     assert er3a.diagnose(robot, (*stated, rumour)) == []
     faulty = er3a.diagnose(changed("er3_600", offset=(2, 0.0)), (*stated, rumour))

@@ -20,7 +20,7 @@ from er3a.finding import fact, is_one
 from er3a.numerics.arrays import Reals
 from er3a.references.quantities import COORDINATES, LimitExcess, PointCoordinate
 from er3a.references.reference import Reference
-from er3a.references.subjects import PointAtPose, PoseExcess
+from testing.reference_subjects import point_at_pose, pose_excess
 
 POSES = (
     (0, 0, 0, 0, 0, 0),
@@ -82,7 +82,7 @@ def stated_of(robot: er3a.Robot, half_width_mm: float = HALF_WIDTH_MM) -> tuple[
     """The flange's positions, rounded to 0.1 mm as a document would."""
     return tuple(
         Reference(
-            PointAtPose(f"pose {i}", "flange", coordinate),
+            point_at_pose(f"pose {i}", "flange", coordinate),
             "key_poses",
             PointCoordinate(pose, "flange", coordinate),
             round(float(value), 1),
@@ -192,7 +192,7 @@ def test_a_right_table_is_left_alone(arm):
 
 def test_a_limit_that_only_a_pose_contradicts(arm):
     pose = (0.0, 60.0, 0.0, 0.0, 0.0, 0.0)
-    shown = Reference(PoseExcess("parked"), "key_poses", LimitExcess(pose), 0.0, 1e-3, "a photograph", "official")
+    shown = Reference(pose_excess("parked"), "key_poses", LimitExcess(pose), 0.0, 1e-3, "a photograph", "official")
     narrow = arm.replace(upper=np.where(np.arange(6) == 1, np.radians(30), arm.upper))
     first = er3a.diagnose(narrow, (*stated_of(arm), shown))[0]
     named = [rounded(faults[0]) for faults in (first.faults, *first.indistinguishable_from)]

@@ -25,10 +25,10 @@ from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.pipeline.stages.validation.checks import parts_found
 from er3a.references.quantities import Limit, PointCoordinate, QuantityAtPose
 from er3a.references.reference import Document, Documents, Reference
-from er3a.references.subjects import JointLimit, PointAtPose
 from er3a.robots.robot import Robot
 from testing.made_once import made_once
 from testing.proposed_measurements import measured
+from testing.reference_subjects import joint_limit, point_at_pose
 
 TRACKER = ("tracker", "measured", "tracker")
 SETTLED = ("settled", "settled_up_to_signs")
@@ -291,7 +291,7 @@ def tracked(robot: Robot, poses: np.ndarray, half_width: float) -> list[Referenc
         at = tuple(float(angle) for angle in pose)
         for k, coordinate in enumerate("xyz"):
             quantity = PointCoordinate(at, "flange", coordinate)
-            subject = PointAtPose(f"pose {n}", "flange", coordinate)
+            subject = point_at_pose(f"pose {n}", "flange", coordinate)
             expected = float(frame_of(robot, pose)[k, 3] * 1000)
             found.append(Reference(subject, "key_poses", quantity, expected, half_width, *TRACKER))
     return found
@@ -346,7 +346,7 @@ def test_standard_deviations_give_the_interval_of_least_squares(random):
         for coordinate in "xyz"
     ]
     stated = [
-        Reference(PointAtPose("p", "flange", None), "key_poses", quantity, value, 1.96 * sigma, *TRACKER, sigma)
+        Reference(point_at_pose("p", "flange", None), "key_poses", quantity, value, 1.96 * sigma, *TRACKER, sigma)
         for quantity, value in zip(quantities, seen(robot).tolist())
     ]
     found = evidence_of(robot, stated, Documents(), only=["a2", "d4", "offset3", "alpha5"])
@@ -401,7 +401,7 @@ def _slope(robot: Robot, name: str, at: np.ndarray) -> np.ndarray:
 def test_derived_documents_prove_nothing(parents, status):
     """The same limit, read off by a document of its own, and by one with an ancestor in common with the table's."""
     robot = puma().replace(origins={entry.name: "manual" for entry in entries_of(puma())})
-    stated = Reference(JointLimit(3, "upper"), "limits", Limit(3, "upper"), 135.0, 0.5, *TRACKER)
+    stated = Reference(joint_limit(3, "upper"), "limits", Limit(3, "upper"), 135.0, 0.5, *TRACKER)
     documents = Documents.of(
         [
             Document("drawing", "a drawing", "a maker"),

@@ -14,8 +14,8 @@ from er3a.files.robot_library import load_robot
 from er3a.kinematics.forward import forward, jacobian
 from er3a.references.predict import predict
 from er3a.references.reference import expected_of
-from er3a.references.subjects import JointLimit, PoseExcess
 from er3a.robots.robot import GRADES
+from testing.reference_subjects import joint_limit, pose_excess
 
 LIMITS = "joint,lower_deg,upper_deg,uncertainty_deg,source,grade\n"
 POSITIONS = "name,point,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm,uncertainty_mm,source,grade\n"
@@ -59,7 +59,7 @@ def test_folder_and_name_give_the_same_set():
 
 def test_a_limit_that_is_not_given_is_kept_as_not_given():
     blank = [r for r in load_references("er3a_c60").references if r.expected is None]
-    assert [r.subject for r in blank] == [JointLimit(6, "lower"), JointLimit(6, "upper")]
+    assert [r.subject for r in blank] == [joint_limit(6, "lower"), joint_limit(6, "upper")]
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_a_pose_that_a_source_shows_counts_as_within_the_limits_once(tmp_path):
     row = "up,{},0,90,0,0,0,0,10,0,699.5,0.1,m,cad\n"
     written(tmp_path, "positions.csv", POSITIONS + row.format("flange") + row.format("wrist_centre"))
     subjects = [reference.subject for reference in load_references(tmp_path).references]
-    assert subjects.count(PoseExcess("up")) == 1
+    assert subjects.count(pose_excess("up")) == 1
 
 
 @pytest.mark.parametrize(

@@ -27,9 +27,9 @@ from er3a.references.quantities import (
 )
 from er3a.references.reference import Reference, conflicts, expected_of, quantities_of
 from er3a.references.rows import PositionRow
-from er3a.references.subjects import AxisDirection, JointLimit
 from er3a.robots.robot import Robot
 from testing.arms import OTHERS_LONG
+from testing.reference_subjects import axis_direction, joint_limit
 
 # Joint origins (m, rad) of the URDF in hanliumaozhi/efort_description: xyz, then fixed-axis roll, pitch, yaw.
 URDF = (
@@ -200,7 +200,7 @@ def test_the_manufacturers_two_radii_conflict_and_nothing_else():
 @given(st.floats(-1000, 1000), st.floats(-1000, 1000), st.floats(0.01, 50), st.floats(0.01, 50))
 def test_a_conflict_is_what_no_value_can_meet(first, second, u1, u2):
     pair = tuple(
-        Reference(JointLimit(1, "upper"), "limits", Limit(1, "upper"), expected, uncertainty, source, "official")
+        Reference(joint_limit(1, "upper"), "limits", Limit(1, "upper"), expected, uncertainty, source, "official")
         for expected, uncertainty, source in ((first, u1, "a"), (second, u2, "b"))
     )
     best = (first * u2 + second * u1) / (u1 + u2)
@@ -213,7 +213,7 @@ def test_directions_conflict_by_the_angle_between_them():
     level, tilted = (1.0, 0.0, 0.0), (np.cos(0.02), 0.0, np.sin(0.02))
     for uncertainty, count in ((0.5, 1), (0.6, 0)):
         pair = tuple(
-            Reference(AxisDirection(4, False), "axes", AxisAngle(4, toward, False), 0.0, uncertainty, source, "cad")
+            Reference(axis_direction(4, False), "axes", AxisAngle(4, toward, False), 0.0, uncertainty, source, "cad")
             for toward, source in ((level, "a"), (tilted, "b"))
         )
         assert len(conflicts(pair)) == count

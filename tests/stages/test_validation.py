@@ -37,11 +37,9 @@ from er3a.pipeline.stages.validation import compute as compute_module
 from er3a.pipeline.stages.validation.checks import checks_of_set, table_checks, verdict_of
 from er3a.pipeline.stages.validation.model import (
     RESULTS,
-    SelfCheck,
     SetSummary,
     ValidationResults,
     ValidationSummary,
-    WholeGroup,
 )
 from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
 from er3a.pipeline.stages.validation.page.report import report
@@ -49,18 +47,18 @@ from er3a.pipeline.study import RobotEntry, Study, load_study
 from er3a.references.predict import predict, state_of
 from er3a.references.quantities import AxisAngle, AxisDistance, Limit, Speed
 from er3a.references.reference import Reference, ReferenceSet
-from er3a.references.subjects import (
-    AxisPosition,
-    DrawingCorner,
-    JointLimit,
-    JointSpeed,
-    PointAtPose,
-    PoseExcess,
-    Reach,
-    SegmentInclination,
-)
 from testing.on_demand import OnDemand
 from testing.readme import answer
+from testing.reference_subjects import (
+    axis_position,
+    drawing_corner,
+    joint_limit,
+    joint_speed,
+    point_at_pose,
+    pose_excess,
+    reach,
+    segment_inclination,
+)
 from tests.robots.test_conventions import random_arm
 
 MISSING_OFFSET = fact("wrong_offset", joint=2, given_deg=0.0, fits_deg=-90.0)
@@ -143,8 +141,8 @@ def test_a_table_that_meets_all_but_that_nothing_settles_is_a_caution(summaries)
     assert consistency.total > independent.total
     assert found.next_measurement.entry in directions.open
     kinds = {(check.subject, check.source): check.kind for check in summaries["er3_600"].checks if check.source}
-    assert {kind for (subject, _), kind in kinds.items() if isinstance(subject, DrawingCorner)} == {"independent"}
-    assert {kind for (subject, _), kind in kinds.items() if isinstance(subject, JointSpeed)} == {"consistency"}
+    assert {kind for (subject, _), kind in kinds.items() if is_one(subject, "drawing_corner")} == {"independent"}
+    assert {kind for (subject, _), kind in kinds.items() if is_one(subject, "joint_speed")} == {"consistency"}
 
 
 @pytest.mark.long
@@ -169,16 +167,16 @@ def test_the_manufacturers_600_mm_is_a_conflict_counted_against_no_model(summari
 def test_the_article_table_is_told_apart_with_numbers(summaries):
     summary = summaries["er3a_c60_article"]
     checks = {(check.reference_set, check.subject): check for check in summary.checks if check.status == "fail"}
-    reach = checks["er3a_c60", Reach("greatest", "wrist_centre", 1)]
-    assert (round(reach.measured, 1), reach.expected) == (1301.6, 627.1)
+    farthest = checks["er3a_c60", reach("greatest", "wrist_centre", 1)]
+    assert (round(farthest.measured, 1), farthest.expected) == (1301.6, 627.1)
     found = summary.verdict.finding
     assert (found.check, found.measured, found.expected) == (reach.subject, reach.measured, reach.expected)
     assert {"1301.6 mm", "627.1 mm"} <= set(re.findall(r"[0-9.]+ mm", say(found)))
     assert {subject for owner, subject in checks if owner == "er3a_c60_article"} == {
-        SegmentInclination("forearm"),
-        SegmentInclination("upper_arm"),
-        PointAtPose("zero pose", "flange", "x"),
-        PointAtPose("zero pose", "flange", "z"),
+        segment_inclination("forearm"),
+        segment_inclination("upper_arm"),
+        point_at_pose("zero pose", "flange", "x"),
+        point_at_pose("zero pose", "flange", "z"),
     }
     claims, real = summary.sets
     assert claims.zero_pose_flange_off_mm == pytest.approx(np.hypot(777.21 - 650, 819.77 + 607.44), abs=1e-6)
@@ -189,7 +187,7 @@ def test_the_article_table_is_told_apart_with_numbers(summaries):
 @pytest.mark.long
 def test_what_the_sources_do_not_say_is_no_reference(stored):
     silent = with_status(stored["er3a_c60"].results, "no_reference")
-    assert {WholeGroup("speeds"), WholeGroup("envelope")} <= silent
+    assert {fact("whole_group", group="speeds"), fact("whole_group", group="envelope")} <= silent
     assert not silent & with_status(stored["er3a_c60"].results, "pass")
 
 
@@ -217,12 +215,16 @@ def test_what_is_read_is_written_as_the_same_bytes(study, folders, stored, tmp_p
 @pytest.mark.parametrize(
     ("edit", "missed", "finding"),
     [
-        (lambda c: c["dh"]["rows"][0].update(d_mm=368.5), AxisPosition(2, "z"), "defined_otherwise"),
-        (lambda c: c["dh"]["rows"][5].update(d_mm=79.5), PointAtPose("zero pose", "flange", "x"), "defined_otherwise"),
-        (lambda c: c["zero"]["rows"][2].update(direction=1), DrawingCorner(85, 185, "z"), "defined_otherwise"),
-        (lambda c: c["limits"]["rows"][2].update(upper_deg=175), JointLimit(3, "upper"), "contradicted"),
-        (lambda c: c["limits"]["rows"][1].update(upper_deg=31), PoseExcess("transport pose"), "contradicted"),
-        (lambda c: c["speeds"]["rows"][0].update(speed_deg_s=4), JointSpeed(1), "contradicted"),
+        (lambda c: c["dh"]["rows"][0].update(d_mm=368.5), axis_position(2, "z"), "defined_otherwise"),
+        (
+            lambda c: c["dh"]["rows"][5].update(d_mm=79.5),
+            point_at_pose("zero pose", "flange", "x"),
+            "defined_otherwise",
+        ),
+        (lambda c: c["zero"]["rows"][2].update(direction=1), drawing_corner(85, 185, "z"), "defined_otherwise"),
+        (lambda c: c["limits"]["rows"][2].update(upper_deg=175), joint_limit(3, "upper"), "contradicted"),
+        (lambda c: c["limits"]["rows"][1].update(upper_deg=31), pose_excess("transport pose"), "contradicted"),
+        (lambda c: c["speeds"]["rows"][0].update(speed_deg_s=4), joint_speed(1), "contradicted"),
     ],
 )
 def test_one_wrong_number_fails_where_it_shows(study, tmp_path, edit, missed, finding):
@@ -257,7 +259,7 @@ def test_a_robot_without_references_and_speeds(study, tmp_path):
 def test_speeds_that_the_robot_file_lacks_are_not_judged(study, tmp_path):
     results = computed(edited_robot(study, tmp_path, lambda content: content.pop("speeds")), tmp_path / "out").results
     assert results.summary.verdict.status == "caution"
-    assert JointSpeed(4) in with_status(results, "no_reference")
+    assert joint_speed(4) in with_status(results, "no_reference")
 
 
 @pytest.mark.long
@@ -268,14 +270,14 @@ def test_an_arm_without_closed_form_is_still_checked(study, tmp_path):
     assert is_one(summary.table.no_closed_form, "no_common_point_of_axes_4_5_6")
     assert summary.table.no_closed_form.miss_mm > 1
     assert summary.round_trips is None
-    assert SelfCheck("closed_form") in with_status(stored.results, "no_reference")
-    assert PointAtPose("zero pose", "flange", "z") in with_status(stored.results, "fail")
+    assert fact("self_check", quantity="closed_form") in with_status(stored.results, "no_reference")
+    assert point_at_pose("zero pose", "flange", "z") in with_status(stored.results, "fail")
 
 
 @pytest.mark.long
 def test_a_table_with_crossed_limits_fails_its_internal_checks(summaries):
     summary = summaries["er3_600"]
-    name = SelfCheck("crossed_limits")
+    name = fact("self_check", quantity="crossed_limits")
     checks = [
         replace(check, status="fail", measured=2.0) if check.subject == name else check for check in summary.checks
     ]
@@ -288,7 +290,7 @@ def test_a_table_with_crossed_limits_fails_its_internal_checks(summaries):
 
 def set_of(*stated: tuple[float, str]) -> ReferenceSet:
     references = tuple(
-        Reference(JointLimit(1, "upper"), "limits", Limit(1, "upper"), value, 0.5, f"source {value}", grade)
+        Reference(joint_limit(1, "upper"), "limits", Limit(1, "upper"), value, 0.5, f"source {value}", grade)
         for value, grade in stated
     )
     return ReferenceSet("made", references, {})
@@ -328,7 +330,7 @@ def test_a_reference_that_a_value_at_random_would_meet_as_often_as_not_is_no_pas
         (1e6, 0, "no_reference"),
         (bound, 1.1 * bound, "fail"),
     ):
-        stated = Reference(JointLimit(1, "upper"), "limits", quantity, value, uncertainty, "a source", "official")
+        stated = Reference(joint_limit(1, "upper"), "limits", quantity, value, uncertainty, "a source", "official")
         references = ReferenceSet("made", (stated,), {})
         bases = bases_of(load_robot("er3_600"), references.checkable, references.documents)
         found = checks_of_set(references, np.array([value + off]), bases, size=1000)[0][0]
@@ -526,7 +528,7 @@ def test_the_verdict_names_the_table_to_use_instead_if_the_study_has_one_that_ho
 @pytest.mark.long
 def test_a_limit_that_was_judged_is_not_shown_as_without_reference(study, stored, tmp_path):
     """Joint 6 of the er3a_c60: one source gives no limit, another one does."""
-    limit = JointLimit(6, "upper")
+    limit = joint_limit(6, "upper")
     checks = [check for check in stored["er3a_c60"].results.summary.checks if check.subject == limit]
     assert [check.status for check in checks] == ["pass"]
 
@@ -673,13 +675,13 @@ def test_poses_outside_the_limits_and_missing_axes_are_said(study, tmp_path):
         content["limits"]["rows"][1].update(upper_deg=30)
 
     results = computed(edited_robot(study, tmp_path, edit), tmp_path / "out").results
-    assert PoseExcess("upper arm back by 45") in with_status(results, "fail")
+    assert pose_excess("upper arm back by 45") in with_status(results, "fail")
 
 
 def test_axes_that_a_set_lacks_are_no_reference(stored):
     silent = with_status(stored["er3a_c60_article"].results, "no_reference")
-    assert {AxisPosition(2, None), AxisPosition(6, None)} <= silent
-    assert AxisPosition(1, None) not in silent
+    assert {axis_position(2, None), axis_position(6, None)} <= silent
+    assert axis_position(1, None) not in silent
 
 
 @pytest.mark.long

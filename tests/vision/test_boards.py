@@ -30,7 +30,7 @@ from er3a.vision.boards import (
 )
 from er3a.vision.calibration_set import CalibrationSet
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.likelihood import PoseObservations, refine
+from er3a.vision.likelihood import refine
 from er3a.vision.typical_causes import fitted_distances, half_widths
 from testing.hand_eye_sets import off, pose
 from tests.vision.test_hand_eye_file import HEAD, columns, write
@@ -154,7 +154,7 @@ def test_a_camera_is_calibrated_from_images_alone_and_those_without_a_board_are_
     assert "assumed: the intrinsics are exact" in done.stdout
     record = json.loads(call("hand-eye", tmp_path / "set.yaml", "--json").stdout)
     assert record["samples"] == 12
-    assert [each["sample"] for each in record["left_out"]] == [f"row {k + 2}" for k in blank]
+    assert [each["params"]["sample"] for each in record["boardless"]] == [f"row {k + 2}" for k in blank]
 
 
 def test_without_any_board_in_the_images_there_is_one_error(tmp_path):
@@ -206,7 +206,7 @@ def test_a_focal_length_that_its_images_leave_open_is_no_wrong_board():
         samples = CalibrationSet(
             "eye_to_hand", flange, views.target, camera_covariance=views.covariance, shared=views.shared
         )
-        refined = refine(PoseObservations.of(samples), X, Y)
+        refined = refine(samples, X, Y)
         fit = fitted_distances("board_scale", samples, refined)
         factor, (alone, shared) = 1 + fit.values[0], half_widths("board_scale", samples, refined, fit)
         half_width = np.hypot(alone, shared)

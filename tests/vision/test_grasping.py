@@ -27,7 +27,14 @@ from er3a.robots.joint_limits import within
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import DetectedObject, Grasp, GraspNeeds, GraspTask, plan_grasp
 from er3a.vision.hand_eye import calibrate_hand_eye
-from er3a.vision.point_error import ArmAccuracy, error_sizes, seen_pose, seen_pose_error, table_covariance
+from er3a.vision.point_error import (
+    ArmAccuracy,
+    SeenPoseError,
+    error_sizes,
+    seen_pose,
+    seen_pose_error,
+    table_covariance,
+)
 from testing.arms import scara
 from testing.camera_cells import CARRIED, FIXED, FOLDER, SCENE
 from testing.hand_eye_sets import pose
@@ -41,6 +48,12 @@ CELLS = [
     pytest.param((FIXED, "fixed_camera"), id="fixed"),
     pytest.param((CARRIED, "carried_camera"), id="carried", marks=pytest.mark.long),
 ]
+
+
+def erring(covariance: np.ndarray) -> SeenPoseError:
+    """An error of the camera alone."""
+    nothing = np.zeros((6, 6))
+    return SeenPoseError(covariance, nothing, nothing, nothing)
 
 
 @pytest.fixture(scope="module", params=CELLS)
@@ -120,7 +133,7 @@ def test_an_object_is_graspable_only_at_the_probability_asked_for(cell):
     def plan(sigma: float, level: float, others: float | None = None):
         """With that deviation, or another one of all grasps but the first."""
         own, sizes = replace(task, needs=replace(NEEDS, probability=level)), chain([sigma], repeat(others or sigma))
-        return plan_grasp(own, target, T, lambda q: np.eye(6) * next(sizes) ** 2)
+        return plan_grasp(own, target, T, lambda q: erring(np.eye(6) * next(sizes) ** 2))
 
     sure, wide = plan(1e-4, 0.95), plan(2e-2, 0.95)
     assert sure.chosen.probability > 0.99
@@ -182,7 +195,7 @@ def test_grasps_are_what_the_arm_can_carry_out(cell):
     for entry in file.objects:
         target = entry.detected()
         T = seen_pose(found, target.T_camera_object, A)
-        plan = plan_grasp(task, target, T, lambda q, own=target.covariance: own)
+        plan = plan_grasp(task, target, T, lambda q, own=target.covariance: erring(own))
         assert ("grasped" if plan.chosen else "not graspable") == entry.expect
         if plan.chosen is None:
             assert plan.refusal is not None
@@ -212,7 +225,7 @@ def chosen_from(home, name="fixed_camera"):
     file, task, _ = task_of(FIXED, robot)
     target = file.objects[0].detected()
     T = seen_pose(found, target.T_camera_object)
-    return robot, task, plan_grasp(replace(task, home=home), target, T, lambda q: target.covariance)
+    return robot, task, plan_grasp(replace(task, home=home), target, T, lambda q: erring(target.covariance))
 
 
 @pytest.fixture(scope="module")
@@ -267,11 +280,11 @@ def test_the_move_to_the_approach_keeps_the_clearance_asked_for(monkeypatch):
     target = file.objects[0].detected()
     found = calibrate_hand_eye(load_hand_eye(FOLDER / "fixed_camera.yaml", robot))
     T = seen_pose(found, target.T_camera_object)
-    refused = plan_grasp(near, target, T, lambda q: target.covariance).refusal
+    refused = plan_grasp(near, target, T, lambda q: erring(target.covariance)).refusal
     assert is_one(refused, "way_collides")
     assert (refused.part, "bump" in say(refused)) == ("move", True)
     closer = replace(near, needs=replace(NEEDS, clearance=0.001))
-    assert plan_grasp(closer, target, T, lambda q: target.covariance).chosen.clearance == pytest.approx(
+    assert plan_grasp(closer, target, T, lambda q: erring(target.covariance)).chosen.clearance == pytest.approx(
         passed, abs=5e-4
     )
 
@@ -300,7 +313,7 @@ def test_success_is_the_share_of_errors_that_the_gripper_forgives(cell):
     target = file.objects[0].detected()
     A = None if picture is None else forward(robot.without_tool(), picture)
     T = seen_pose(found, target.T_camera_object, A)
-    plan = plan_grasp(task, target, T, lambda q: np.diag([0, 0, 0.004**2, 0, 0, 0]))
+    plan = plan_grasp(task, target, T, lambda q: erring(np.diag([0, 0, 0.004**2, 0, 0, 0])))
     assert plan.chosen.probability == pytest.approx(0.6827, abs=0.025)
 
 
@@ -315,7 +328,7 @@ def test_a_can_forgives_turns_about_its_axis_and_a_box_does_not(cell):
         T = seen_pose(found, target.T_camera_object, A)
         about_z = np.zeros((6, 6))
         about_z[3:, 3:] = np.radians(20) ** 2 * np.outer(T[:3, 2], T[:3, 2])
-        shares[entry.name] = plan_grasp(task, target, T, lambda q, own=about_z: own).chosen.probability
+        shares[entry.name] = plan_grasp(task, target, T, lambda q, own=about_z: erring(own)).chosen.probability
     assert shares["can"] > 0.999
     assert shares["box"] < 0.3
 
@@ -331,7 +344,7 @@ def test_other_arms_grasp_along_straight_lines(name, home):
     task = GraspTask(robot, Bodies(robot, None), np.radians(home), NEEDS, limits, SPEED, 1)
     T, certain = pose([0, 0, 10], [0.45, 0.1, 0.2]), np.eye(6) * 1e-10
     target = DetectedObject("thing", T, certain, 4, (Grasp("top", pose([180, 0, 0], [0, 0, 0.1])),), 0.08, 0.08)
-    chosen = plan_grasp(task, target, T, lambda q: certain).chosen
+    chosen = plan_grasp(task, target, T, lambda q: erring(certain)).chosen
     for part in ("approach", "retreat"):
         q = along(chosen, part, 21)
         tool = forward(robot, q)[:, :3, 3]
@@ -351,7 +364,7 @@ def test_a_margin_asked_for_in_degrees_is_millimetres_of_a_slide():
     for slide, margin in ((0.150, 30), (0.179, 1)):
         T = forward(robot, np.array([0.3, 0.5, slide, 0.1]))
         target = DetectedObject("t", T, 1e-12 * np.eye(6), 1, (Grasp("g", np.eye(4)),), 0.02, 0.02)
-        plan = plan_grasp(task, target, T, lambda _: 1e-12 * np.eye(6))
+        plan = plan_grasp(task, target, T, lambda _: erring(1e-12 * np.eye(6)))
         if margin < 2:
             assert (plan.refusal.code, plan.refusal.solutions) == ("grasp_near_limits", 4)
             unit = "deg (mm of a prismatic joint)"

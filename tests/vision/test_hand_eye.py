@@ -19,9 +19,9 @@ from er3a.geometry.transforms import moved, transform
 from er3a.pipeline.scope import Open
 from er3a.pipeline.stages.vision.compute import _open_frames
 from er3a.vision.calibration_set import CalibrationSet
-from er3a.vision.classic_methods import park, shah
+from er3a.vision.classic_methods import park
 from er3a.vision.hand_eye import CONVENTIONS, calibrate_hand_eye, other_conventions
-from er3a.vision.likelihood import PoseObservations, flange_to_camera, refine, residuals
+from er3a.vision.likelihood import refine, residuals
 from er3a.vision.typical_causes import moved_between, wrong_distances
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 from testing.hand_eye_coverage import board_coverage, pose_coverage
@@ -41,7 +41,6 @@ from testing.hand_eye_sets import (
 )
 
 SETUPS = ("eye_in_hand", "eye_to_hand")
-CLOSED_FORMS = {"park": park, "shah": shah}
 
 
 def a_set(setup: str, seed: int = 0, count: int = 15, **more) -> CalibrationSet:
@@ -50,41 +49,26 @@ def a_set(setup: str, seed: int = 0, count: int = 15, **more) -> CalibrationSet:
     return CalibrationSet(setup, flange, noisy(seen(setup, flange), random), **more)
 
 
-def by_opencv(name: str, F: np.ndarray, B: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    if name == "shah":
-        G = np.linalg.inv(F)
-        method = cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH
-        R_Y, t_Y, R_X, t_X = cv2.calibrateRobotWorldHandEye(
-            B[:, :3, :3], B[:, :3, 3], G[:, :3, :3], G[:, :3, 3], method=method
-        )
-        X, Y = np.eye(4), np.eye(4)
-        X[:3, :3], X[:3, 3], Y[:3, :3], Y[:3, 3] = R_X, t_X.ravel(), R_Y, t_Y.ravel()
-        return np.linalg.inv(X), np.linalg.inv(Y)
+def by_opencv(F: np.ndarray, B: np.ndarray) -> np.ndarray:
     method = cv2.CALIB_HAND_EYE_PARK
     R, t = cv2.calibrateHandEye(F[:, :3, :3], F[:, :3, 3], B[:, :3, :3], B[:, :3, 3], method=method)
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = R, t.ravel()
-    return X, None
+    return X
 
 
 @pytest.mark.parametrize("setup", SETUPS)
-@pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_answer_as_opencv_does(name, setup):
+def test_the_closed_form_answers_as_opencv_does(setup):
     random = np.random.default_rng(5)
     flange = flange_poses(random, 12, turn=0.35)
     B = noisy(seen(setup, flange), random)
     F = flange if setup == "eye_in_hand" else np.linalg.inv(flange)
-    X, Y = CLOSED_FORMS[name](F, B)
-    X_cv, Y_cv = by_opencv(name, F, B)
-    assert np.abs(X - X_cv).max() < 1e-9
-    if Y_cv is not None:
-        assert np.abs(Y - Y_cv).max() < 1e-9
+    assert np.abs(park(F, B)[0] - by_opencv(F, B)).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", CLOSED_FORMS)
-def test_closed_forms_find_the_truth_without_noise(name):
+def test_the_closed_form_finds_the_truth_without_noise():
     flange = flange_poses(np.random.default_rng(6), 6)
-    X, Y = CLOSED_FORMS[name](flange, seen("eye_in_hand", flange))
+    X, Y = park(flange, seen("eye_in_hand", flange))
     assert np.abs(X - X_TRUE).max() < 1e-9
     assert np.abs(Y - Y_TRUE).max() < 1e-9
 
@@ -99,18 +83,6 @@ def test_derivatives_are_those_of_differences():
         step[k] = 1e-6
         ends = [residuals(flange, B, moved(X_TRUE, s * step[:6]), moved(Y_TRUE, s * step[6:]))[0] for s in (1, -1)]
         np.testing.assert_allclose(J[..., k], (ends[0] - ends[1]) / 2e-6, atol=1e-8)
-
-
-@pytest.mark.parametrize("setup", SETUPS)
-def test_errors_of_the_flange_reach_the_camera(setup):
-    flange = flange_poses(np.random.default_rng(3), 4)
-    G = flange_to_camera(setup, flange if setup == "eye_in_hand" else np.linalg.inv(flange), X_TRUE, Y_TRUE)
-    for k in range(6):
-        step = np.zeros(6)
-        step[k] = 1e-6
-        ends = [seen(setup, moved(flange, s * step)) for s in (1, -1)]
-        found = np.stack([off(a, b) for a, b in zip(*ends)]) / 2e-6
-        np.testing.assert_allclose(G[..., k], found, atol=1e-8)
 
 
 def test_the_refinement_ends_where_scipy_finds_the_least_squares():
@@ -134,7 +106,7 @@ def test_the_refinement_ends_where_scipy_finds_the_least_squares():
     np.testing.assert_allclose(found.scatter**2 * free, 2 * least.cost, rtol=1e-9)
     by_sample, positions = np.arange(90).reshape(2, 15, 3).transpose(1, 0, 2).ravel(), [0, 1, 2, 6, 7, 8]
     half_width = clustered_half_width(least.jac[by_sample], least.fun[by_sample])
-    refined = refine(PoseObservations.of(samples), found.X, found.Y)
+    refined = refine(samples, found.X, found.Y)
     np.testing.assert_allclose(refined.half_width[positions], half_width[positions], rtol=1e-3)
 
 
@@ -180,8 +152,6 @@ def test_a_board_turned_by_half_is_named_and_left_out(setup):
     assert [(each.sample, each.kind) for each in found.suspects] == [("5", "half_turn_z")]
     assert not found.used[4]
     assert np.linalg.norm(off(found.X, X_TRUE)[:3]) < 2e-3
-    assert found.without_suspects is not None
-    assert found.without_suspects[0] > 5e-4
 
 
 @pytest.mark.long
@@ -259,8 +229,8 @@ def test_places_are_the_same_in_any_order():
 
 def test_both_streams_inverted_is_the_same_problem_with_the_unknowns_swapped():
     samples = a_set("eye_in_hand", 12)
-    F, B = samples.flange, samples.target
-    X, Y = shah(F, B)
+    F = samples.flange
+    X, Y = park(F, samples.target)
     X_swapped, Y_swapped = park(np.linalg.inv(F), np.linalg.inv(seen("eye_in_hand", F)))
     assert np.abs(off(X_swapped, Y_TRUE)).max() < 1e-9
     assert np.abs(off(Y_swapped, X_TRUE)).max() < 1e-9
@@ -310,7 +280,7 @@ def test_sound_sets_have_the_right_board_and_intrinsics():
         for setup in SETUPS:
             stated = {"camera_covariance": covariance(count)} if seed % 2 else {}
             samples = a_set(setup, 300 + seed, count, **stated)
-            found = wrong_distances(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE))
+            found = wrong_distances(samples, refine(samples, X_TRUE, Y_TRUE))
             wrong.append([each.finding for each in found if each.sure])
     assert wrong == [[]] * 80
 
@@ -546,7 +516,7 @@ def test_a_set_of_two_setups_is_named_with_the_sample_between(setup, last, what,
 @pytest.mark.long
 def test_sound_sets_are_not_of_two_setups():
     for samples in (a_set(setup, seed, 15) for setup in SETUPS for seed in range(40, 50)):
-        assert moved_between(samples, refine(PoseObservations.of(samples), X_TRUE, Y_TRUE)) is None
+        assert moved_between(samples, refine(samples, X_TRUE, Y_TRUE)) is None
 
 
 @pytest.mark.long

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.geometry.transforms import frame_along
+from er3a.geometry.transforms import frame_along, rot_x, rot_z
 from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
 from er3a.kinematics.chain import axes_of, meeting_point, poses_of
 from er3a.numerics.arrays import Flags, Reals
@@ -96,8 +96,7 @@ def about_z(angle: float) -> Reals:
     -------
     R : (3, 3)
     """
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return rot_z(angle)[:3, :3]
 
 
 def about_x(angle: float) -> Reals:
@@ -111,8 +110,7 @@ def about_x(angle: float) -> Reals:
     -------
     R : (3, 3)
     """
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return rot_x(angle)[:3, :3]
 
 
 def vector_of(array: Reals) -> Vector:

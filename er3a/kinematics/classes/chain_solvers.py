@@ -14,8 +14,8 @@ from functools import partial
 
 import numpy as np
 
-from er3a.geometry.transforms import frame_along
-from er3a.kinematics.chain import axes_of, inverse_rigid, poses_of, size_of
+from er3a.geometry.transforms import frame_along, inverted
+from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes import class_solvers
 from er3a.kinematics.classes.arm_angle import about_x, about_z, arm_angle_arm
 from er3a.kinematics.classes.parallel_axes import three_parallel
@@ -77,7 +77,7 @@ class LockedJoint(class_solvers.ChainSolver):
         links = np.array([self.links[ends[0]] if self.joint == 0 else np.eye(4), self.links[ends[1]]])
         if self.joint == 0:
             links[1] = np.eye(4)
-        step = inverse_rigid(poses_of(links, own[:, None], self.sliding[[self.joint]]))
+        step = inverted(poses_of(links, own[:, None], self.sliding[[self.joint]]))
         return np.asarray(step @ T if self.joint == 0 else T @ step)
 
     def values_of(self, x: Reals) -> Reals:
@@ -360,7 +360,7 @@ def _completions(
         first, second = eye.copy(), eye.copy()
         second[:3, :3] = frame_along(w)[[1, 2, 0]].T  # z across the last axis
         first[:3, :3] = frame_along(w)[[2, 0, 1]].T  # z across both
-        more = [links[-1] @ first, inverse_rigid(first) @ second, inverse_rigid(second)]
+        more = [links[-1] @ first, inverted(first) @ second, inverted(second)]
         found.append(("planar_wrist", (4, 5), np.concatenate([links[:-1], more])))
     if n == 3:
         # a wrist about the tool point; at right angles, so that it takes every orientation (one askew would lose arms
@@ -369,7 +369,7 @@ def _completions(
         across[:3, :3] = about_x(np.pi / 2)
         last = eye.copy()
         last[:3, :3] = about_z(0.7) @ about_x(1.1)
-        found.append(("position", (3, 4, 5), np.concatenate([links, [across], [inverse_rigid(across)], [last]])))
+        found.append(("position", (3, 4, 5), np.concatenate([links, [across], [inverted(across)], [last]])))
     found.append(("planar_wrist", tuple(range(n, 6)), _with_any_joints(links, n)))
     return found
 
@@ -385,7 +385,7 @@ def _with_any_joints(links: Reals, n: int) -> Reals:
     back = np.eye(4)
     for step in more:
         back = back @ step
-    return np.array([*links[:-1], links[-1] @ more[0], *more[1:], inverse_rigid(back)])
+    return np.array([*links[:-1], links[-1] @ more[0], *more[1:], inverted(back)])
 
 
 def _with_joint_between(links: Reals, joint: int, axis: Reals) -> Reals:

@@ -14,6 +14,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from er3a.geometry.transforms import exp_rotation
 from er3a.geometry.vectors import Vector, wrap_to_pi
 from er3a.kinematics.chain import axes_of, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import ArmAngleArm, arm_angles_of, solve_at_arm_angle
@@ -616,18 +617,12 @@ class LinkedRows(ChainSolver):
         return self.chain.names(x)
 
 
-def _turned_back(v: Reals, axis: Reals, angle: float) -> Reals:
-    """A vector as seen with joint 1 at 0."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(c * v - s * np.cross(axis, v) + (1 - c) * (axis @ v) * axis)
-
-
 def _names_by_side(links: Reals, wrist_in_tool: Vector, x: Reals) -> tuple[SlotName, ...]:
     """Names by the side of axis 1 on which the wrist is in the zero pose x (n,), by the elbow and by the wrist."""
     (w1, w2, *_), points = axes_of(links)
     T = poses_of(links, x)
     W = T[:3, 3] + T[:3, :3] @ np.array(wrist_in_tool) - points[0]
-    side = float(np.cross(w1, w2) @ _turned_back(W, w1, x[0]))
+    side = float(np.cross(w1, w2) @ exp_rotation(-x[0] * w1) @ W)
     return _three_signs(w1, w2, side if abs(side) > BOUNDARY_M else 1.0)
 
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import TURN, Vector, dot, in_frame_of
-from er3a.kinematics.chain import axes_of, poses_of, size_of
+from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import (
     BLOCK,
     Rows,
@@ -109,20 +109,13 @@ def three_parallel(links: Reals) -> ThreeParallel | None:
     beside = [np.linalg.norm(np.cross(w, axes[k])) for k in (0, 4)] + [np.linalg.norm(np.cross(axes[4], axes[5]))]
     if min(beside) < 1e-6:
         return None
-    wrist = _meeting(axes[4], points[4], axes[5], points[5])
-    if wrist is None:
+    wrist, miss = meeting_point(axes[4:], points[4:])
+    if 2 * miss >= MEETS_M:
         return None
     constants = _constants(links, axes, points, wrist)
     if min(constants.upper_arm, constants.forearm) < MEETS_M:
         return None
     return ThreeParallel(np.ascontiguousarray(links, dtype=float), constants)
-
-
-def _meeting(a: Reals, p: Reals, b: Reals, r: Reals) -> Reals | None:
-    """Where two lines meet; None if they miss each other."""
-    n = np.cross(a, b)
-    s = np.linalg.solve(np.column_stack([a, -b, n]), r - p)
-    return p + s[0] * a if abs(s[2]) * np.linalg.norm(n) < MEETS_M else None
 
 
 def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> ParallelConstants:

@@ -19,7 +19,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 import scipy
 
-from er3a.kinematics.chain import inverse_rigid, invert_rigid, multiply_rigid, poses_of, size_of
+from er3a.geometry.transforms import inverted
+from er3a.kinematics.chain import invert_rigid, multiply_rigid, poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import Reading, equations_of_pose, readings_of, sampled_determinant
 from er3a.kinematics.classes.loop_rows import LoopMemory, hidden_angles, new_memory, pairs_at, remaining_joints
 from er3a.kinematics.classes.polish import SOLVES, newton, residual_and_jacobian, twin_start
@@ -126,7 +127,7 @@ def _trial(reading: Reading, links: Reals, T: Reals, memory: LoopMemory) -> floa
     """Share of poses in which this reading has a clear polynomial without dark places."""
     good = 0.0
     for pose in T:
-        equations_of_pose(reading, links[6] @ inverse_rigid(pose), memory.elimination)
+        equations_of_pose(reading, links[6] @ inverted(pose), memory.elimination)
         peak, noise = sampled_determinant(memory.elimination)
         if peak < FAMILY_PEAK or noise > LOUD * peak:
             continue

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.geometry.transforms import frame_along
+from er3a.geometry.transforms import frame_along, inverted
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.chain import axes_of, inverse_rigid, meeting_point, poses_of, size_of
+from er3a.kinematics.chain import axes_of, meeting_point, poses_of, size_of
 from er3a.kinematics.classes.arm_angle import SphericalConstants, spherical_constants
 from er3a.kinematics.classes.scara import wrist_angles
 from er3a.kinematics.classes.six_revolute import CERTAIN, SLOTS, UNCERTAIN, RowsFound, in_order
@@ -93,7 +93,7 @@ def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
     if miss > MEETS:
         return None
     before_3 = poses_of(L[:3], np.zeros(2))  # frame of joint 3 with all at 0
-    c = inverse_rigid(before_3)[:3, :3] @ centre + inverse_rigid(before_3)[:3, 3]
+    c = inverted(before_3)[:3, :3] @ centre + inverted(before_3)[:3, 3]
     slide, z, none = int(slides[0]), np.array([0.0, 0.0, 1.0]), np.zeros(3)
     (R1, t1), (R2, t2) = ((L[k, :3, :3], L[k, :3, 3]) for k in (1, 2))
     if slide == 2:
@@ -109,7 +109,7 @@ def slide_and_wrist(links: Reals, sliding: Flags) -> SlideAndWrist | None:
     wrist, G = spherical_constants(axes[3:], frame)
     T = poses_of(L, np.zeros(6))
     first, second = (j for j in range(3) if j != slide)
-    tool = inverse_rigid(T)
+    tool = inverted(T)
     in_tool = tool[:3, :3] @ centre + tool[:3, 3]
     sliding = np.asarray(sliding, dtype=bool)
     return SlideAndWrist(
@@ -162,7 +162,7 @@ def _before_wrist(arm: SlideAndWrist, T: Reals) -> tuple[Reals, Flags]:
     """Joints 1 to 3 (N, 4, 3) that take the wrist centre where the poses have it, NaN where there are none; poses in
     doubt (N,)."""
     centre = np.append(arm.centre_in_tool, 1.0)[:, None]
-    start = inverse_rigid(arm.links[0] @ arm.links[1] if arm.first == 1 else arm.links[0])
+    start = inverted(arm.links[0] @ arm.links[1] if arm.first == 1 else arm.links[0])
     A = (start @ (T @ centre))[:, :3, 0]
     places, doubt = _places(arm, A)
     X, Y, d = np.moveaxis(places, -1, 0)

@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.kinematics.chain import inverse_rigid, poses_of, size_of
+from er3a.geometry.transforms import inverted
+from er3a.kinematics.chain import poses_of, size_of
 from er3a.kinematics.classes.hidden_joint import HARMONICS, SAMPLE_ANGLES, SAMPLES
 from er3a.kinematics.classes.loop_rows import LoopMemory
 from er3a.kinematics.classes.polish import SOLVES
@@ -96,7 +97,7 @@ def two_slides(links: Reals, sliding: Flags) -> TwoSlides | None:
     scaled[:, :3, 3] /= size
     random = np.random.default_rng(7)
     q = random.uniform(-1, 1, (TRIALS, 6)) * np.where(sliding, 1.0, np.pi)
-    loops = scaled[6] @ inverse_rigid(poses_of(scaled, q, sliding)) @ scaled[0]
+    loops = scaled[6] @ inverted(poses_of(scaled, q, sliding)) @ scaled[0]
     ranked = []
     for number, (joint, sense, arranged, place, slides) in enumerate(_arrangements(scaled, sliding)):
         for power in (1, 2):
@@ -128,7 +129,7 @@ def _arrangements(links: Reals, sliding: Flags) -> list[tuple[Integers, float, R
                 continue
             arranged = np.array([links[k + 1] for k in order])
             if backwards:
-                arranged = inverse_rigid(arranged)
+                arranged = inverted(arranged)
             sense = -1.0 if backwards else 1.0
             found.append((joint, sense, arranged, order.index(5), np.asarray(sliding)[joint]))
     return found
@@ -150,7 +151,7 @@ def solve_two_slides(arm: TwoSlides, T: Reals) -> RowsFound:
 
 def _by_readings(arm: TwoSlides, T: Reals, memory: LoopMemory, q: Reals, count: Integers, certainty: Integers) -> None:
     """Fill rows (N, 16, 6), their number (N,) and certainty (N,), which starts as CONTINUUM."""
-    loops = arm.links[6] @ inverse_rigid(T) @ arm.links[0]
+    loops = arm.links[6] @ inverted(T) @ arm.links[0]
     far = _reach(loops) ** 2
     readings_used, left, moving = np.zeros(len(T), dtype=np.int64), np.arange(len(T)), np.zeros(len(T), dtype=bool)
     for reading in arm.readings:

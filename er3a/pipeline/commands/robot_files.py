@@ -297,11 +297,12 @@ def hand_eye(
     from er3a.files.hand_eye_file import HandEyeFile, read_calibration
     from er3a.files.robot_library import load_robot
     from er3a.files.yaml_file import load
+    from er3a.finding import plain
     from er3a.pipeline.messages.say import say
     from er3a.pipeline.messages.scope import assumed_text, gap_text
-    from er3a.pipeline.messages.vision import hand_eye_lines, hand_eye_record
+    from er3a.pipeline.messages.vision import hand_eye_lines
     from er3a.pipeline.scope import GAPS, Open
-    from er3a.pipeline.stages.vision.compute import open_of_calibration
+    from er3a.pipeline.stages.vision.compute import calibration_result, open_of_calibration
     from er3a.vision.boards import ambiguous_tilts
     from er3a.vision.hand_eye import calibrate_hand_eye, zeros_tried
     from er3a.vision.vision_findings import HandEyeError, grave_warnings
@@ -325,14 +326,14 @@ def hand_eye(
     ]
     not_checked = [gap_text(each) for each in missed if each.reason in GAPS]
     assumed = [assumed_text(each) for each in missed if each.reason not in GAPS]
+    touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if as_json:
-        record = hand_eye_record(found, boardless, open_tilts)
-        options.print_json(record | {"not_checked": not_checked, "assumed": assumed})
+        more = {"touch_contradicts": touched_elsewhere, "not_checked": not_checked, "assumed": assumed}
+        options.print_json(plain(calibration_result(head, found, images)) | more)
     else:
         sample_lines = [f"sample {say(each)}" for each in (*open_tilts, *boardless)]
         sample_lines += [f"not checked: {each}" for each in not_checked]
         sample_lines += [f"assumed: {each}" for each in assumed]
         print("\n".join([hand_eye_lines(found, boardless), *sample_lines]))
-    touched_elsewhere = found.touch is not None and found.touch.contradiction is not None
     if grave_warnings(found.warnings) or touched_elsewhere:
         raise typer.Exit(1)

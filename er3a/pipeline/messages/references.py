@@ -6,8 +6,7 @@ from er3a.finding import Amount, Finding, is_one
 from er3a.pipeline.language import as_text, own_title, tr, with_unit, words
 from er3a.pipeline.messages.pages import SIDES
 from er3a.pipeline.messages.say import FORMATS, WORDS, bracketed, joined, say, say_as, says, sentence, texts, word
-from er3a.references import subjects
-from er3a.references.rows import GROUPS, check_complete
+from er3a.references.subjects import Subject
 
 GROUP_WORDS = words(
     {
@@ -23,7 +22,6 @@ GROUP_WORDS = words(
 POINT_WORDS = words({"flange": "flange", "wrist_centre": "wrist centre"})
 SEGMENT_WORDS = words({"upper_arm": "upper arm from the vertical", "forearm": "forearm from the vertical"})
 LABELS = {"abs_x": "|x|"}
-check_complete("words for groups of references", GROUPS, GROUP_WORDS)
 STATUS_WORDS = words(
     {
         "settled": "settled",
@@ -127,25 +125,25 @@ WORDS.update(
 FORMATS["unit"] = tr
 
 
-AtPose = subjects.PointAtPose | subjects.OrientationAtPose | subjects.PoseExcess
+AT_POSE = ("point_at_pose", "orientation_at_pose", "pose_excess")
 
 
-def quoted(subject: subjects.Subject) -> str:
+def quoted(subject: Subject) -> str:
     """A subject within a sentence: the pose behind what is seen there."""
-    return bracketed(say_as(subject), own_title(subject.pose)) if isinstance(subject, AtPose) else say(subject)
+    return bracketed(say_as(subject), own_title(subject.pose)) if is_one(subject, *AT_POSE) else say(subject)
 
 
-@say.register
-def _(found: AtPose) -> str:
+@says(*AT_POSE)
+def _(found: Subject) -> str:
     return sentence("at_pose", own_pose=own_title(found.pose), seen=say_as(found))
 
 
-@say.register
-def _(found: subjects.MotionOfJoint) -> str:
+@says("motion_of_joint")
+def _(found: Subject) -> str:
     return say_as(found, motion=motion_seen(found))
 
 
-def motion_seen(found: subjects.MotionOfJoint) -> str:
+def motion_seen(found: Finding) -> str:
     """What is seen, as a clause."""
     manner, *others = found.seen.split("_")
     way = word("way", WAYS, others[-1] if others else manner)
@@ -154,7 +152,7 @@ def motion_seen(found: subjects.MotionOfJoint) -> str:
 
 @says("look_at_motion")
 def _(found: Finding) -> str:
-    motion = motion_seen(subjects.MotionOfJoint(found.joint, found.point, found.seen))
+    motion = motion_seen(found)
     pose = joined([as_text(angle, "g") for angle in found.pose_deg], ", ")
     start = with_unit(f"({pose})", "deg") if any(found.pose_deg) else tr("the zero pose")
     return say_as(found, start=start, motion=motion)

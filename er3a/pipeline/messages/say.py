@@ -39,7 +39,7 @@ from functools import singledispatch
 from string import Formatter
 from typing import Any
 
-from er3a.finding import Amount, AnyFinding
+from er3a.finding import Amount
 from er3a.finding import Finding as Found
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
@@ -78,9 +78,6 @@ TEXTS = texts(
         "more": "{count} more",
         "stage.not_computed": "Not computed: {reason}",
         "stage.not_examined": "This stage has not been computed yet.",
-        "page.last_run": (
-            "The last run of this study did not end well, so this page may tell of what was before: {problem}"
-        ),
         "stage.outdated": "Changed since, so this tells of what was before (run the study again): {names}. {text}",
     }
 )
@@ -125,10 +122,8 @@ def same_text(key: str, *codes: str) -> None:
     MAKERS.update(dict.fromkeys(codes, lambda found: sentence(key, **_params(found))))
 
 
-def _params(finding: Any) -> Mapping[str, Any]:
-    if isinstance(finding, Found):
-        return {"assumed": finding.basis == "assumed", **finding.params}
-    return {name: getattr(finding, name) for name in finding.__dataclass_fields__}
+def _params(finding: Found) -> Mapping[str, Any]:
+    return {"assumed": finding.basis == "assumed", **finding.params}
 
 
 def excerpt(text: str) -> str:
@@ -136,7 +131,7 @@ def excerpt(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:EXCERPT]} …"
 
 
-def say_as(finding: AnyFinding, /, **parts: Any) -> str:
+def say_as(finding: Found, /, **parts: Any) -> str:
     """A finding's text, with parts besides its own fields or in place of them."""
     return sentence(finding.code, **{**_params(finding), **parts})
 
@@ -201,12 +196,12 @@ def word(code: str, words: Mapping[Any, str], key: Any) -> str:
     return language.translated(code, words[key]) if key in words else key
 
 
-def listed(findings: Iterable[AnyFinding]) -> list[str]:
+def listed(findings: Iterable[Found]) -> list[str]:
     """Each finding's text."""
     return [say(finding) for finding in findings]
 
 
-def say_all(findings: Iterable[AnyFinding]) -> str:
+def say_all(findings: Iterable[Found]) -> str:
     """Findings, each a sentence, one after the other."""
     return joined(listed(findings), " ")
 

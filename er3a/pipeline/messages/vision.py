@@ -208,48 +208,5 @@ def hand_eye_lines(found: HandEye, boardless: Sequence[Finding] = ()) -> str:
         lines.append(f"touched points: {far:.2g} mm apart at most, probability {found.touch.probability:.2g}")
         lines += [f"warning: {say(each)}" for each in (found.touch.contradiction,) if each]
     lines += [f"sample {say(each)}" for each in found.suspects]
-    if found.without_suspects is not None:
-        mm, deg = 1000 * found.without_suspects[0], np.degrees(found.without_suspects[1])
-        lines.append(f"if included, they would move the camera by {mm:.3g} mm and {deg:.2g} deg")
     lines += [f"warning: {say(each)}" for each in found.warnings]
     return "\n".join(lines)
-
-
-def hand_eye_record(
-    found: HandEye,
-    boardless: Sequence[Finding] = (),
-    open_tilts: Sequence[Finding] = (),
-) -> dict[str, object]:
-    """A calibration as plain data, for another program; half widths of 95 % intervals in mm and deg.
-
-    ``boardless``: images that it leaves out; ``open_tilts``: those that leave open which way the board is tilted.
-    """
-
-    def named(findings: Sequence[Finding]) -> list[dict[str, str]]:
-        return [{"code": each.code, "sample": each.sample, "text": say(each)} for each in findings]
-
-    def pose(T: np.ndarray, half: np.ndarray) -> dict[str, object]:
-        return {
-            "matrix": T.tolist(),
-            "xyz_mm": (1000 * T[:3, 3]).tolist(),
-            "quaternion_wxyz": quaternion_of(T).tolist(),
-            "half_width_mm": (1000 * half[:3]).tolist(),
-            "half_width_deg": np.degrees(half[3:]).tolist(),
-        }
-
-    return {
-        "setup": found.samples.setup,
-        "samples": len(found.samples) + len(boardless),
-        "used": [name for name, used in zip(found.samples.names, found.used) if used],
-        "hand_eye": pose(found.X, found.half_width[:6]),
-        "board": pose(found.Y, found.half_width[6:]),
-        "scatter": found.scatter,
-        "camera_mm": float(1000 * found.deviations[0]),
-        "camera_deg": float(np.degrees(found.deviations[1])),
-        "suspects": named(found.suspects),
-        "left_out": named(boardless),
-        "open_tilts": named(open_tilts),
-        "warnings": [{"code": each.code, "text": say(each)} for each in found.warnings],
-        "touch_probability": found.touch.probability if found.touch else None,
-        "touch_contradicts": found.touch is not None and found.touch.contradiction is not None,
-    }

@@ -42,13 +42,12 @@ from er3a.pipeline.stages.covered import (
 from er3a.pipeline.stages.expectations import demonstrations, pass_of, unmet_expectations
 from er3a.pipeline.stages.inverse import model
 from er3a.pipeline.stages.inverse.entry import InverseSettings
-from er3a.pipeline.stages.trajectory.motion import limits_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import limit_margin, meant, shown, unit_compared
 from er3a.robots.robot import Robot
 from er3a.selection.nearest import Choice, nearest
 from er3a.selection.rule_names import RuleName
-from er3a.selection.select import RULES, MoveRule, available_rules, best_of_sets, mixed_cost, refusals
+from er3a.selection.select import RULES, available_rules, mixed_cost, refusals
 
 SINGULAR = 1e-6  # sine of an angle, m from axis 1, or singular value (no unit): far above rounding
 LITTLE_MARGIN_DEG = 2.0  # mm of a prismatic joint; as much as grasps and boxes are asked for by default
@@ -323,47 +322,6 @@ def _places(cost: Reals, free: Flags) -> Integers:
     return np.where(free, better + 1, 0)
 
 
-def sequence(
-    robot: Robot,
-    targets: tuple[Target, ...],
-    solved: list[SolvedTarget],
-    acceleration: Reals | None = None,
-) -> model.VisitOrder | None:
-    """Visiting all targets that are reached, in their order: the best solutions as a whole, against the greedy ones.
-
-    Parameters
-    ----------
-    targets : of which the first gives the joints to start from
-    solved : one for each target
-    acceleration : (n,), rad/s^2 or m/s^2, for times of moves; None counts speeds alone
-
-    Returns
-    -------
-    order : by time if the speeds are known, else by the joint moves; None for fewer than two targets
-    """
-    reached = [one for one in solved if one.result.chosen_deg is not None]
-    if len(reached) < 2:
-        return None
-    rule: MoveRule = "time" if "time" in available_rules(robot) else "nearest"
-    # A rank of 0 marks what is refused.
-    usable = [np.flatnonzero(one.rows.rank) for one in reached]
-    sets = [one.solutions.q[rows] for one, rows in zip(reached, usable)]
-    found = best_of_sets(robot, sets, targets[0].q_ref, rule, acceleration)
-    stops = tuple(
-        model.Stop(
-            target=one.result.name,
-            branch=int(one.rows.branch[rows[row]]),
-            label=one.rows.label[rows[row]],
-            q_deg=tuple(shown(robot, q).tolist()),
-            greedy_branch=int(one.rows.branch[rows[greedy]]),
-            greedy_label=one.rows.label[rows[greedy]],
-        )
-        for one, rows, row, q, greedy in zip(reached, usable, found.rows, found.q, found.greedy_rows)
-    )
-    differs = bool((found.rows != found.greedy_rows).any())
-    return model.VisitOrder(rule, found.cost, found.greedy_cost, stops, differs)
-
-
 STAGE_NAME = "inverse"
 REPRODUCED_M = 1e-9  # by which a solution may miss its target: far above the rounding of a solution in closed form
 REPRODUCED_RAD = 1e-9
@@ -422,7 +380,6 @@ def compute(study: Study, name: str) -> model.InverseResults:
         scene=scene.title if scene else None,
         turns=not many,
         targets=results,
-        sequence=sequence(robot, targets, solved, limits_of(robot, motion).acceleration),
         round_trips=_round_trips(trips) if trips else None,
         checked=_checked(
             results,

@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.collision.pairs import Pair
 from er3a.finding import Finding
-from er3a.kinematics.solutions import Label, Method, TargetOutcome, Unsolved
+from er3a.kinematics.solutions import Method, TargetOutcome, Unsolved
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
@@ -104,34 +104,6 @@ class TargetResult:
 
 
 @dataclass(frozen=True)
-class Stop:
-    """A target in a sequence: its solution when all are chosen as a whole, and the branch taken greedily."""
-
-    target: str
-    branch: int
-    label: Label
-    q_deg: tuple[float, ...]
-    greedy_branch: int
-    greedy_label: Label
-
-
-@dataclass(frozen=True)
-class VisitOrder:
-    """All targets that can be reached, in order; costs in the rule's unit.
-
-    Attributes
-    ----------
-    differs : whether the greedy solutions (turns included) are others
-    """
-
-    rule: RuleName
-    cost: float
-    greedy_cost: float
-    stops: tuple[Stop, ...]
-    differs: bool
-
-
-@dataclass(frozen=True)
 class RoundTrips:
     """Random joints to poses and back (``kinematics.round_trips.BatchRoundTrips``).
 
@@ -168,7 +140,6 @@ class InverseSummary(Summary):
     scene: str | None
     turns: bool
     targets: tuple[TargetResult, ...]
-    sequence: VisitOrder | None
     round_trips: RoundTrips | None
 
 

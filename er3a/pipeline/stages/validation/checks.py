@@ -33,7 +33,6 @@ from er3a.pipeline.stages.validation import model
 from er3a.references.quantities import Quantity, undecided_from
 from er3a.references.reference import Reference, ReferenceSet, conflicts, expected_of
 from er3a.references.rows import GROUPS, AxisRow
-from er3a.references.subjects import AxisPosition, JointLimit, JointSpeed, ReferenceSubject
 from er3a.robots.robot import AUTHORITATIVE_GRADES, Robot
 
 ROUNDING = 1e-9  # in the unit of a reference (mm, deg, mm/s, deg/s): what reading and predicting it lose at most
@@ -58,7 +57,9 @@ def against_itself(
     note : of what the check leaves out
     """
     status: Literal["pass", "fail"] = "pass" if abs(measured) <= tolerance else "fail"
-    return model.Judged(measured, 0.0, measured, tolerance, unit, model.SelfCheck(quantity), group, status, note)
+    return model.Judged(
+        measured, 0.0, measured, tolerance, unit, fact("self_check", quantity=quantity), group, status, note
+    )
 
 
 def checks_of_set(
@@ -193,7 +194,7 @@ def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[mode
     ]
     present = {reference.group for reference in references.references}
     gaps += [
-        model.Unjudged(model.WholeGroup(group), group, "", note, reference_set=name)
+        model.Unjudged(fact("whole_group", group=group), group, "", note, reference_set=name)
         for group in GROUPS
         if group not in present
     ]
@@ -202,12 +203,10 @@ def _gaps(references: ReferenceSet, slides: Sequence[bool] | Flags) -> list[mode
     with_axis = {row.joint for row in references.of(AxisRow)}
     for joint in range(1, len(slides) + 1):
         if "axes" in present and joint not in with_axis:
-            gaps.append(model.Unjudged(AxisPosition(joint, None), "axes", "mm", note, reference_set=name))
-        wanted: list[tuple[str, ReferenceSubject]] = [
-            ("limits", JointLimit(joint, "lower")),
-            ("limits", JointLimit(joint, "upper")),
-            ("speeds", JointSpeed(joint)),
-        ]
+            axis = fact("axis_position", joint=joint, coordinate=None)
+            gaps.append(model.Unjudged(axis, "axes", "mm", note, reference_set=name))
+        wanted = [("limits", fact("joint_limit", joint=joint, side=side)) for side in ("lower", "upper")]
+        wanted.append(("speeds", fact("joint_speed", joint=joint)))
         units = ("mm", "mm/s") if slides[joint - 1] else ("deg", "deg/s")
         gaps += [
             model.Unjudged(subject, group, units[group == "speeds"], note, reference_set=name)
@@ -245,7 +244,7 @@ def table_checks(robot: Robot) -> list[model.Check]:
     checks = [against_itself(name, "table_sanity", float(count), NONE_ALLOWED) for name, count in faults.items()]
     missing = fact("numbers_missing") if checks[0].status == "fail" else wrist_partition_missing(robot)
     if missing:
-        return [*checks, model.Unjudged(model.SelfCheck("closed_form"), "table_sanity", "", missing)]
+        return [*checks, model.Unjudged(fact("self_check", quantity="closed_form"), "table_sanity", "", missing)]
     return [*checks, against_itself("closed_form", "table_sanity", 0.0, NONE_ALLOWED)]
 
 
@@ -266,7 +265,10 @@ def round_trip_checks(robot: Robot, poses: int, seed: int) -> tuple[list[model.C
     if missing and not round_trips.has_class(robot):
         return [
             model.Unjudged(
-                model.SelfCheck("joints_to_pose_to_joints"), GROUP, "deg", fact("no_closed_form", missing=missing)
+                fact("self_check", quantity="joints_to_pose_to_joints"),
+                GROUP,
+                "deg",
+                fact("no_closed_form", missing=missing),
             )
         ], None
     by_class = missing is not None or robot.coupling is not None

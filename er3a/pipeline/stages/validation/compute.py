@@ -39,7 +39,6 @@ from er3a.references import quantities
 from er3a.references.predict import read, search, state_of
 from er3a.references.reference import Documents, ReferenceSet, quantities_of
 from er3a.references.rows import GROUPS, AxisRow, PositionRow
-from er3a.references.subjects import Reach
 from er3a.robots.joint_limits import meant, size_of
 from er3a.robots.robot import Robot
 
@@ -238,7 +237,7 @@ def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator
         for check in checks
         if isinstance(check, model.Unjudged)
         and check.group in GROUPS
-        and (check.group not in groups if isinstance(check.subject, model.WholeGroup) else check.subject not in judged)
+        and (check.group not in groups if is_one(check.subject, "whole_group") else check.subject not in judged)
     }
     if unstated := tuple(group for group in GROUPS if group in missing or group not in groups):
         yield Open("references", unstated)
@@ -308,9 +307,9 @@ def _without_reference(
 ) -> list[model.Unjudged]:
     """Reach that no reference gives, as measured."""
     stated = {check.subject for check in checks}
-    subjects = {Reach(distance.extreme, distance.point, distance.axis): distance for distance in always_searched(robot)}
-    return [
-        model.Unjudged(subject, "reach", "mm", fact("in_no_set"), measured=values[distance])
-        for subject, distance in subjects.items()
-        if subject not in stated
-    ]
+    found = []
+    for each in always_searched(robot):
+        subject = fact("reach", extreme=each.extreme, point=each.point, axis=each.axis)
+        if subject not in stated:
+            found.append(model.Unjudged(subject, "reach", "mm", fact("in_no_set"), measured=values[each]))
+    return found

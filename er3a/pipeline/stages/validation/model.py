@@ -18,7 +18,7 @@ from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary
 from er3a.pipeline.study import Study
 from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_joint, vector
-from er3a.references.subjects import ReferenceSubject, Subject
+from er3a.references.subjects import Subject
 from er3a.robots.robot import Grade, Robot
 
 ModelGroup = Literal["table_sanity", "round_trips"]
@@ -35,21 +35,6 @@ SelfChecked = Literal[
     "position_error",
     "orientation_error",
 ]
-
-
-class SelfCheck(Subject):
-    """A check of the model that needs no document."""
-
-    quantity: SelfChecked
-
-
-class WholeGroup(Subject):
-    """All that references of a group could say."""
-
-    group: str
-
-
-CheckSubject = ReferenceSubject | SelfCheck | WholeGroup
 
 
 Note = Finding | ClosedFormMissing
@@ -71,7 +56,7 @@ class Judged:
     difference: float
     tolerance: float
     unit: str
-    subject: CheckSubject
+    subject: Subject
     group: str
     status: Literal["pass", "fail", "conflict"]
     note: Finding | None = None
@@ -91,7 +76,7 @@ class Judged:
 class Unjudged:
     """What could be checked, had the sources, or the robot's file, a value."""
 
-    subject: CheckSubject
+    subject: Subject
     group: str
     unit: str
     note: Note
@@ -126,7 +111,7 @@ class Conflict:
     """References of one set about one number that no model can meet all."""
 
     reference_set: str
-    subject: ReferenceSubject
+    subject: Subject
     unit: str
     measured: float
     statements: tuple[Statement, ...]

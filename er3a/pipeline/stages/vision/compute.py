@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,7 @@ from er3a.vision.field_of_view import in_sight
 from er3a.vision.grasp_motion import PARTS
 from er3a.vision.grasping import ChosenGrasp, DetectedObject, GraspNeeds, GraspPlan, GraspTask, plan_grasp
 from er3a.vision.hand_eye import HandEye, TouchCheck, calibrate_hand_eye, spread_of, zeros_tried
-from er3a.vision.point_error import ArmAccuracy, SeenPoseError, error_sizes, seen_pose, seen_pose_error
+from er3a.vision.point_error import SeenPoseError, error_sizes, seen_pose, seen_pose_error
 from er3a.vision.vision_findings import HandEyeError, grave_warnings
 
 
@@ -61,7 +62,6 @@ def calibration_result(
     result : mm and deg
     """
     spread, turned = spread_of(found)
-    moved, tilted = (None, None) if found.without_suspects is None else found.without_suspects
     boardless = images.boardless if images else ()
     return stated(
         model.CalibrationResult,
@@ -79,8 +79,6 @@ def calibration_result(
         camera_deg=from_si("deg", found.deviations[1]),
         spread_mm=from_si("mm", spread),
         spread_deg=from_si("deg", turned),
-        moved_mm=from_si("mm", moved),
-        moved_deg=from_si("deg", tilted),
         touch=_touch(found),
         open_tilts=ambiguous_tilts(images.views, found.samples.names) if images else (),
         boardless=boardless,
@@ -200,19 +198,17 @@ def compute(study: Study, name: str) -> model.VisionResults:
         return _without_calibration(error, task_file, title, settings)
     found = with_zeros[0]
     picture = None if head.setup == "eye_to_hand" else meant(robot, np.array(task_file.picture_deg))
-    camera = _camera_at(robot, found, picture)
-    places = {each.name: camera @ each.pose() for each in task_file.objects}
+    cell = _Cell(robot, task_file, found, picture)
     calibration = calibration_result(head, found, images)
     doubt = _doubt(calibration, found.touch)
-    limits = (limits_of(robot, motions), study.seed)
-    planned = [] if doubt else _planned(robot, task_file, found, scene, (settings, picture), limits)
-    objects = tuple(_object(robot, entry, places[entry.name], plan, error) for entry, plan, error in planned)
+    planned = [] if doubt else list(_planned(cell, scene, settings, limits_of(robot, motions), study.seed))
+    objects = tuple(_object(robot, entry, cell.place(entry), plan) for entry, plan in planned)
     shapes = _shapes(robot, objects, study.assumed_margin(name))
     near = shapes.near if shapes else ()
     open_points = (
         *of_file,
         *open_of_calibration(samples, head, images, with_zeros, task_file.gripper.tolerance_mm),
-        *gaps_in_solids(scene, _places(robot, task_file, found, picture)),
+        *gaps_in_solids(scene, cell.places_asked()),
         *(() if scene and scene.carried else (Open("gripper"),)),
     )
     gaps = (*seen.gaps, *(each for each in open_points if each.reason in GAPS))
@@ -236,17 +232,41 @@ def compute(study: Study, name: str) -> model.VisionResults:
     )
 
 
-def _places(
-    robot: Robot, file: VisionFile, found: HandEye, picture: Reals | None
-) -> Iterator[tuple[str, Reals, float]]:
-    """Where the objects are that are to be grasped (3,), m, and what 95 % of the errors of that stay below, m: one that
-    stands on a solid may seem sunk in it by so much."""
-    camera, accuracy = _camera_at(robot, found, picture), file.arm.accuracy()
-    home = meant(robot, np.array(file.home_deg))
-    for each in file.objects:
-        if each.expect in (None, "grasped"):
-            error = _error_at(found, each.detected(), accuracy, (robot, picture), home)
-            yield each.name, (camera @ each.pose())[:3, 3], float(error_sizes(error.camera + error.calibration)[0])
+@dataclass(frozen=True, eq=False)
+class _Cell:
+    """An arm before the objects of a file, its camera calibrated.
+
+    ``picture`` (n,), rad or m: where a camera on the flange saw the objects; None for a fixed one.
+    """
+
+    robot: Robot
+    file: VisionFile
+    found: HandEye
+    picture: Reals | None
+
+    @cached_property
+    def home(self) -> Reals:
+        """Where the arm waits, (n,), rad or m."""
+        return meant(self.robot, np.array(self.file.home_deg))
+
+    def place(self, entry: ObjectEntry) -> Reals:
+        """T_base_object (4, 4), m."""
+        flange = None if self.picture is None else forward(self.robot.without_tool(), self.picture)
+        return seen_pose(self.found, entry.pose(), flange)
+
+    def error_at(self, target: DetectedObject, q: Reals) -> SeenPoseError:
+        """The error of an object's pose as the tool meets it at joint values (n,)."""
+        arm = self.robot, q, self.picture
+        return seen_pose_error(self.found, target.T_camera_object, target.covariance, self.file.arm.accuracy(), arm)
+
+    def places_asked(self) -> Iterator[tuple[str, Reals, float]]:
+        """Where the objects are that are to be grasped (3,), m, and what 95 % of the errors of that stay below, m: one
+        that stands on a solid may seem sunk in it by so much."""
+        for each in self.file.objects:
+            if each.expect in (None, "grasped"):
+                error = self.error_at(each.detected(), self.home)
+                sunk = float(error_sizes(error.camera + error.calibration)[0])
+                yield each.name, self.place(each)[:3, 3], sunk
 
 
 def _asked(objects: Sequence[model.ObjectResult], found: HandEye) -> dict[Check, tuple[int, int]]:
@@ -346,12 +366,6 @@ def _shapes(robot: Robot, objects: tuple[model.ObjectResult, ...], margin: float
     return shapes_assumed(robot, margin, near) if objects else None
 
 
-def _camera_at(robot: Robot, found: HandEye, picture: Reals | None) -> Reals:
-    """T_base_camera (4, 4) when the objects were seen."""
-    placed: Reals = seen_pose(found, np.eye(4), None if picture is None else forward(robot.without_tool(), picture))
-    return placed
-
-
 def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding | None:
     """Why no grasp may rest on a calibration; None if nothing contradicts it."""
     if doubts := grave_warnings(found.warnings):
@@ -359,19 +373,14 @@ def _doubt(found: model.CalibrationResult, touch: TouchCheck | None) -> Finding 
     return touch.contradiction if touch else None
 
 
-Planned = list[tuple[ObjectEntry, GraspPlan, SeenPoseError | None]]
+Planned = list[tuple[ObjectEntry, GraspPlan]]
 
 
 def _planned(
-    robot: Robot,
-    task_file: VisionFile,
-    found: HandEye,
-    scene: Scene | None,
-    asked: tuple[VisionSettings, Reals | None],
-    motion: tuple[JointLimits, int],
-) -> Planned:
-    (settings, picture), (limits, seed) = asked, motion
-    tolerance = (*(mm / 1000 for mm in task_file.gripper.tolerance_mm), *np.radians(task_file.gripper.tolerance_deg))
+    cell: _Cell, scene: Scene | None, settings: VisionSettings, limits: JointLimits, seed: int
+) -> Iterator[tuple[ObjectEntry, GraspPlan]]:
+    gripper = cell.file.gripper
+    tolerance = (*(mm / 1000 for mm in gripper.tolerance_mm), *np.radians(gripper.tolerance_deg))
     needs = GraspNeeds(
         settings.least_clearance_mm / 1000,
         float(np.radians(settings.least_limit_margin_deg)),
@@ -380,43 +389,19 @@ def _planned(
         settings.least_success,
     )
     speed = settings.line_speed_mm_s / 1000
-    task = GraspTask(
-        robot, Bodies(robot, scene), meant(robot, np.array(task_file.home_deg)), needs, limits, speed, seed
-    )
-    accuracy = task_file.arm.accuracy()
-    camera = _camera_at(robot, found, picture)
-    rows: Planned = []
-    for entry in task_file.objects:
+    task = GraspTask(cell.robot, Bodies(cell.robot, scene), cell.home, needs, limits, speed, seed)
+    for entry in cell.file.objects:
         target = entry.detected()
-        error_at = partial(_error_at, found, target, accuracy, (robot, picture))
-        plan = plan_grasp(task, target, camera @ target.T_camera_object, partial(_covariance_at, error_at))
-        rows.append((entry, plan, error_at(plan.chosen.q) if plan.chosen else None))
-    return rows
+        yield entry, plan_grasp(task, target, cell.place(entry), partial(cell.error_at, target))
 
 
-def _covariance_at(error_at: Callable[[Reals], SeenPoseError], q: Reals) -> Reals:
-    return error_at(q).whole
-
-
-def _error_at(
-    found: HandEye, target: DetectedObject, accuracy: ArmAccuracy, arm: tuple[Robot, Reals | None], q: Reals
-) -> SeenPoseError:
-    return seen_pose_error(found, target.T_camera_object, target.covariance, accuracy, (arm[0], q, arm[1]))
-
-
-def _object(
-    robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan, error: SeenPoseError | None
-) -> model.ObjectResult:
-    parts = (
-        None
-        if error is None
-        else np.array(
-            [
-                error_sizes(part)
-                for part in (error.camera, error.calibration, error.repeatability, error.table, error.whole)
-            ]
-        )
-    )
+def _object(robot: Robot, entry: ObjectEntry, T: Reals, plan: GraspPlan) -> model.ObjectResult:
+    error_mm = error_deg = None
+    if (error := plan.error) is not None:
+        causes = error.camera, error.calibration, error.repeatability, error.table, error.whole
+        distances, angles = zip(*map(error_sizes, causes))
+        error_mm = model.ErrorParts(*(1000 * np.array(distances)).tolist())
+        error_deg = model.ErrorParts(*np.degrees(angles).tolist())
     return stated(
         model.ObjectResult,
         plan,
@@ -425,8 +410,8 @@ def _object(
         **_pose(T),
         outcome="grasped" if plan.chosen else "not graspable",
         expect=entry.expect,
-        error_mm=None if parts is None else model.ErrorParts(*(1000 * parts[:, 0]).tolist()),
-        error_deg=None if parts is None else model.ErrorParts(*np.degrees(parts[:, 1]).tolist()),
+        error_mm=error_mm,
+        error_deg=error_deg,
         grasp=_grasp(robot, plan.chosen) if plan.chosen else None,
     )
 
@@ -521,7 +506,7 @@ def figures_of(
 
 def _all_ways(robot: Robot, planned: Planned) -> model.PathRows:
     """The motions of all grasps."""
-    found = (_ways(robot, entry.name, plan.chosen) for entry, plan, _ in planned if plan.chosen)
+    found = (_ways(robot, entry.name, plan.chosen) for entry, plan in planned if plan.chosen)
     return model.PathRows.stacked(found).of_joints(robot.slides)
 
 

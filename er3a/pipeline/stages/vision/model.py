@@ -55,7 +55,6 @@ class CalibrationResult:
     scatter : root mean square of the residuals in stated standard deviations
     camera_mm, camera_deg : the camera's standard deviation by axis, root mean square of the three
     spread_mm, spread_deg : root mean square distance of the board's places, by sample, from their mean
-    moved_mm, moved_deg : how far the hand-eye pose would be off with the samples that were left out; None without any
     copies : samples left out as exact copies of earlier ones
     open_tilts : images that leave open which way the board is tilted; boardless : images left out, without a board
     intrinsics_estimated : from the same images; the intervals include their errors
@@ -80,8 +79,6 @@ class CalibrationResult:
     axes_apart_deg: float
     suspects: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
-    moved_mm: float | None
-    moved_deg: float | None
     touch: TouchResult | None
     open_tilts: tuple[Finding, ...] = ()
     boardless: tuple[Finding, ...] = ()

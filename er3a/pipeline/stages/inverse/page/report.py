@@ -13,7 +13,7 @@ from er3a.finding import is_one
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
-from er3a.pipeline.messages.kinematics import RULE_TITLES, branch_word, singularity_word
+from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
@@ -24,7 +24,6 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
 from er3a.robots.robot import Robot
-from er3a.selection.select import RULES
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
@@ -53,10 +52,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
         units=_units(robot),
         slides=bool(robot.slides.any()),
-        optimised_heading=tr("J1 to J{count}, optimised ({units})", count=robot.joints, units=_units(robot)),
         trips=trips,
-        stops=_stops(summary.sequence, {target.name for target in chosen}),
-        move=_move_rule(robot, summary.sequence),
     )
 
 
@@ -183,26 +179,6 @@ def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
         if family.within_limits
         else tr("but every member leaves the limits"),
     )
-
-
-def _move_rule(robot: Robot, sequence: model.VisitOrder | None) -> tuple[str, str]:
-    """Unit and title of the rule that moves in the sequence are ranked by."""
-    if sequence is None:
-        return "", ""
-    return tr(RULES[sequence.rule].unit_of(robot)), word("rule.title", RULE_TITLES, sequence.rule)
-
-
-def _stops(sequence: model.VisitOrder | None, named: set[str]) -> list[list[str]]:
-    return [
-        [
-            stop.target,
-            _short(stop.label, stop.branch),
-            _short(stop.greedy_label, stop.greedy_branch),
-            _joints(stop.q_deg),
-        ]
-        for stop in (sequence.stops if sequence else ())
-        if stop.target in named
-    ]
 
 
 def _clearance(target: model.TargetResult) -> str:

@@ -49,7 +49,6 @@ from er3a.pipeline.viewing.side_view import (
     seen_arm,
     side_view,
 )
-from er3a.references.subjects import Reach
 from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
@@ -191,7 +190,7 @@ def _disputed(robot: Robot, conflicts: Iterable[model.Conflict]) -> list[Label]:
             start=np.array([0.0, height]),
         )
         for each in conflicts
-        if isinstance(each.subject, Reach) and each.subject.axis == 1
+        if is_one(each.subject, "reach") and each.subject.axis == 1
     ]
 
 

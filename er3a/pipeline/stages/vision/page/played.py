@@ -64,8 +64,8 @@ def grasp_moment(results: VisionResults, each: ObjectResult) -> tuple[str, float
     return each.name, float(rows.t_s[-1]) if len(rows) else 0.0
 
 
-def placed(pose: PoseEstimate) -> Reals:
-    """A pose as a transform (4, 4), m."""
+def placed(pose: PoseEstimate | ObjectResult) -> Reals:
+    """A pose, or where an object is, as a transform (4, 4), m."""
     R = scipy.spatial.transform.Rotation.from_quat(pose.quaternion_wxyz, scalar_first=True).as_matrix()
     return posed(R, np.array(pose.xyz_mm) / 1000)
 
@@ -111,7 +111,5 @@ def _metres(xyz_mm: Sequence[float]) -> tuple[float, float, float]:
 
 
 def _object(each: ObjectResult) -> Shape:
-    R = scipy.spatial.transform.Rotation.from_quat(each.quaternion_wxyz, scalar_first=True).as_matrix()
-    T = posed(R, np.array(each.xyz_mm) / 1000)
-    colour = VERDICTS["pass" if each.grasp else "fail"]
-    return {"frame": 0, "name": each.name, "kind": "box", "T": T.tolist(), "size": OBJECT_M, "colour": colour}
+    colour, T = VERDICTS["pass" if each.grasp else "fail"], placed(each).tolist()
+    return {"frame": 0, "name": each.name, "kind": "box", "T": T, "size": OBJECT_M, "colour": colour}

@@ -77,7 +77,6 @@ def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str,
     if not fixed:
         camera = forward(robot.without_tool(), meant(robot, np.array(task.picture_deg or task.home_deg))) @ camera
     half = np.tan(np.radians([task.view.horizontal_deg, task.view.vertical_deg]) / 2)
-    place = rr.Transform3D(translation=camera[:3, 3], mat3x3=camera[:3, :3])
     sight = rr.Pinhole(
         resolution=IMAGE * half / half[0],
         focal_length=float(IMAGE / 2 / half[0]),
@@ -85,12 +84,15 @@ def _camera(robot: Robot, task: VisionFile, summary: VisionSummary) -> dict[str,
         image_plane_distance=SIGHT * task.view.farthest_mm / 1000,
         color=rgb(REFERENCE),
     )
-    shapes: dict[str, Logged] = {"camera": [place, sight]}
+    shapes: dict[str, Logged] = {"camera": [_at(camera), sight]}
     if not fixed:
-        board = placed(found.board)
-        place = rr.Transform3D(translation=board[:3, 3], mat3x3=board[:3, :3])
-        shapes["board"] = [place, rr.Arrows3D(vectors=0.08 * np.eye(3), colors=AXES, radii=0.002)]
+        shapes["board"] = [_at(placed(found.board)), rr.Arrows3D(vectors=0.08 * np.eye(3), colors=AXES, radii=0.002)]
     return shapes
+
+
+def _at(T: Reals) -> rr.Transform3D:
+    """Where a shape is, (4, 4), m."""
+    return rr.Transform3D(translation=T[:3, 3], mat3x3=T[:3, :3])
 
 
 def _samples(rows: SampleRows, size: float) -> dict[str, Logged]:
@@ -108,12 +110,10 @@ def _samples(rows: SampleRows, size: float) -> dict[str, Logged]:
 
 
 def _object(each: ObjectResult, size: float) -> dict[str, Logged]:
-    w, x, y, z = each.quaternion_wxyz
-    place = rr.Transform3D(translation=np.array(each.xyz_mm) / 1000, quaternion=rr.Quaternion(xyzw=[x, y, z, w]))
     colour, entity = rgb(VERDICTS["pass" if each.grasp else "fail"]), f"objects/{each.name}"
     box = rr.Boxes3D(sizes=[OBJECT_M], colors=[colour], labels=[each.name], show_labels=True)
     axes = rr.Arrows3D(vectors=0.07 * size * np.eye(3), colors=AXES, radii=0.002)
-    shapes: dict[str, Logged] = {entity: [place, box], f"{entity}/axes": axes}
+    shapes: dict[str, Logged] = {entity: [_at(placed(each)), box], f"{entity}/axes": axes}
     if each.error_mm:
         shapes[f"{entity}/error"] = rr.Ellipsoids3D(radii=[each.error_mm.together / 1000], colors=[rgb(HIGHLIGHT)])
     return shapes
