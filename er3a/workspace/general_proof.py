@@ -146,7 +146,7 @@ def _azimuth(arm: GeneralArm, x: float, y: float) -> float:
     return y * TURN / arm.bar if arm.bar > 0.0 else np.arctan2(y, x)
 
 
-@kernel
+@inner_kernel
 def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
     """Row values of joint values, with joint 1 at 0."""
     n, m = arm.drive.shape
@@ -158,7 +158,7 @@ def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
         theta[k] = total
 
 
-@kernel
+@inner_kernel
 def _allowed(arm: GeneralArm, v: Reals) -> bool:
     """Whether joint values respect the limits of sums."""
     for r in range(arm.combined.shape[0]):
@@ -170,7 +170,7 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
     """Add joint values to the list, unless their bucket is full. Kernel.
 
@@ -213,7 +213,7 @@ def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> Non
         keep(arm, known, memory.v, _radius(arm, x, y), z, _azimuth(arm, x, y))
 
 
-@kernel
+@inner_kernel
 def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     """Radius, height (m) and azimuth (rad) at ``memory.v``, their slopes and the weights of the joints."""
     _values(arm, memory.v, memory.theta)
@@ -238,7 +238,7 @@ def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     return rho, z, _azimuth(arm, x, y)
 
 
-@kernel
+@inner_kernel
 def _directions(memory: Memory, hold: float) -> bool:
     """Smallest weighted changes of the joints that change radius or height alone; False where there are none.
 

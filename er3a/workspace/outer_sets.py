@@ -152,7 +152,7 @@ def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
     return within
 
 
-@kernel
+@inner_kernel
 def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tuple[Four, Four]:
     """Where a cell about axis k (of a bar so long (m), unless that is 0), at angles within ``width`` of one, lies about
     axis k + 1.
@@ -194,7 +194,7 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tup
     return (nearest, farthest, pz - up, pz + up), (px, py, aside, rho_there - along)
 
 
-@kernel
+@inner_kernel
 def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: float) -> bool:
     """Whether a cell at a range of angles about axis k may meet what is not empty about axis k + 1."""
     spread, (x, y, aside, clear) = _spread(L, cell, angle, width, bar)
