@@ -111,10 +111,13 @@ def _stencil(d: int) -> Reals:
     return np.concatenate([np.zeros((1, d)), unit, -unit, np.array(pairs).reshape(-1, d)])
 
 
+_pairs = cache(np.tril_indices)  # finding these takes longer than all the rest
+
+
 def _derivatives(values: Reals, d: int) -> tuple[Reals, Reals]:
     here, up, down, pairs = values[0], values[1 : d + 1], values[d + 1 : 2 * d + 1], values[2 * d + 1 :]
     curvature = np.diag((up - 2 * here + down) / STEP**2)
-    rows, columns = np.tril_indices(d, -1)
+    rows, columns = _pairs(d, -1)
     mixed = (pairs - up[rows] - up[columns] + here) / STEP**2
     curvature[rows, columns] = curvature[columns, rows] = mixed
     return (up - down) / (2 * STEP), curvature

@@ -281,7 +281,7 @@ def _picture(recording: Path, moment: float | None) -> bytes:
         image = Image.open(shot).convert("RGB")
         views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
         encoded = io.BytesIO()
-        views.save(encoded, "WEBP", quality=QUALITY, method=6)
+        views.save(encoded, "WEBP", quality=QUALITY)
         return encoded.getvalue()
 
 
