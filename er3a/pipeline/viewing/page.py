@@ -370,6 +370,16 @@ def render(
     write_text(output, html)
 
 
+class _Compiled(dict[str, bytes]):
+    """Templates that this process has compiled, by what jinja calls them: each page has an environment of its own, but
+    most of it is what all pages share."""
+
+    set = dict.__setitem__
+
+
+_COMPILED = jinja2.MemcachedBytecodeCache(_Compiled())  # type: ignore[arg-type]  # it asks for a time-out too
+
+
 def page_environment(*folders: Path) -> jinja2.Environment:
     """Jinja as pages use it.
 
@@ -388,6 +398,7 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
+        bytecode_cache=_COMPILED,
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
