@@ -377,7 +377,7 @@ class _Compiled(dict[str, bytes]):
     set = dict.__setitem__
 
 
-_COMPILED = jinja2.MemcachedBytecodeCache(_Compiled())  # type: ignore[arg-type]  # it asks for a time-out too
+_COMPILED = _Compiled()
 
 
 def page_environment(*folders: Path) -> jinja2.Environment:
@@ -398,7 +398,8 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
-        bytecode_cache=_COMPILED,
+        # By language: what a filter makes of a constant is compiled in.
+        bytecode_cache=jinja2.MemcachedBytecodeCache(_COMPILED, prefix=language.current()),  # type: ignore[arg-type]
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True
