@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from er3a import export_urdf, load_robot
 from er3a.collision.bodies import Bodies
-from er3a.collision.convex import ROOM, cylinder_points, overlap_depth
-from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, pair_distance, place, unplaced
+from er3a.collision.convex import cylinder_points, overlap_depth
+from er3a.collision.distances import CYLINDER, HALF_SPACE, HULL, some_distances
 from er3a.collision.shapes import CORNERS, WORLD, Body, layout_of
 from er3a.kinematics.forward import frames
 from er3a.robots.robot import Robot
@@ -68,13 +68,11 @@ def own_distance(first: Body, second: Body) -> tuple[float, bool]:
     """Our signed distance, and whether cores overlap."""
     robot = load_robot("er3_600")
     layout = layout_of(robot, [first, second], [(0, 1)])
-    T, w, middle = unplaced(layout)
-    place(layout, np.zeros(robot.joints), T, w, middle)
-    found, deep = pair_distance(layout, T, w, 0, 1, np.empty((ROOM, 3)), np.empty((2, 3)), np.inf)
+    (found,), (deep,), _ = some_distances(layout, np.zeros(robot.joints), np.array([0]))
     if deep:
         cores = [cylinder_points(b.points, b.disc) if b.kind == CYLINDER else b.points for b in (first, second)]
         found -= overlap_depth(*cores)
-    return found, bool(deep)
+    return float(found), bool(deep)
 
 
 class Peer:

@@ -41,7 +41,7 @@ def _point_on_line(w: Reals, p: int, a: int, b: int) -> float:
     return min(1.0, max(0.0, along / length)) if length > 0 else 0.0
 
 
-@kernel
+@inner_kernel
 def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -> float:
     """Square of the distance of two points on lines."""
     square = 0.0
@@ -50,7 +50,7 @@ def _between(w: Reals, a0: int, a1: int, b0: int, b1: int, s: float, t: float) -
     return square
 
 
-@kernel
+@inner_kernel
 def lines_distance(w: Reals, a0: int, a1: int, b0: int, b1: int, near: Reals) -> float:
     """Distance of two line segments, in closed form [1]_ (section 5.1.9).
 

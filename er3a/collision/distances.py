@@ -82,7 +82,7 @@ class Layout(NamedTuple):
     inner: Integers
 
 
-@kernel
+@inner_kernel
 def pair_distance(
     layout: Layout, T: Reals, w: Reals, a: int, b: int, room: Reals, near: Reals, far: float
 ) -> tuple[float, bool]:
@@ -162,7 +162,7 @@ def _row_reach(coupling: Reals, half: Reals, k: int) -> float:
     return value
 
 
-@kernel
+@inner_kernel
 def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
     """Room for what :func:`place` finds.
 
@@ -178,7 +178,7 @@ def unplaced(layout: Layout) -> tuple[Reals, Reals, Reals]:
     return np.empty((rows, 4, 4)), np.empty(layout.points.shape), np.empty(layout.centre.shape)
 
 
-@kernel
+@inner_kernel
 def place(layout: Layout, q: Reals, T: Reals, world: Reals, middle: Reals) -> None:
     """Place base, links and bodies at joint values.
 
@@ -229,7 +229,7 @@ def _place_points(layout: Layout, T: Reals, b: int, world: Reals) -> None:
             world[p, r] = u * points[p, 0] + v * points[p, 1] + w * points[p, 2] + t
 
 
-@kernel
+@inner_kernel
 def _apart(middle: Reals, reach: Reals, a: int, b: int) -> float:
     """A lower bound of the distance of two bodies, by the balls around them; a half-space has no ball."""
     square = 0.0

@@ -15,7 +15,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 Vector = tuple[float, float, float]
 
 
-@kernel
+@inner_kernel
 def dot(a: Vector, b: Vector) -> float:
     """Scalar product of two vectors.
 
@@ -30,7 +30,7 @@ def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inner_kernel
 def cross(a: Vector, b: Vector) -> Vector:
     """Vector product ``a x b``, right-handed.
 
@@ -45,7 +45,7 @@ def cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
+@inner_kernel
 def add(a: Vector, b: Vector) -> Vector:
     """Sum of two vectors of the same unit and frame.
 
@@ -60,7 +60,7 @@ def add(a: Vector, b: Vector) -> Vector:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel
+@inner_kernel
 def subtract(a: Vector, b: Vector) -> Vector:
     """Difference ``a - b``: from the point b to the point a.
 
@@ -75,7 +75,7 @@ def subtract(a: Vector, b: Vector) -> Vector:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@kernel
+@inner_kernel
 def scaled(a: Vector, factor: float) -> Vector:
     """A vector times a number.
 

@@ -227,7 +227,7 @@ def solve_blocks(  # noqa: C901, PLR0912
             marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
 
 
-@kernel
+@inner_kernel
 def _check(w: Reals) -> None:
     """1 where the pose is a rigid transform, to the tolerances of ``transforms.check_poses``."""
     for i in range(BLOCK):
@@ -279,7 +279,7 @@ def in_frame_1(rows: tuple[Vector, Vector, Vector], x: float, y: float, z: float
     return a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
 
 
-@kernel
+@inner_kernel
 def _shoulder(arm: BlockConstants, w: Reals, near: Reals, far: Reals) -> None:
     """Wrist centre and wrist axes in frame 1; both roots of theta_1."""
     for i in range(BLOCK):
@@ -335,7 +335,7 @@ def _elbow(arm: BlockConstants, w: Reals, side: Reals) -> None:
         side[_REACHED * BLOCK + i] = reached if (far > 0.0) & (near > 0.0) else 0.0
 
 
-@kernel
+@inner_kernel
 def _wrist(arm: BlockConstants, w: Reals, side: Reals, sign: float, pair: Reals) -> None:
     """All angles of both wrist branches, for the elbow root of that sign."""
     half_s, half_c = arm.half_sum

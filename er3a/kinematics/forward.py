@@ -212,7 +212,7 @@ def step_row(row: Row, link: Reals) -> Row:
     )
 
 
-@kernel
+@inner_kernel
 def rows_of(T: Reals) -> tuple[Row, Row, Row]:
     """The three upper rows of a transform. Kernel.
 
@@ -422,7 +422,7 @@ def _keep_axis(rows: Reals, count: int, axes: Axes, sign: float, column: Reals) 
             column[(3 + r) * BLOCK + i] = (axes[3] * zs[i] + 0.0) * sign
 
 
-@kernel
+@inner_kernel
 def _along(count: int, column: Reals) -> None:
     """The tool point's velocity by a prismatic joint: its axis, and no turn."""
     for i in range(count):

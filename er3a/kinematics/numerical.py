@@ -149,7 +149,7 @@ def uniform(seed: np.uint64, pose: int, start: int, joint: int) -> float:
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@kernel
+@inner_kernel
 def _begin(q: Reals, first: Reals, n: int, start: int, limits: Limits, draws: Draws) -> None:
     """Set joints to a start: the guess, or a random one within the limits."""
     (lower, upper, respect), (_, seed, before) = limits, draws

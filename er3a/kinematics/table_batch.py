@@ -145,7 +145,7 @@ def frames_of(tables: Tables, robot: Robot, q: Reals) -> Reals:
         is the flange
     """
     out = np.empty((len(tables), len(q), tables.d.shape[1] + 1, 4, 4))
-    fill_frames(for_kernel(robot.base), *tables.kernel_columns, np.require(q, requirements=["C", "W"]), out)
+    fill_frames(for_kernel(robot.base), *tables.kernel_columns, np.array(q, order="C"), out)
     if not robot.flange_is_last_frame:
         out[:, :, -1] = out[:, :, -1] @ robot.flange
     return out

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel
 
 LARGEST_ANGLE = 1e5  # rad; the two-part reduction below keeps full accuracy up to here
 
@@ -23,7 +23,7 @@ _LAST_BITS = 1.5 * 2.0**52  # a whole number plus this ends in the number's own 
 _TAN_PI_8 = 0.41421356237309503
 
 
-@kernel
+@inner_kernel
 def cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine of an angle, without a branch. Kernel.
 
@@ -62,7 +62,7 @@ def cos_sin(angle: float) -> tuple[float, float]:
     return cosine, sine
 
 
-@kernel
+@inner_kernel
 def arctan2(y: float, x: float) -> float:
     """Angle of the point (x, y), without a branch. Kernel.
 

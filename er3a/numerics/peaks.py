@@ -6,6 +6,7 @@ eigenvalues. Nothing is random: equal inputs give equal numbers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from itertools import product
@@ -76,8 +77,8 @@ def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Re
         if not free.any() or np.abs(slope[free]).max() < GAINS_NOTHING:
             break
         step = np.zeros(len(q))
-        step[free] = _newton(slope[free], curvature[np.ix_(free, free)])
-        trials = np.clip(q + SHARES[:, None] * step, lower, upper)
+        step[free] = _newton(slope[free], curvature[free][:, free])
+        trials = np.minimum(np.maximum(q + SHARES[:, None] * step, lower), upper)
         reached = function(trials)
         best = int(np.argmax(reached))
         if not reached[best] > here + GAINS_NOTHING:
@@ -101,7 +102,7 @@ def _newton(slope: Reals, curvature: Reals) -> Reals:
     values, vectors = np.linalg.eigh(curvature)
     size = np.maximum(np.abs(values), 1e-3 * max(float(np.abs(values).max()), float(np.abs(slope).max())) + 1e-12)
     step: Reals = vectors @ ((vectors.T @ slope) / size)
-    return step * (LONGEST_STEP / max(float(np.linalg.norm(step)), LONGEST_STEP))
+    return step * (LONGEST_STEP / max(math.sqrt(step @ step), LONGEST_STEP))
 
 
 @cache
@@ -111,10 +112,13 @@ def _stencil(d: int) -> Reals:
     return np.concatenate([np.zeros((1, d)), unit, -unit, np.array(pairs).reshape(-1, d)])
 
 
+_pairs = cache(np.tril_indices)  # finding these takes longer than all the rest
+
+
 def _derivatives(values: Reals, d: int) -> tuple[Reals, Reals]:
     here, up, down, pairs = values[0], values[1 : d + 1], values[d + 1 : 2 * d + 1], values[2 * d + 1 :]
     curvature = np.diag((up - 2 * here + down) / STEP**2)
-    rows, columns = np.tril_indices(d, -1)
+    rows, columns = _pairs(d, -1)
     mixed = (pairs - up[rows] - up[columns] + here) / STEP**2
     curvature[rows, columns] = curvature[columns, rows] = mixed
     return (up - down) / (2 * STEP), curvature

@@ -416,7 +416,7 @@ Limits = tuple[Reals, Reals, Reals]
 """Lower and upper limits, and how far they may be left, (m,) each; of many poses (N, m) but for the last."""
 
 
-@kernel
+@inner_kernel
 def _room(q: Reals, lattice: Lattice, limits: Limits) -> tuple[Reals, Reals, Reals, Reals]:
     """Turns of each row (r,) between which joints (n,) keep to limits, and what rows from each one on can add to what
     limits are of, at least and at most (r + 1, m)."""
@@ -449,7 +449,7 @@ def _combine(combinations: Reals, q: Reals, out: Reals) -> None:
             out[i] += combinations[i, j] * q[j]
 
 
-@kernel
+@inner_kernel
 def _all_within(q: Reals, lattice: Lattice, limits: Limits, found: Reals) -> int:
     """Fill ``found`` (k, n) with joints (n,) by all turns that keep limits (m,), as many as there is room for; returns
     how many."""

@@ -120,7 +120,7 @@ def philox4x32(c0: np.uint64, c1: np.uint64, c2: np.uint64, c3: np.uint64, k0: n
     return c0, c1, c2, c3
 
 
-@kernel
+@inner_kernel
 def _unit(bits: np.uint64) -> np.float32:
     """A number in (0, 1) from 21 bits, exact in single precision."""
     return (np.float32(np.int32(bits)) + _HALF) * _STEP

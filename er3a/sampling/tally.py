@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy
@@ -140,22 +139,21 @@ def _best(robot: Robot, grid: Grid, q: Reals, values: Reals, factors: tuple[floa
         sums_of = np.array([limit.factors for limit in robot.combined])
         ends = np.array([(limit.lower, limit.upper) for limit in robot.combined]).T
         sums, fine = scipy.optimize.LinearConstraint(sums_of, ends[0], ends[1]), {"ftol": 1e-15, "maxiter": 500}
-        ways: dict[str, Any] = {
-            "jac": True,
-            "method": "SLSQP",
-            "bounds": bounds,
-            "constraints": [sums],
-            "options": fine,
-        }
-        ended = [scipy.optimize.minimize(goal, start, **ways) for start in starts]
+        ended = [
+            scipy.optimize.minimize(
+                goal, start, jac=True, method="SLSQP", bounds=bounds, constraints=[sums], options=fine
+            )
+            for start in starts
+        ]
         kept = [float(end.fun) for end in ended if within(robot, end.x)]
         return float(min([*kept, *(goal(start)[0] for start in starts)]))
     tight = {"ftol": 1e-15, "gtol": 1e-12, "maxiter": 500}
-    found = [
-        scipy.optimize.minimize(goal, q0, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun
-        for q0 in starts
-    ]
-    return float(min(found))
+    return float(
+        min(
+            scipy.optimize.minimize(goal, q0, jac=True, method="L-BFGS-B", bounds=bounds, options=tight).fun
+            for q0 in starts
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)

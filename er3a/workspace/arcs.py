@@ -10,7 +10,7 @@ import numpy as np
 
 from er3a.geometry.vectors import TURN
 from er3a.numerics.arrays import Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 
 ROUND_OFF = 1e-12
 """Bound (m per metre of reach, and rad) on the rounding of any length or angle of the proofs."""
@@ -20,7 +20,7 @@ Cell = tuple[float, float, float, float]
 MAX_ARCS = 12  # disjoint intervals that a set has place for; where more would be needed, a set errs to the safe side
 
 
-@kernel
+@inner_kernel
 def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
     """Take the interval [low, high] within [0, 2 pi] out of the set; see :func:`remove`."""
     n = 0

@@ -14,7 +14,7 @@ import numpy as np
 from er3a.geometry.vectors import Vector
 from er3a.kinematics.chain import constant_links, joint_starts, moving_tip
 from er3a.numerics.arrays import Flags, Reals
-from er3a.numerics.jit import kernel
+from er3a.numerics.jit import inner_kernel, kernel
 from er3a.robots.joint_limits import theta_limits
 from er3a.robots.robot import Robot
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF
@@ -235,7 +235,7 @@ def place(arm: GeneralArm, theta: Reals, radii: Reals, columns: Reals, frame: Re
     return x, y, z
 
 
-@kernel
+@inner_kernel
 def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
     """The tool point for one joint vector, and its levers. Kernel.
 
@@ -267,7 +267,7 @@ def point_of(arm: GeneralArm, theta: Reals, radii: Reals) -> Vector:
     return x, y, z
 
 
-@kernel
+@inner_kernel
 def curvature(arm: GeneralArm, moves: Reals, radii: Reals) -> float:
     """Bound on the second derivative of the point along a straight line of joint values. Kernel.
 

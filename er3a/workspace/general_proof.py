@@ -77,8 +77,6 @@ class Memory(NamedTuple):
     weights: Reals
     directions: Reals  # (2, m)
     v: Reals
-    points: Reals  # (corners, 2), radius and height
-    flat: Reals  # (corners, 2), x and y
     thetas: Reals  # (corners, n)
     levers: Reals  # (corners, n)
     moves: Reals
@@ -126,8 +124,6 @@ def memory(arm: GeneralArm) -> Memory:
         np.empty(m),
         np.empty((2, m)),
         np.empty(m),
-        np.empty((corners, 2)),
-        np.empty((corners, 2)),
         np.empty((corners, n)),
         np.empty((corners, n)),
         np.empty(n),
@@ -146,7 +142,7 @@ def _azimuth(arm: GeneralArm, x: float, y: float) -> float:
     return y * TURN / arm.bar if arm.bar > 0.0 else np.arctan2(y, x)
 
 
-@kernel
+@inner_kernel
 def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
     """Row values of joint values, with joint 1 at 0."""
     n, m = arm.drive.shape
@@ -158,7 +154,7 @@ def _values(arm: GeneralArm, v: Reals, theta: Reals) -> None:
         theta[k] = total
 
 
-@kernel
+@inner_kernel
 def _allowed(arm: GeneralArm, v: Reals) -> bool:
     """Whether joint values respect the limits of sums."""
     for r in range(arm.combined.shape[0]):
@@ -170,7 +166,7 @@ def _allowed(arm: GeneralArm, v: Reals) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def keep(arm: GeneralArm, known: Postures, v: Reals, rho: float, z: float, azimuth: float) -> None:
     """Add joint values to the list, unless their bucket is full. Kernel.
 
@@ -213,7 +209,7 @@ def sample(arm: GeneralArm, unit: Reals, known: Postures, memory: Memory) -> Non
         keep(arm, known, memory.v, _radius(arm, x, y), z, _azimuth(arm, x, y))
 
 
-@kernel
+@inner_kernel
 def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     """Radius, height (m) and azimuth (rad) at ``memory.v``, their slopes and the weights of the joints."""
     _values(arm, memory.v, memory.theta)
@@ -238,7 +234,7 @@ def _slopes(arm: GeneralArm, memory: Memory) -> tuple[float, float, float]:
     return rho, z, _azimuth(arm, x, y)
 
 
-@kernel
+@inner_kernel
 def _directions(memory: Memory, hold: float) -> bool:
     """Smallest weighted changes of the joints that change radius or height alone; False where there are none.
 
@@ -304,10 +300,14 @@ def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
     """Whether the parallelogram about ``memory.v``, so many times a rectangle, winds around it; keeps its corners."""
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
     w, h = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
-    corners, n, m = memory.points.shape[0], arm.drive.shape[0], memory.v.shape[0]
+    corners, n, m = memory.thetas.shape[0], arm.drive.shape[0], memory.v.shape[0]
     turn_x, turn_y = (-1.0, 1.0, 1.0, -1.0, -1.0), (-1.0, -1.0, 1.0, 1.0, -1.0)
-    for c in range(corners):
-        edge, share = c // _PER_EDGE, (c % _PER_EDGE) / _PER_EDGE
+    safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + arm.bar + abs(z))
+    winding, x, y, x_1, y_1 = 0, 0.0, 0.0, 0.0, 0.0
+    for step in range(corners + 1):  # around to the first one; most lines that fail do so on their first edges
+        e, c = step % corners, step - 1
+        x_0, y_0, x_before, y_before = x_1, y_1, x, y
+        edge, share = e // _PER_EDGE, (e % _PER_EDGE) / _PER_EDGE
         s_0 = scale * w * (turn_x[edge] + share * (turn_x[edge + 1] - turn_x[edge]))
         s_1 = scale * h * (turn_y[edge] + share * (turn_y[edge + 1] - turn_y[edge]))
         v = memory.weights  # of no more use here
@@ -316,26 +316,21 @@ def _winds(arm: GeneralArm, cell: Cell, scale: float, memory: Memory) -> bool:
             v[j] = min(max(moved, arm.v_lower[j]), arm.v_upper[j])
         if not _allowed(arm, v):
             return False
-        _values(arm, v, memory.thetas[c])
-        x, y, height = point_of(arm, memory.thetas[c], memory.levers[c])
-        memory.flat[c, 0], memory.flat[c, 1] = x, y
-        memory.points[c, 0], memory.points[c, 1] = _radius(arm, x, y) - rho, height - z
-    safe = 64.0 * ROUND_OFF * (1.0 + cell[1] + arm.bar + abs(z))
-    w, h = w + safe, h + safe
-    winding = 0
-    for c in range(corners):
-        e = (c + 1) % corners
+        _values(arm, v, memory.thetas[e])
+        x, y, height = point_of(arm, memory.thetas[e], memory.levers[e])
+        x_1, y_1 = _radius(arm, x, y) - rho, height - z
+        if step == 0:
+            continue
         for k in range(n):
             memory.moves[k] = abs(memory.thetas[e, k] - memory.thetas[c, k])
         # Between two samples the image leaves its chord by an eighth of the second derivative at most.
         off = 0.125 * curvature(arm, memory.moves, memory.levers[c])
         if arm.bar == 0.0:
             # A straight chord in space is bent in the section, where radius is a distance from the axis.
-            flat = np.hypot(memory.flat[e, 0] - memory.flat[c, 0], memory.flat[e, 1] - memory.flat[c, 1])
-            nearest = rho + min(memory.points[c, 0], memory.points[e, 0]) - 0.5 * flat
+            flat = np.hypot(x - x_before, y - y_before)
+            nearest = rho + min(x_0, x_1) - 0.5 * flat
             off += min(flat, flat * flat / (8.0 * nearest)) if nearest > 0.0 else flat
-        x_0, y_0, x_1, y_1 = memory.points[c, 0], memory.points[c, 1], memory.points[e, 0], memory.points[e, 1]
-        if not _misses(x_0, y_0, x_1, y_1, w + off, h + off):
+        if not _misses(x_0, y_0, x_1, y_1, w + safe + off, h + safe + off):
             return False
         # Crossings of the positive half axis, counted by their sense.
         side = x_0 * y_1 - x_1 * y_0
@@ -363,7 +358,7 @@ def _azimuths(arm: GeneralArm, cell: Cell, memory: Memory) -> tuple[bool, float,
     ux, uy = (x / rho, y / rho) if arm.bar == 0.0 else (1.0, 0.0)
     low = high = inward = 0.0
     memory.moves[:] = 0.0
-    for c in range(memory.points.shape[0]):
+    for c in range(memory.thetas.shape[0]):
         aside = along = 0.0
         for k in range(1, n):
             move = memory.thetas[c, k] - memory.theta[k]

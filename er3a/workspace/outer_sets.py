@@ -152,9 +152,33 @@ def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
     return within
 
 
-@kernel
-def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tuple[Four, Four]:
-    """Where a cell about axis k (of a bar so long (m), unless that is 0), at angles within ``width`` of one, lies about
+@inner_kernel
+def _room() -> tuple[Flags, Reals]:
+    """Working memory of :func:`exclude`, and the pieces of a turn at each level: those of a level with n pieces begin
+    at row n, and the halves of piece i are 2 i and 2 i + 1.
+
+    Returns
+    -------
+    flags : (2, longest) bool, not initialised
+    turns : (pieces, 6): the middle's angle (rad), its cosine and sine, half the width (rad), how far an arc of that
+        half falls back from its tangent, in parts of the radius, and how far it runs along it
+    """
+    longest = _PIECES << _LEVELS
+    turns = np.empty((2 * longest, 6))
+    pieces = _PIECES
+    while pieces <= longest:
+        width = 0.5 * TURN / pieces + 1e-12
+        for i in range(pieces):
+            angle, row = TURN * (i + 0.5) / pieces, turns[pieces + i]
+            row[0], row[1], row[2] = angle, np.cos(angle), np.sin(angle)
+            row[3], row[4], row[5] = width, 1.0 - np.cos(width), np.sin(width)
+        pieces *= 2
+    return np.empty((2, longest), dtype=np.bool_), turns
+
+
+@inner_kernel
+def _spread(L: Reals, cell: Cell, turns: Reals, at: int, bar: float) -> tuple[Four, Four]:
+    """Where a cell about axis k (of a bar so long (m), unless that is 0), at the angles of a piece, lies about
     axis k + 1.
 
     Returns
@@ -164,19 +188,15 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tup
         azimuths, which take long, are worked out from them where they are needed
     """
     rho, z = 0.5 * (cell[0] + cell[1]), 0.5 * (cell[2] + cell[3])
-    c, s, along_bar = np.cos(angle), np.sin(angle), 0.0
+    c, s, along_bar = turns[at, 1], turns[at, 2], 0.0
+    sag, d_turn = cell[1] * turns[at, 4], cell[1] * turns[at, 5]
     if bar > 0.0:
-        c, s, along_bar = 1.0, 0.0, bar * angle / TURN
+        c, s, along_bar, sag, d_turn = 1.0, 0.0, bar * turns[at, 0] / TURN, 0.0, bar * turns[at, 3] / TURN
     x, y, height = rho * c - L[0, 3], rho * s + along_bar - L[1, 3], z - L[2, 3]
     px = L[0, 0] * x + L[1, 0] * y + L[2, 0] * height
     py = L[0, 1] * x + L[1, 1] * y + L[2, 1] * height
     pz = L[0, 2] * x + L[1, 2] * y + L[2, 2] * height
-    # How far an arc of that width falls back from its tangent, and how far it runs along it.
-    sag = cell[1] * (1.0 - np.cos(width)) if width < np.pi else 2.0 * cell[1]
     d_rho, d_z = 0.5 * (cell[1] - cell[0]), 0.5 * (cell[3] - cell[2])
-    d_turn = cell[1] * (np.sin(width) if width < 0.5 * np.pi else 1.0)
-    if bar > 0.0:
-        sag, d_turn = 0.0, bar * width / TURN
     inwards = d_rho + sag
     rho_there = np.sqrt(px * px + py * py)
     ux, uy = (px / rho_there, py / rho_there) if rho_there > 0.0 else (1.0, 0.0)
@@ -194,10 +214,10 @@ def _spread(L: Reals, cell: Cell, angle: float, width: float, bar: float) -> tup
     return (nearest, farthest, pz - up, pz + up), (px, py, aside, rho_there - along)
 
 
-@kernel
-def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: float) -> bool:
-    """Whether a cell at a range of angles about axis k may meet what is not empty about axis k + 1."""
-    spread, (x, y, aside, clear) = _spread(L, cell, angle, width, bar)
+@inner_kernel
+def _meets(L: Reals, cell: Cell, turns: Reals, at: int, outer: Rings, bar: float) -> bool:
+    """Whether a cell at the angles of a piece about axis k may meet what is not empty about axis k + 1."""
+    spread, (x, y, aside, clear) = _spread(L, cell, turns, at, bar)
     i_0, i_1, j_0, j_1 = _range_of(spread, outer)
     if i_0 > i_1 or j_0 > j_1:
         return False
@@ -218,29 +238,33 @@ def _meets(L: Reals, cell: Cell, angle: float, width: float, outer: Rings, bar: 
 
 
 @inner_kernel
-def _meets_anywhere(L: Reals, cell: Cell, outer: Rings, levels: int) -> bool:
+def _meets_anywhere(L: Reals, cell: Cell, turns: Reals, outer: Rings, levels: int) -> bool:
     """Whether a cell may meet what is not empty at any angle."""
-    stack = np.empty((levels + 2, 2))
-    for piece in range(_PIECES):
-        stack[0, 0], stack[0, 1] = TURN * (piece + 0.5) / _PIECES, 0.5 * TURN / _PIECES + 1e-12
-        waiting, finest = 1, 0.5 * TURN / _PIECES / 2.0**levels * 1.5
+    stack = np.empty(levels + 2, dtype=np.int64)
+    for piece in range(_PIECES, 2 * _PIECES):
+        stack[0], waiting = piece, 1
         while waiting > 0:
             waiting -= 1
-            angle, width = stack[waiting, 0], stack[waiting, 1]
-            if not _meets(L, cell, angle, width, outer, 0.0):
+            at = stack[waiting]
+            if not _meets(L, cell, turns, at, outer, 0.0):
                 continue
-            if width <= finest:
+            if at >= _PIECES << levels:
                 return True
-            half = 0.5 * width + 1e-13
-            stack[waiting, 0], stack[waiting, 1] = angle - 0.5 * width, half
-            stack[waiting + 1, 0], stack[waiting + 1, 1] = angle + 0.5 * width, half
+            stack[waiting], stack[waiting + 1] = 2 * at, 2 * at + 1
             waiting += 2
     return False
 
 
 @inner_kernel
 def exclude(  # noqa: C901, PLR0912
-    L: Reals, cell: Cell, ends: tuple[float, float, float], outer: Rings, arcs: Reals, count: int, flags: Flags
+    L: Reals,
+    cell: Cell,
+    ends: tuple[float, float, float],
+    outer: Rings,
+    arcs: Reals,
+    count: int,
+    flags: Flags,
+    turns: Reals,
 ) -> int:
     """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.
 
@@ -251,7 +275,7 @@ def exclude(  # noqa: C901, PLR0912
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     outer : the largest reach of the joints after it
     arcs, count : the arcs that are empty so far; changed in place
-    flags : (2, longest) bool, working memory
+    flags, turns : of :func:`_room`
 
     Returns
     -------
@@ -263,11 +287,11 @@ def exclude(  # noqa: C901, PLR0912
     while levels < _LEVELS and around / pieces > edge:
         levels, pieces = levels + 1, 2 * pieces
     if high - low >= FULL_TURN:
-        return 0 if _meets_anywhere(L, cell, outer, levels) else count
+        return 0 if _meets_anywhere(L, cell, turns, outer, levels) else count
     now, finer = flags[0], flags[1]
     pieces, found = _PIECES, False
     for i in range(pieces):
-        now[i] = _meets(L, cell, TURN * (i + 0.5) / pieces, 0.5 * TURN / pieces + 1e-12, outer, bar)
+        now[i] = _meets(L, cell, turns, pieces + i, outer, bar)
         found = found or now[i]
     if not found:
         return count
@@ -283,8 +307,7 @@ def exclude(  # noqa: C901, PLR0912
                 if finer[i] or not finer[(i + sense) % pieces]:
                     continue
                 m = (i + sense) % pieces
-                half = 0.5 * TURN / pieces + 1e-12
-                while finer[m] and not _meets(L, cell, TURN * (m + 0.5) / pieces, half, outer, bar):
+                while finer[m] and not _meets(L, cell, turns, pieces + m, outer, bar):
                     finer[m] = False
                     m = (m + sense) % pieces
         now, finer = finer, now
@@ -305,7 +328,7 @@ def exclude(  # noqa: C901, PLR0912
 def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> None:
     """Fill in what one more joint in front may reach."""
     n_rho, n_z = rings.counts.shape
-    flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
+    flags, turns = _room()
     for i in range(n_rho):
         for j in range(n_z):
             cell = (
@@ -315,7 +338,7 @@ def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> Non
                 rings.low + (j + 1) * rings.size[1],
             )
             count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
-            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, flags)
+            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, flags, turns)
 
 
 @kernel
@@ -362,8 +385,8 @@ def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, cou
     cells : (N, 4), m
     empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; changed in place
     """
-    flags = np.zeros((2, _PIECES << _LEVELS), dtype=np.bool_)
+    flags, turns = _room()
     for n in range(cells.shape[0]):
         cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         ends = arm.lower[0], arm.upper[0], arm.bar
-        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], flags)
+        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], flags, turns)

@@ -212,8 +212,9 @@ def inside_hull(corners: Reals, points: Reals) -> Flags:
     if is_flat(corners):
         return np.zeros(len(points), dtype=bool)
     every = inside = np.arange(len(points))
-    for x, y, z, offset in scipy.spatial.ConvexHull(corners).equations:
-        inside = inside[points[inside] @ (x, y, z) + offset < 0]  # the first planes leave few to the others
+    # A face of many corners comes as many triangles of one plane.
+    for x, y, z, offset in np.unique(scipy.spatial.ConvexHull(corners).equations, axis=0):
+        inside = inside[points[inside] @ (x, y, z) + offset < 0]
     return np.isin(every, inside)
 
 

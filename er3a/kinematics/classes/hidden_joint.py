@@ -49,7 +49,7 @@ from er3a.numerics.jit import inner_kernel, kernel
 NUMBERS = 15
 
 
-@kernel
+@inner_kernel
 def carry(K: Reals, v: Reals, out: Reals) -> None:
     """Carry a line's fifteen numbers along a rigid motion. Kernel.
 

@@ -211,7 +211,7 @@ def _into_frame(k: ParallelConstants, T: Reals, start: int, size: int, pose: Rea
         pose[_MARK * BLOCK + i] = 0.0
 
 
-@kernel
+@inner_kernel
 def _first_joint(k: ParallelConstants, pose: Reals, side: Reals, sign: float, slack: float) -> None:
     """Joint 1 by one root; then W in the plane, axis 6 and the vector across it as seen from link 1, into ``side``."""
     for i in range(BLOCK):

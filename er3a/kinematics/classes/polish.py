@@ -11,7 +11,7 @@ import numpy as np
 
 from er3a.kinematics.chain import multiply_rigid, post_rotate_z
 from er3a.numerics.arrays import Flags, Integers, Reals
-from er3a.numerics.jit import inner_kernel, kernel
+from er3a.numerics.jit import inner_kernel
 
 SOLVES = 1e-12  # residual, rad and parts of the chain's size
 MIN_PIVOT = 1e-9  # in parts of the first: a direction with less is not determined by the pose
@@ -173,7 +173,7 @@ def null_vector(M: Reals, columns: Integers, one: int, pivots: int, v: Reals) ->
         v[columns[k]] = total / M[k, k] if M[k, k] != 0.0 else 0.0
 
 
-@kernel
+@inner_kernel
 def miss_and_pivot(links: Reals, T: Reals, rows: Reals) -> tuple[float, float]:
     """How well rows solve a pose, and how near the nearest of them is to a singular one. Kernel.
 
@@ -200,7 +200,7 @@ def miss_and_pivot(links: Reals, T: Reals, rows: Reals) -> tuple[float, float]:
     return off, pivot
 
 
-@kernel
+@inner_kernel
 def _step(J: Reals, columns: Integers, dq: Reals) -> None:
     """The step that solves an eliminated system; 0 in directions without a pivot."""
     first = abs(J[0, 0])

@@ -386,7 +386,7 @@ def add_root(
     return rows, pivot
 
 
-@kernel
+@inner_kernel
 def add_row(links: Reals, pose: Reals, m: LoopMemory, found: Reals, pivot: float, q: Reals, rows: int) -> int:
     """Add a row unless it is present. Kernel.
 

@@ -370,6 +370,16 @@ def render(
     write_text(output, html)
 
 
+class _Compiled(dict[str, bytes]):
+    """Templates that this process has compiled, by what jinja calls them: each page has an environment of its own, but
+    most of it is what all pages share."""
+
+    set = dict.__setitem__
+
+
+_COMPILED = _Compiled()
+
+
 def page_environment(*folders: Path) -> jinja2.Environment:
     """Jinja as pages use it.
 
@@ -388,6 +398,8 @@ def page_environment(*folders: Path) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         extensions=["jinja2.ext.i18n"],
+        # By language: what a filter makes of a constant is compiled in.
+        bytecode_cache=jinja2.MemcachedBytecodeCache(_COMPILED, prefix=language.current()),  # type: ignore[arg-type]
     )
     environment.install_gettext_translations(language.translations(), newstyle=False)  # type: ignore[attr-defined]
     environment.policies["ext.i18n.trimmed"] = True

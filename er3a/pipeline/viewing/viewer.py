@@ -231,7 +231,7 @@ def _fetched(url: str) -> tuple[str, bytes]:
     return kind, re.sub(rb"<link\b[^>]*https://[^>]*>", b"", content) if kind.startswith("text/html") else content
 
 
-WINDOW = (1200, 780)  # pixels
+WINDOW = "1200x780"  # pixels
 TITLE_BAR = 36
 TIME_BAR = 34  # left out: it fills as loading goes
 QUALITY = 75
@@ -270,23 +270,22 @@ def write_empty(output: Path) -> None:
 
 def _picture(recording: Path, moment: float | None) -> bytes:
     with TemporaryDirectory(prefix="er3a-preview-") as folder:
-        shot, messages, port = Path(folder) / "shot.png", Path(folder) / "messages", free_port()
-        size = "x".join(map(str, WINDOW))
-        words = ("--headless", "--port", str(port), "--window-size", size, "--hide-welcome-screen")
+        messages, port = Path(folder) / "messages", free_port()
+        words = ("--headless", "--port", str(port), "--window-size", WINDOW, "--hide-welcome-screen")
         with viewer_running([recording], *words, messages=messages) as viewer:
             try:
-                _shoot(port, viewer, shot, moment)
+                shot = _shoot(port, viewer, moment)
             except EOFError:
                 raise Er3aError(_why(messages.read_text(encoding="utf-8", errors="replace"))) from None
-        image = Image.open(shot).convert("RGB")
+        image = Image.open(io.BytesIO(shot)).convert("RGB")
         views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
         encoded = io.BytesIO()
-        views.save(encoded, "WEBP", quality=QUALITY, method=6)
+        views.save(encoded, "WEBP", quality=QUALITY)
         return encoded.getvalue()
 
 
-def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path, moment: float | None) -> None:
-    """Have the viewer save pictures until one is like the one before: everything is loaded then.
+def _shoot(port: int, viewer: subprocess.Popen[bytes], moment: float | None) -> bytes:
+    """Have the viewer draw pictures until one is like the one before: everything is loaded then.
 
     Raises
     ------
@@ -306,20 +305,19 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], shot: Path, moment: float
             client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
             state = client.get_state()
             if not state.active_recording or state.loading:
-                time.sleep(0.05)
-                continue
+                raise ConnectionError
             if not bare:
                 client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
                 if moment is not None:
                     client.set_time(duration=moment)
                 bare = True
-            client.save_screenshot(str(shot))
+            picture = client.take_screenshot()
         except (ConnectionError, RuntimeError):
             time.sleep(0.05)
             continue
-        if shot.read_bytes() == before:
-            return
-        before = shot.read_bytes()
+        if picture == before:
+            return picture
+        before = picture
     raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
 
 
