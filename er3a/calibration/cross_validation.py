@@ -284,12 +284,6 @@ def choose_terms(
             return ChosenTerms(tuple(taken), (*taken.values(), *dropped.values(), *others))
 
 
-def _by_chance(before: float, after: float, numbers: int, freedom: int) -> float:
-    """Probability that so many more numbers lower the sum of squares so far, if there is only noise (F test)."""
-    ratio = max((before - after) / numbers / (after / freedom), 0.0)
-    return float(scipy.special.fdtrc(numbers, freedom, ratio))
-
-
 def _needless(
     linear: _Linear, used: list[int], taken: Sequence[JointTerm], count: int
 ) -> tuple[JointTerm, TriedTerm] | None:
@@ -311,7 +305,9 @@ class _Trial:
         squares = linear.fitted(used)[1]
         amounts, self.rest = linear.fitted(self._columns)
         self._amounts = amounts[-len(own) :]
-        self.probability = _by_chance(squares, self.rest, len(own), len(linear.rest) - len(self._columns))
+        freedom = len(linear.rest) - len(self._columns)
+        ratio = max((squares - self.rest) / len(own) / (self.rest / freedom), 0.0)  # of the F test
+        self.probability = float(scipy.special.fdtrc(len(own), freedom, ratio))
         if term.kind == "ripple":
             self.probability = min(1.0, len(RIPPLES) * self.probability)
 

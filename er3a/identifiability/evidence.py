@@ -62,23 +62,17 @@ def judge_limit(
     low, high = value - WIDEST, value + WIDEST
     if not independent:
         return ("consistent" if reacts else "open"), (low, high)
-    low, high = _past_poses(entry, independent, low, high)
-    if entry.column != "speed":
-        low, high = _by_extremes(robot, entry, independent, low, high)
-    inside = low - ROUNDING <= value <= high + ROUNDING
-    return ("weak" if inside else "contradicted"), (low, high)
-
-
-def _past_poses(entry: Entry, independent: Sequence[Reference], low: float, high: float) -> tuple[float, float]:
-    """A limit lies beyond every pose at which a document shows the arm."""
     for reference in independent:
-        if isinstance(reference.quantity, LimitExcess):
+        if isinstance(reference.quantity, LimitExcess):  # it lies beyond every pose at which a document shows the arm
             angle = value_at(reference.quantity.pose, entry.joint)
             if entry.column == "upper":
                 low = max(low, angle - reference.uncertainty)
             else:
                 high = min(high, angle + reference.uncertainty)
-    return low, high
+    if entry.column != "speed":
+        low, high = _by_extremes(robot, entry, independent, low, high)
+    inside = low - ROUNDING <= value <= high + ROUNDING
+    return ("weak" if inside else "contradicted"), (low, high)
 
 
 def _by_extremes(

@@ -27,20 +27,6 @@ from er3a.references.reference import Documents, Reference, ReferenceSet, confli
 from er3a.robots.robot import Robot
 
 
-def is_unexplained(conclusion: Conclusion | None) -> bool:
-    """Whether references are missed by a table, and nothing explains it.
-
-    Parameters
-    ----------
-    conclusion : of a diagnosis; None without one
-
-    Returns
-    -------
-    unexplained : neither by one or two faults nor by any zeros, directions, base and flange; False without a diagnosis
-    """
-    return is_one(conclusion, "no_fault_stands_out", "unexplained")
-
-
 def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bool:
     """Whether references describe another arm than a table: most of them are missed, and nothing explains it.
 
@@ -53,7 +39,7 @@ def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bo
     -------
     another : False without a diagnosis
     """
-    return failed > total / 2 and is_unexplained(conclusion)
+    return failed > total / 2 and is_one(conclusion, "no_fault_stands_out", "unexplained")
 
 
 def not_the_robot_described(robot: Robot, references: ReferenceSet, conclusion: Conclusion | None) -> Finding | None:
