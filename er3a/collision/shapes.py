@@ -246,11 +246,6 @@ def _hulls(shapes: ArmShapes, links: set[int]) -> list[tuple[int, Reals, float]]
     return hulls + [(h.link, np.array(h.points), h.margin) for h in shapes.pieces if h.link in links]
 
 
-def _size(robot: Robot) -> float:
-    """The sum of all lengths in the table, m."""
-    return float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
-
-
 def shapes_assumed(robot: Robot, margin: float, clearances: Mapping[str, float | None]) -> Finding | None:
     """The remark on collisions where the arm's shapes are assumed.
 
@@ -282,7 +277,7 @@ def default_envelopes(robot: Robot) -> tuple[Envelope, ...]:
     -------
     envelopes : in the links' frames, m; links without length get none
     """
-    size = _size(robot)
+    size = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     parts, found = link_parts(robot), []
     last = robot.rows
     for k in range(last):
