@@ -64,7 +64,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     """
     settled, numbers = len(found.estimates) - len(found.open), len(found.estimates) + len(found.held)
     not_settled = f"; not settled: {', '.join(found.open)}" if found.open else ""
-    turned = f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"
     lines = [
         *([] if found.fits else [say(found.conclusion)]),
         *held_back_warning(found, fitted, others),
@@ -72,7 +71,11 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses settle {settled} of {numbers} numbers{not_settled}",
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after",
-        *([] if found.turned_before_deg is None else [turned]),
+        *(
+            []
+            if found.turned_before_deg is None
+            else [f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"]
+        ),
         *_entry_lines(found.estimates),
         *(f"not estimated: {say(reason)}" for reason in found.held),
         *(f"set aside: row {each.row}, {each.distance_mm:.3g} mm off" for each in found.outliers),
