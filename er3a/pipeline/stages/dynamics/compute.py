@@ -204,33 +204,34 @@ class LoadedArm:
 
     Attributes
     ----------
-    unit_payload : 1 kg of the payload whose greatest mass is computed
+    settings : gravity, and the place of the payload whose greatest mass is computed
     links_grade, load_grade : of the masses
     """
 
     robot: Robot
     load: Load | None
-    unit_payload: MassBody
-    gravity: float
+    settings: DynamicsSettings
     links_grade: Grade
     load_grade: Grade
 
     @cached_property
     def model(self) -> ArmModel:
         """The arm's model of its motion, with its load."""
-        return arm_model(self.robot, self.load, self.gravity)
+        return arm_model(self.robot, self.load, self.settings.gravity_m_s2)
 
     @cached_property
     def with_unit(self) -> ArmModel:
         """The arm's model with its load and 1 kg more, at the place of the payload."""
-        bodies = [body for body in (self.load, self.unit_payload) if body]
-        whole = together(bodies)
-        return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.gravity)
+        x, y, z = (value / 1000 for value in self.settings.payload_centre_mm)
+        square = (self.settings.payload_gyration_mm / 1000) ** 2
+        unit = MassBody(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0))
+        whole = together([body for body in (self.load, unit) if body])
+        return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.settings.gravity_m_s2)
 
     @cached_property
     def bare(self) -> ArmModel:
         """The arm's model without its load."""
-        return arm_model(self.robot, None, self.gravity)
+        return arm_model(self.robot, None, self.settings.gravity_m_s2)
 
     def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
         """By how much torques may be off, by the tolerances of links and load.
@@ -265,7 +266,7 @@ class PathTorques:
     imbalance: float | None
 
 
-def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, samples: int, wrist: tuple[int, ...]) -> PathTorques:
+def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[int, ...]) -> PathTorques:
     """Torques of a path: its table at evenly spread times; peaks and means also where the path was solved and checked,
     and within pieces of it that are shorter than their steps.
 
@@ -276,7 +277,7 @@ def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, samples: int,
     """
     entry, n = motion.entry, arm.robot.joints
     asked = set(entry.expected) <= {"safe"}
-    t = np.linspace(0.0, motion.built.duration, samples)
+    t = np.linspace(0.0, motion.built.duration, arm.settings.samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
@@ -467,10 +468,11 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])
-    grade = "inferred" if robot is not given else _links_grade(given)
+    source = given.sources.get("inertia")
+    grade = source.grade if source and robot is given else "inferred"
     moving = any(each.link > 0 for each in robot.masses.links)
-    arm = _loaded_arm(robot, load, (grade, load_grade), settings)
-    paths, skipped, rest = _paths(study, name, arm, settings) if moving else ([], (), ())
+    arm = LoadedArm(robot, load, settings, grade, load_grade)
+    paths, skipped, rest = _paths(study, name, arm) if moving else ([], (), ())
     holding = _holding(arm) if moving else ()
     motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
@@ -533,27 +535,9 @@ def with_estimates(robot: Robot, density: float | None) -> Robot:
     return robot.replace(masses=Masses(links, kept.drives, kept.wrist, kept.weight))
 
 
-def _links_grade(robot: Robot) -> Grade:
-    source = robot.sources.get("inertia")
-    return source.grade if source else "inferred"
-
-
 def _worst_grade(grades: list[Grade]) -> Grade:
     order: tuple[Grade, ...] = ("measured", "official", "cad", "export", "claim", "inferred")
     return max(grades, key=order.index, default="official")
-
-
-def _loaded_arm(robot: Robot, load: Load | None, grades: tuple[Grade, Grade], settings: DynamicsSettings) -> LoadedArm:
-    x, y, z = (value / 1000 for value in settings.payload_centre_mm)
-    square = (settings.payload_gyration_mm / 1000) ** 2
-    return LoadedArm(
-        robot=robot,
-        load=load,
-        unit_payload=MassBody(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0)),
-        gravity=settings.gravity_m_s2,
-        links_grade=grades[0],
-        load_grade=grades[1],
-    )
 
 
 def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: DynamicsSettings) -> tuple[Coverage, ...]:
@@ -577,9 +561,7 @@ def _mounting(study: Study, name: str) -> tuple[Open, ...]:
     return () if placed else (Open("mounting"),)
 
 
-def _paths(
-    study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
-) -> tuple[list[PathTorques], tuple[str, ...], tuple[Open, ...]]:
+def _paths(study: Study, name: str, arm: LoadedArm) -> tuple[list[PathTorques], tuple[str, ...], tuple[Open, ...]]:
     """The paths, the names of those that an arm of its class can't follow, and what programs have besides."""
     joints, task = arm.robot.joints, task_of(study, name)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
@@ -591,7 +573,7 @@ def _paths(
         if each.motion is None:
             skipped.append(each.name)
         else:
-            found.append(path_torques(arm, each.motion, judged(task, each.motion), settings.samples, wrist))
+            found.append(path_torques(arm, each.motion, judged(task, each.motion), wrist))
             if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
                 rest.append(Open("program_loads", (each.name,)))
     return found, tuple(skipped), by_reason(rest)

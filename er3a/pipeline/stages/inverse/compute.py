@@ -24,7 +24,7 @@ from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import MANY_TARGETS, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.solutions import MANY_TARGETS, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
@@ -463,13 +463,12 @@ def _checked(
 
 def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
     """Targets whose solutions may not be all that there are."""
-    names = tuple(each.name for each in targets if not _is_certain(each.method))
+    names = tuple(
+        each.name
+        for each in targets
+        if is_one(each.method, "iteration") or (is_one(each.method, "by_class") and not each.method.certain)
+    )
     return (Open("solutions_complete", names),) if names else ()
-
-
-def _is_certain(method: Method) -> bool:
-    """Whether the solutions that it found are all."""
-    return bool(method.certain) if is_one(method, "by_class") else not is_one(method, "iteration")
 
 
 def _verdict(

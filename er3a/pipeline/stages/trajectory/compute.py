@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from er3a.collision.along import ClearanceAlong, clearance_along
+from er3a.collision.along import clearance_along
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
@@ -100,7 +100,8 @@ class AvoidanceTask(MotionTask):
         collides = bool(found.along.contacts)
         if (collides or found.beyond or found.limits) and motion.not_planned is None and self.only in (None, "planned"):
             results += self._planned(motion)
-        margin, name = self._margin_of(found.along), motion.entry.name
+        ends, name = found.along.distance[[0, -1]], motion.entry.name
+        margin = float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))  # no more than the ends of the path have
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
@@ -178,11 +179,6 @@ class AvoidanceTask(MotionTask):
         return fact(
             "pair_too_near", pair=smallest.between, clearance_mm=smallest.least_mm, margin_mm=1000 * margin
         ) if near else None, smallest
-
-    def _margin_of(self, along: ClearanceAlong) -> float:
-        """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""
-        ends = along.distance[[0, -1]]
-        return float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))
 
     def _rows(self, path: str, strategy: str, timed: Timed, cost: StrategyCost | None) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
