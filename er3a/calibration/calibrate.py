@@ -98,7 +98,7 @@ class Level:
 
     name: LevelName
     kept: tuple[Entry, ...]
-    held: tuple[outcomes.Held, ...]
+    held: tuple[Finding, ...]
     more: Finding | None
     left: tuple[Entry, ...] = ()
 
@@ -311,7 +311,7 @@ class Calibration(ByValue, Displayed):
     robot: Robot
     level: outcomes.LevelName
     estimates: tuple[Estimate, ...]
-    held: tuple[outcomes.Held, ...]
+    held: tuple[Finding, ...]
     coordinates: int
     poses: int
     rms_before_mm: float
@@ -348,7 +348,7 @@ class Calibration(ByValue, Displayed):
         return not any(is_one(why, "sets_scale") for why in self.held)
 
     @property
-    def conclusion(self) -> outcomes.CalibrationConclusion:
+    def conclusion(self) -> Finding:
         """What the measurements say about the table."""
         if self.wrong:
             return self.wrong

@@ -12,7 +12,7 @@ import numpy as np
 from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
-from er3a.dynamics.plausibility import MassFinding, has_mass, mass_findings
+from er3a.dynamics.plausibility import has_mass, mass_findings
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.finding import Finding, fact, is_one
@@ -139,7 +139,7 @@ def verdict_of(
     paths: list[PathTorques],
     holding: tuple[model.HoldingTorque, ...],
     uses: tuple[model.Use, ...],
-    findings: tuple[MassFinding, ...],
+    findings: tuple[Finding, ...],
     unknown: tuple[Open, ...],
     masses: model.MassesUsed | None,
     *,

@@ -87,8 +87,8 @@ def solve_target(
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
     near: model.NeighbourPoses | None = None
-    obstacle: model.Obstacle | None = None
-    advice: tuple[model.Advice, ...] = ()
+    obstacle: Finding | None = None
+    advice: tuple[Finding, ...] = ()
     if chosen is not None:
         advice = _what_to_know(robot, rows, chosen)
     else:
@@ -198,7 +198,7 @@ def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
     return stated(model.SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
-def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
+def _obstacle(robot: Robot, target: Target, branches: int) -> Finding:
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
         return fact("branches_leave_limits", count=branches)
@@ -211,7 +211,7 @@ def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
     return fact("reach_missing", gap_mm=float(gap[smallest] * 1000))
 
 
-def _outcome(obstacle: model.Obstacle | None) -> TargetOutcome:
+def _outcome(obstacle: Finding | None) -> TargetOutcome:
     match obstacle:
         case None:
             return "reached"
@@ -235,8 +235,8 @@ def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
     return usable
 
 
-def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[model.Advice, ...]:
-    turn: model.Advice = fact("turning_does_not_help")
+def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[Finding, ...]:
+    turn = fact("turning_does_not_help")
     if near.least_turn_deg is not None and near.turned_to_deg is not None:
         turn = fact(
             "turn_tool",
@@ -246,7 +246,7 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
             margin_deg=LITTLE_MARGIN_DEG,
             clearance_mm=1000 * clearance,
         )
-    shift: model.Advice = fact("shifting_does_not_help")
+    shift = fact("shifting_does_not_help")
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
         shift = fact(
             "shift_tool",
@@ -258,10 +258,8 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
     return turn, shift
 
 
-def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
-    found: list[model.Advice] = [
-        fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on
-    ]
+def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[Finding, ...]:
+    found: list[Finding] = [fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
     margin = float(rows.limit_margin_deg[chosen])
     near = fact("near_limit", margin=Amount(margin, unit_compared(robot)))
     return (*found, near) if margin < LITTLE_MARGIN_DEG else tuple(found)

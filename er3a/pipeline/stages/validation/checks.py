@@ -16,7 +16,6 @@ from er3a.finding import Amount, Finding, fact, is_one
 from er3a.identifiability.entries import GROUP_OF, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import GRAVEST, PART_OF_GROUP, PartName, together
-from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckBasis, CheckCounts, count_checks
 from er3a.identifiability.statements import (
     NOT_OFF,
@@ -444,13 +443,13 @@ def _left_of(evidence: model.TableEvidence | None) -> dict[str, Any]:
     }
 
 
-def _next_measurement(evidence: model.TableEvidence | None) -> Proposal | None:
+def _next_measurement(evidence: model.TableEvidence | None) -> Finding | None:
     """What would settle the entry for which the tool could be off farthest; of equals, what documents leave open."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in (*evidence.entries, *evidence.combinations)}
 
-    def gravity(proposal: Proposal) -> tuple[float, float, bool]:
+    def gravity(proposal: Finding) -> tuple[float, float, bool]:
         each = by_name[proposal.entry]
         return each.off.mm, each.off.deg, each.status == "open"
 
