@@ -631,9 +631,9 @@ def _angles_differ(
     for column, off, own in zip(("alpha", "beta", "theta"), gaps, values):
         for k in np.flatnonzero(np.abs(off) > tolerances.angle).tolist():
             link = slides[k] if column == "theta" else k
-            other = float(own[k] + off[k])
-            other = float(wrap_to_pi(np.array(other))) if abs(other) > MAX_HALF_TURN else other
-            differences.append(EntryDifference(column, link, float(own[k]), other))
+            value = float(own[k] + off[k])
+            value = float(wrap_to_pi(np.array(value))) if abs(value) > MAX_HALF_TURN else value
+            differences.append(EntryDifference(column, link, float(own[k]), value))
     return differences, float(np.abs(np.concatenate(gaps)).max(initial=0.0))
 
 

@@ -213,7 +213,9 @@ def confirmation_record(found: Confirmation, robot: str, nearest: str = "") -> d
     """
 
     def placed(place: Placed | None) -> dict[str, object] | None:
-        return place and {
+        if place is None:
+            return None
+        return {
             "xyz_mm": place.xyz_mm.tolist(),
             "rpy_deg": place.rpy_deg.tolist(),
             "half_width_mm": place.half_width_mm,

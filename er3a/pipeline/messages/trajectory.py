@@ -310,7 +310,7 @@ def end_text(path: model.PathSummary, end: model.SoundEnd) -> str:
 def whole_pace(path: model.PathSummary) -> str:
     """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
     speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
-    other = path.unreachable or path.out_of_limits or path.collisions or path.jumps
+    other = bool(path.unreachable or path.out_of_limits or path.collisions or path.jumps)
     other = other or any(is_one(each.cause, "jerk_too_great") for each in path.too_fast)
     if path.strategy != "slow" or speed is None or acceleration is None or other or not path.too_fast:
         return ""
