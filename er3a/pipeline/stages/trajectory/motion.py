@@ -100,7 +100,6 @@ class MotionTask(PlanningTask):
     near : distances below which a pass counts as near-singular
     """
 
-    bodies: Bodies
     near: NearSingular = USUAL_NEAR
 
 
@@ -118,11 +117,10 @@ def planned_entries(task: MotionTask, entry: PathEntry | ProgramPath, source: Co
     start = None if entry.start_deg is None else joint_values(task.robot, entry.start_deg, "start_deg")
     options = CheckOptions(
         start=start,
-        scene=task.bodies.scene if task.bodies else None,
+        scene=task.bodies.scene,
         near=task.near,
         joint_limits=task.limits,
         penetration_tolerance=task.tolerance,
-        measures=task.bodies is not None,
     )
     check = check_program(read_program(entry.program), task.robot, options)
     parts, rest = parts_of(check, task.robot, source)
