@@ -197,19 +197,18 @@ def can_leave_out(pose_of: Integers, numbers: int) -> bool:
     return len(np.unique(pose_of)) >= MIN_POSES and len(pose_of) >= 2 * numbers
 
 
-def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
+def left_out(observations: PointObservations, found: Fit) -> HeldOutErrors:
     """Errors of a fitted model at poses left out, in other parts than those that terms are chosen by.
 
     Parameters
     ----------
     found : the fit to all observations
-    seed : of the parts
 
     Returns
     -------
     errors : mean and largest distance in mm, for poses left out at random, and by neighbourhood
     """
-    parts = parts_of(observations, seed)
+    parts = parts_of(observations, 0)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
     counts = len(found.amounts), len(found.coefficients)
