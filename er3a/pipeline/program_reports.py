@@ -28,6 +28,7 @@ from er3a.pipeline.scope import GAPS, Coverage, Open, coverages
 from er3a.pipeline.scope import Check as Checked
 from er3a.pipeline.stages.covered import covered_units, gaps_of_program
 from er3a.program_check.check_program import (
+    CHECKS,
     NOT_FOLLOWED,
     Check,
     CheckOptions,
@@ -331,7 +332,7 @@ def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:
                 "level": each.level,
                 "complete": check.execution.complete,
                 "checked": list(check.checked),
-                "not_checked": each.lacks(NEEDED),
+                "not_checked": each.lacks((*CHECKS, *NEEDED)),
                 "gaps": [{"check": GAPS[one.reason], "reason": one.reason, "names": one.names} for one in each.missed],
                 "shapes_assumed": check.shapes is not None,
                 "cycle": plain(check.cycle),

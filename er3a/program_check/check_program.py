@@ -80,6 +80,7 @@ class CheckOptions(ByValue):
         has none
     penetration_tolerance : m; no overlap deeper than this goes unnoticed
     assumed_margin : m; a motion that passes nearer than this to assumed shapes of the arm is named
+    measures : whether to check collisions
     keep_on : asked while clearance is proven between points of motions; if it is False, what is left is named
     """
 
@@ -90,6 +91,7 @@ class CheckOptions(ByValue):
     joint_limits: JointLimits | None = None
     penetration_tolerance: float = PENETRATION_TOLERANCE
     assumed_margin: float = ASSUMED_MARGIN
+    measures: bool = True
     limits: RunLimits = field(default_factory=RunLimits)
     keep_on: Callable[[], bool] = _always
 
@@ -231,17 +233,20 @@ def check_program(program: Program | str | Path, robot: Robot, options: CheckOpt
     judge = Judge(robot, CheckRules(options.near, assumed_limits(robot, options)))
     execution = execute(program, robot, options.start, options.frames, options.limits, judge)
     motions = {number: execution.steps[number].moved for number in execution.motions}
-    tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
-    obstacles = Obstacles(robot, options.scene, tools, options.penetration_tolerance, options.assumed_margin)
-    obstacles.check(list(judge.motions.values()), options.keep_on)
-    for one, other in _corners(execution, motions):
-        obstacles.corner(one, other)
+    obstacles = None
+    if options.measures:
+        tools = [each.motion.tool.pose for each in motions.values() if each.motion.tool.pose is not None]
+        around = options.penetration_tolerance, options.assumed_margin
+        obstacles = Obstacles(robot, options.scene, tools, *around)
+        obstacles.check(list(judge.motions.values()), options.keep_on)
+        for one, other in _corners(execution, motions):
+            obstacles.corner(one, other)
     located = _located(execution, robot, motions, obstacles)
     verdicts = _verdicts(program, execution, motions, located)
     level: Level = worst_of(each.level for each in located)
     main = execution.main() if execution.endings else None
     way = () if main is None else execution.way(main)
-    shapes = shapes_assumed(robot, options.assumed_margin, {})
+    shapes = shapes_assumed(robot, options.assumed_margin, {}) if options.measures else None
     checked = _checks(robot, options, motions)
     return ProgramCheck(
         execution, level, located, verdicts, motions, way, _cycle(execution, motions, main, way), checked, shapes
@@ -250,12 +255,12 @@ def check_program(program: Program | str | Path, robot: Robot, options: CheckOpt
 
 def _checks(robot: Robot, options: CheckOptions, motions: Mapping[int, CheckedMotion]) -> tuple[Check, ...]:
     """What the motions that pass were checked for."""
-    checked = [*CHECKS]
-    if options.scene is not None and options.scene.solids:
+    checked = [each for each in CHECKS if each != "self-collision" or options.measures]
+    if options.scene is not None and options.scene.solids and options.measures:
         checked.append("scene")
     arms = {id(each.arm): each.arm for each in motions.values()}.values()
     carries = options.scene is not None and bool(options.scene.carried)
-    if carries or not any(has_bare_tool(arm, options.scene) for arm in arms):
+    if options.measures and (carries or not any(has_bare_tool(arm, options.scene) for arm in arms)):
         checked.append("tool")
     return tuple(checked)
 
@@ -287,7 +292,7 @@ def _corners(
 
 
 def _located(
-    execution: Execution, robot: Robot, motions: Mapping[int, CheckedMotion], obstacles: Obstacles
+    execution: Execution, robot: Robot, motions: Mapping[int, CheckedMotion], obstacles: Obstacles | None
 ) -> tuple[LocatedFinding, ...]:
     """All findings, like ones of an instruction grouped."""
     program, top = execution.program, Place(execution.program.file)
@@ -318,7 +323,7 @@ def _located(
         LocatedFinding("note", fact("not_followed", text=text, reason="unreached"), place)
         for place, text in _unreached(execution)
     ]
-    if obstacles.bodies.in_error:
+    if obstacles is not None and obstacles.bodies.in_error:
         found.append(LocatedFinding("caution", fact("pairs_unexamined", pairs=obstacles.bodies.in_error), top))
     found += [*_loads(execution, robot), *_not_set(execution)]
     found += [
