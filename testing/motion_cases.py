@@ -18,8 +18,9 @@ from er3a.files.yaml_file import parse
 from er3a.geometry.transforms import rpy_of
 from er3a.kinematics.forward import forward
 from er3a.kinematics.singularity import TYPES, NearSingular
-from er3a.pipeline.stages.trajectory.judgement import Judgement, MotionJudge
-from er3a.pipeline.stages.trajectory.motion import Motion, motion_of
+from er3a.pipeline.stages.trajectory.judgement import Judgement
+from er3a.pipeline.stages.trajectory.judgement import judged as judgement_of
+from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask, motion_of
 from er3a.planning.commands import CommandSource
 from er3a.planning.names import PathVerdict
 from er3a.planning.timing import JointLimits, joint_limits
@@ -150,7 +151,7 @@ def judged(robot, written, samples, limits: JointLimits) -> tuple[Motion, Judgem
     whole = {"name": "x", "title": "x", "samples": samples, **written}
     entry = parse(PathFile, {"kind": "paths", "paths": [whole]}, None).paths[0]
     motion = motion_of(robot, entry, CHECKS, CommandSource(None, ""), {})
-    return motion, MotionJudge(robot, NO_BODIES, 0.0, NEAR, limits).judged(motion, NOTHING_MET)
+    return motion, judgement_of(MotionTask(robot, NO_BODIES, 0.0, limits, 0, near=NEAR), motion, NOTHING_MET)
 
 
 def looked_at(robot, spec, points: int) -> Truth:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from er3a.finding import fact, is_one
-from er3a.identifiability.proposals import Proposal
+from er3a.finding import Finding, fact, is_one
 from er3a.references.predict import predict
 from er3a.references.quantities import Limit, Quantity, Speed
 from er3a.references.reference import Reference
@@ -17,7 +16,7 @@ from er3a.robots.robot import Robot
 MEASURED = "measured"
 
 
-def measured(proposal: Proposal, arm: Robot, origin: str = MEASURED) -> Reference:
+def measured(proposal: Finding, arm: Robot, origin: str = MEASURED) -> Reference:
     """What the proposed measurement shows on an arm, as a reference."""
     subject, quantity, group = _about(proposal)
     expected = float(predict(arm, [_plain(quantity, subject, group)])[0])
@@ -44,7 +43,7 @@ def opposite(seen: Seen) -> Seen:
     return cast(Seen, f"{stem}_{turned[last]}" if stem else turned[last])
 
 
-def _about(proposal: Proposal) -> tuple[Subject, Quantity, str]:
+def _about(proposal: Finding) -> tuple[Subject, Quantity, str]:
     joint = proposal.joint
     if is_one(proposal, "look_at_motion"):
         motion = SeenMotion(proposal.pose_deg, joint, proposal.point, proposal.seen)

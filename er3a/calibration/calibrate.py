@@ -98,7 +98,7 @@ class Level:
 
     name: LevelName
     kept: tuple[Entry, ...]
-    held: tuple[outcomes.Held, ...]
+    held: tuple[Finding, ...]
     more: Finding | None
     left: tuple[Entry, ...] = ()
 
@@ -311,7 +311,7 @@ class Calibration(ByValue, Displayed):
     robot: Robot
     level: outcomes.LevelName
     estimates: tuple[Estimate, ...]
-    held: tuple[outcomes.Held, ...]
+    held: tuple[Finding, ...]
     coordinates: int
     poses: int
     rms_before_mm: float
@@ -348,7 +348,7 @@ class Calibration(ByValue, Displayed):
         return not any(is_one(why, "sets_scale") for why in self.held)
 
     @property
-    def conclusion(self) -> outcomes.CalibrationConclusion:
+    def conclusion(self) -> Finding:
         """What the measurements say about the table."""
         if self.wrong:
             return self.wrong
@@ -640,21 +640,16 @@ def _from_points(robot: Robot, every: PointObservations, free_ratios: bool) -> C
     )
 
 
-def _far_off(robot: Robot, estimates: Sequence[Estimate]) -> tuple[str, ...]:
-    """Entries of the table whose corrections no way of building an arm explains."""
-    return tuple(
+def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> Finding | None:
+    """Why measurements and table can't belong together: corrections or residuals far beyond those of arms and
+    trackers."""
+    far = tuple(
         each.name
-        for each in estimates
+        for each in found.estimates
         if each.parameter.joint
         and each.settled
         and not settles(robot, each.unit, (abs(each.correction) - each.half_width) / FAR_WIDEST[each.unit])
     )
-
-
-def _wrong(robot: Robot, observations: PointObservations, found: Calibration) -> Finding | None:
-    """Why measurements and table can't belong together: corrections or residuals far beyond those of arms and
-    trackers."""
-    far = _far_off(robot, found.estimates)
     too_much = not observations.deviation_known and found.rms_after_mm > FAR_REST * whole_length_mm(robot)
     return fact("far_from_table", entries=far, rest_mm=found.rms_after_mm) if far or too_much else None
 

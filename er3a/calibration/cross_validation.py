@@ -197,19 +197,18 @@ def can_leave_out(pose_of: Integers, numbers: int) -> bool:
     return len(np.unique(pose_of)) >= MIN_POSES and len(pose_of) >= 2 * numbers
 
 
-def left_out(observations: PointObservations, found: Fit, seed: int = 0) -> HeldOutErrors:
+def left_out(observations: PointObservations, found: Fit) -> HeldOutErrors:
     """Errors of a fitted model at poses left out, in other parts than those that terms are chosen by.
 
     Parameters
     ----------
     found : the fit to all observations
-    seed : of the parts
 
     Returns
     -------
     errors : mean and largest distance in mm, for poses left out at random, and by neighbourhood
     """
-    parts = parts_of(observations, seed)
+    parts = parts_of(observations, 0)
     unknowns = np.r_[found.amounts, found.coefficients]
     poses, pose_of = np.unique(observations.pose_of[found.last], return_inverse=True)
     counts = len(found.amounts), len(found.coefficients)
@@ -284,12 +283,6 @@ def choose_terms(
             return ChosenTerms(tuple(taken), (*taken.values(), *dropped.values(), *others))
 
 
-def _by_chance(before: float, after: float, numbers: int, freedom: int) -> float:
-    """Probability that so many more numbers lower the sum of squares so far, if there is only noise (F test)."""
-    ratio = max((before - after) / numbers / (after / freedom), 0.0)
-    return float(scipy.special.fdtrc(numbers, freedom, ratio))
-
-
 def _needless(
     linear: _Linear, used: list[int], taken: Sequence[JointTerm], count: int
 ) -> tuple[JointTerm, TriedTerm] | None:
@@ -311,7 +304,9 @@ class _Trial:
         squares = linear.fitted(used)[1]
         amounts, self.rest = linear.fitted(self._columns)
         self._amounts = amounts[-len(own) :]
-        self.probability = _by_chance(squares, self.rest, len(own), len(linear.rest) - len(self._columns))
+        freedom = len(linear.rest) - len(self._columns)
+        ratio = max((squares - self.rest) / len(own) / (self.rest / freedom), 0.0)  # of the F test
+        self.probability = float(scipy.special.fdtrc(len(own), freedom, ratio))
         if term.kind == "ripple":
             self.probability = min(1.0, len(RIPPLES) * self.probability)
 

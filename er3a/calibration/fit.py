@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.calibration.observations import PointObservations
-from er3a.calibration.outcomes import CalibrationError, Held, PlacementName
+from er3a.calibration.outcomes import CalibrationError, PlacementName
 from er3a.calibration.parameters import (
     DEPENDENT,
     corrected,
@@ -71,7 +71,7 @@ class Subspace:
     """
 
     kept: tuple[Entry, ...]
-    held: tuple[Held, ...]
+    held: tuple[Finding, ...]
 
 
 def jacobian(
@@ -141,7 +141,7 @@ def subspace(
     every = [rows @ (scale * jacobian(robot, parameters, observations, gathered=way)) for way in ways]
     no_effect = NO_EFFECT * np.linalg.norm(1 / observations.deviation_mm)
     kept: list[int] = []
-    held: list[Held] = []
+    held: list[Finding] = []
     bases: list[Reals] = [np.empty((len(J), 0)) for J in every]
     for k, parameter in enumerate(parameters):
         norms = [(float(np.linalg.norm(J[:, k])), np.linalg.norm(J, axis=0).max()) for J in every]
@@ -221,7 +221,7 @@ def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Ent
     return tuple(each for each in parameters if scale is None or each not in (scale, TURNS_ALL))
 
 
-def held_with(scale: Entry | None) -> tuple[Held, ...]:
+def held_with(scale: Entry | None) -> tuple[Finding, ...]:
     """Why parameters are held if a length sets the scale.
 
     Parameters

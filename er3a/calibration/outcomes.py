@@ -21,18 +21,9 @@ TermVerdict = Literal["taken", "not_lower", "noise", "wrong_way"]
 may have made it, or because a load would have to lift the arm."""
 
 
-Held = Finding
-
-
-NotCalibrated = Finding
-
-
 class CalibrationError(Er3aError):
     """Measurements determine too little of a table, or no corrections make the table fit them; see ``finding``."""
 
-    def __init__(self, finding: NotCalibrated, problem: str):
+    def __init__(self, finding: Finding, problem: str):
         self.finding = finding
         super().__init__(problem)
-
-
-CalibrationConclusion = Finding

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+from scipy.cluster.hierarchy import DisjointSet
 
 from er3a.collision.bodies import Bodies
 from er3a.collision.distances import FREE, free_between
@@ -218,18 +219,11 @@ def joined_to_home(bodies: Bodies, places: ClearPlaces, home: Reals, more: Reals
     first = np.repeat(np.arange(len(q)), near.shape[1] - 1)
     second, length = near[:, 1:].ravel(), away[:, 1:].ravel()
     order = np.lexsort((second, first, length))
-    group = np.arange(len(q))
-
-    def root(node: int) -> int:
-        while group[node] != node:
-            group[node] = group[group[node]]
-            node = int(group[node])
-        return node
-
+    joint = DisjointSet(range(len(q)))
     for edge in order:
-        a, b = root(int(first[edge])), root(int(second[edge]))
-        if a != b and free_between(bodies.layout, q[first[edge]], q[second[edge]], DEPTH, LOOKS)[0] == FREE:
-            group[max(a, b)] = min(a, b)
+        a, b = int(first[edge]), int(second[edge])
+        if not joint.connected(a, b) and free_between(bodies.layout, q[a], q[b], DEPTH, LOOKS)[0] == FREE:
+            joint.merge(a, b)
     joined = np.zeros(len(places.clear), bool)
-    joined[clear] = [root(node) == root(0) for node in range(1, len(clear) + 1)]
+    joined[clear] = [joint.connected(0, node) for node in range(1, len(clear) + 1)]
     return joined

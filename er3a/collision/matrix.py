@@ -256,10 +256,7 @@ def trimmed(body: Body, centre: Reals, radius: float) -> list[Body]:
 def _centres(robot: Robot, pair: BodyPair) -> list[Reals]:
     """Where two capsules are nearest to each other, each point (3,), m, in its own link's frame, in the one of the
     joint vectors drawn in which they are farthest apart."""
-    q, found, none = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1)), np.empty(TRIED)
-    layout = layout_of(robot, pair, [(0, 1)])
-    measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
-    apart = q[int(found[:, 0].argmax())]
+    apart = quasi_random_points(robot.lower, robot.upper, TRIED)[int(_distances(robot, pair).argmax())]
     near = _measured(robot, pair, [(0, 1)], apart)[2][0]
     frames = (link_frames(robot, apart)[body.link] for body in pair)
     return [frame[:3, :3].T @ (point - frame[:3, 3]) for frame, point in zip(frames, near)]
@@ -280,13 +277,20 @@ def _searched(robot: Robot, pair: BodyPair, boxes: int) -> tuple[int, Reals, flo
     if any(body.tree for body in pair):
         outcome, looked, bound = search_boxes(layout, 0, box, (False, 0.0), BOXES_OF_SURFACES, at)
         return outcome, at, bound, looked
-    q, found, none = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1)), np.empty(TRIED)
-    measure(layout, q, found, none, np.empty(TRIED, np.int64), np.empty(TRIED, bool))
-    outcome, looked, bound = search_boxes(layout, 0, box, (False, GOAL * float(found.min())), boxes // 2, at)
+    goal = GOAL * float(_distances(robot, pair).min())
+    outcome, looked, bound = search_boxes(layout, 0, box, (False, goal), boxes // 2, at)
     if outcome not in (FREE, MEETS):
         outcome, more, bound = search_boxes(layout, 0, box, (False, 0.0), boxes, at)
         looked += more
     return outcome, at, bound, looked
+
+
+def _distances(robot: Robot, pair: BodyPair) -> Reals:
+    """Of two bodies (TRIED,), m, in the joint vectors drawn."""
+    q, found = quasi_random_points(robot.lower, robot.upper, TRIED), np.empty((TRIED, 1))
+    none = np.empty(TRIED), np.empty(TRIED, np.int64), np.empty(TRIED, bool)
+    measure(layout_of(robot, pair, [(0, 1)]), q, found, *none)
+    return found[:, 0]
 
 
 def _overlap(robot: Robot, pairs: Sequence[BodyPair]) -> Flags:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from er3a.kinematics.table_batch import Tables, robot_of, tables_of
+from er3a.numerics.arrays import Flags
 from er3a.robots.robot import Robot
 
 Change = Callable[[Tables], Tables]
@@ -104,11 +105,15 @@ def times(factor: float, columns: Sequence[str], row: int | None = None) -> Chan
     """
 
     def change(tables: Tables) -> Tables:
-        size = tables.d.shape[-1]
-        factors = np.where(np.arange(size) == row, factor, 1.0) if row is not None else np.full(size, factor)
+        factors = np.where(_chosen(tables, row), factor, 1.0)
         return replace(tables, **{name: getattr(tables, name) * factors for name in columns})
 
     return change
+
+
+def _chosen(tables: Tables, row: int | None) -> Flags:
+    """(m,), one row, or all."""
+    return np.asarray((np.arange(tables.d.shape[-1]) == row) | (row is None))
 
 
 def in_order(order: Sequence[int], columns: Sequence[str]) -> Change:
@@ -139,7 +144,7 @@ def swapped(row: int | None = None) -> Change:
     """
 
     def change(tables: Tables) -> Tables:
-        own = np.full(tables.d.shape[-1], True) if row is None else np.arange(tables.d.shape[-1]) == row
+        own = _chosen(tables, row)
         return replace(tables, a=np.where(own, tables.d, tables.a), d=np.where(own, tables.a, tables.d))
 
     return change

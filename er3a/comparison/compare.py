@@ -464,7 +464,8 @@ def _joint_zeros(robot: Robot, found: mechanism.Match) -> Reals:
 def _limits(robot_a: Robot, robot_b: Robot, signs: Reals, zeros: Reals, tolerances: mechanism.Tolerances) -> RangeLayer:
     if not (robot_a.states("limits") and robot_b.states("limits")):
         return RangeLayer(None)
-    lower, upper = _limits_of_b(robot_b, signs, zeros)
+    ends = signs * robot_b.lower + zeros, signs * robot_b.upper + zeros  # as A's joints show them
+    lower, upper = np.minimum(*ends), np.maximum(*ends)
     found = []
     for j in range(robot_a.joints):
         slides, ends = bool(robot_a.slides[j]), (robot_a.continuous[j], robot_b.continuous[j])
@@ -485,12 +486,6 @@ def _sums_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[CombinedLimit,
         off = float(factors @ zeros)
         found.append(CombinedLimit(tuple(factors.tolist()), limit.lower + off, limit.upper + off))
     return tuple(found)
-
-
-def _limits_of_b(robot: Robot, signs: Reals, zeros: Reals) -> tuple[Reals, Reals]:
-    """B's limits as A's joints show them."""
-    ends = np.sort(np.stack([signs * robot.lower + zeros, signs * robot.upper + zeros]), axis=0)
-    return ends[0], ends[1]
 
 
 def _speeds(robot_a: Robot, robot_b: Robot) -> RangeLayer:

@@ -421,14 +421,6 @@ class EntryDifference:
         return abs(gap if self.column in ("a", "d") else float(wrap_to_pi(np.array(gap))))
 
 
-def _other_angle(column: str, link: int, one: float, gap: float) -> EntryDifference:
-    """An angle that differs by ``gap``, written as a table would: within half a turn, but for tolerances around it."""
-    other = one + gap
-    return EntryDifference(
-        column, link, one, float(wrap_to_pi(np.array(other))) if abs(other) > MAX_HALF_TURN else other
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Match:
     """The other arm brought onto the first one.
@@ -639,7 +631,9 @@ def _angles_differ(
     for column, off, own in zip(("alpha", "beta", "theta"), gaps, values):
         for k in np.flatnonzero(np.abs(off) > tolerances.angle).tolist():
             link = slides[k] if column == "theta" else k
-            differences.append(_other_angle(column, link, float(own[k]), float(off[k])))
+            value = float(own[k] + off[k])
+            value = float(wrap_to_pi(np.array(value))) if abs(value) > MAX_HALF_TURN else value
+            differences.append(EntryDifference(column, link, float(own[k]), value))
     return differences, float(np.abs(np.concatenate(gaps)).max(initial=0.0))
 
 

@@ -142,10 +142,10 @@ def nearest(fitter: Fitter, readings: Sequence[JointReading], forms: Sequence[st
     for form in forms:
         kept = list(range(len(readings)))
         if form and len(kept) > NEAR:
-            sizes = np.concatenate(
-                [_agreement(_products(fitter, readings[k : k + BLOCK], form)[0]) for k in kept[::BLOCK]]
-            )
-            kept = np.argsort(-sizes, kind="stable")[:NEAR].tolist()
+            K = [_products(fitter, readings[k : k + BLOCK], form)[0] for k in kept[::BLOCK]]
+            # Of the largest singular values, 1 if rotations agree.
+            squares = np.concatenate([np.linalg.eigvalsh(each @ transposed(each))[:, -1] for each in K])
+            kept = np.argsort(-squares, kind="stable")[:NEAR].tolist()
         chosen = [readings[k] for k in kept]
         found += _with_orientations(fitter, chosen, form) if form else _positions_alone(fitter, chosen)
     return sorted(found, key=lambda each: each.score)
@@ -157,12 +157,6 @@ def _products(fitter: Fitter, readings: Sequence[JointReading], form: str) -> tu
     K = C.reshape(-1, 9).T @ F[..., :3, :3].reshape(*F.shape[:2], 9)  # (H, ab, cd)
     K = K.reshape(-1, 3, 3, 3, 3).transpose(0, 1, 3, 4, 2).reshape(-1, 9, 9)  # (a, c), (d, b)
     return K / len(C), F
-
-
-def _agreement(K: Reals) -> Reals:
-    """The largest singular value of each (H, 9, 9), 1 if rotations agree."""
-    found: Reals = np.sqrt(np.abs(np.linalg.eigvalsh(K @ transposed(K))[:, -1]))
-    return found
 
 
 def _with_orientations(fitter: Fitter, readings: Sequence[JointReading], form: str) -> list[Near]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from er3a.diagnosis.faults import Faults
-from er3a.finding import Finding
 from er3a.references.quantities import Unit
 
 
@@ -34,6 +33,3 @@ class RankedHypothesis:
     half_widths: float
     indistinguishable_from: tuple[Faults, ...]
     score: float
-
-
-Conclusion = Finding

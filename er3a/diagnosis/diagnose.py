@@ -14,7 +14,7 @@ from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
 from er3a.diagnosis.fitting import ANGLES, MEETS, free_numbers, moved
 from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
-from er3a.finding import fact, is_one
+from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables, search
@@ -106,9 +106,7 @@ class Diagnosis(list[Hypothesis], Displayed):
     missed : references that no hypothesis rests on, and that the table misses: extremes over the limits, such as reach
     """
 
-    def __init__(
-        self, conclusion: conclusions.Conclusion, references: int, tried: int, hypotheses: Sequence[Hypothesis] = ()
-    ):
+    def __init__(self, conclusion: Finding, references: int, tried: int, hypotheses: Sequence[Hypothesis] = ()):
         super().__init__(hypotheses)
         self.conclusion, self.references, self.tried = conclusion, references, tried
         self.not_examined: tuple[str, ...] = ()
@@ -240,7 +238,7 @@ def _may_be_chosen(robot: Robot, hypotheses: Sequence[Hypothesis]) -> bool:
     return all(entry_of(fault) in ends for fault in hypotheses[0].faults)
 
 
-def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusions.Conclusion | None:
+def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> Finding | None:
     """What the best hypothesis amounts to; None if it explains neither all nor most."""
     if not best.explains and best.residual_after >= MOSTLY * best.residual_before:
         return None
@@ -254,7 +252,7 @@ def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> conclusion
     )
 
 
-def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> conclusions.Conclusion:
+def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> Finding:
     tried = len(ranking.pool.faults)
     if not hypotheses:
         relative = np.nan_to_num(np.abs(ranking.before) / case.uncertainty, nan=np.inf)

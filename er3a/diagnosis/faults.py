@@ -67,7 +67,7 @@ def rounded(fault: Fault) -> Fault:
     fault : unchanged if it has no such numbers; the scale's factor to six digits
     """
     return fault.but(
-        **{name: _digits(fault.params[name], count) for name, count in DIGITS.items() if name in fault.params}
+        **{name: float(f"{fault.params[name]:.{count}g}") for name, count in DIGITS.items() if name in fault.params}
     )
 
 
@@ -100,10 +100,6 @@ def place_of(fault: Fault) -> str | Fault:
     place : the name of its entry; the rounded fault itself if it is in several
     """
     return entry_of(fault) or rounded(fault)
-
-
-def _digits(value: float, count: int) -> float:
-    return float(f"{value:.{count}g}")
 
 
 SIDES: tuple[Side, ...] = ("lower", "upper")

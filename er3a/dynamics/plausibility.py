@@ -28,10 +28,7 @@ WEIGHT_RATIO = 0.15  # of the stated weight, by which the sum of the links may d
 PARALLEL_RATIO = 2.0  # of the inertia that the shape would have: more is too much
 
 
-MassFinding = Finding
-
-
-def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
+def mass_findings(robot: Robot) -> tuple[Finding, ...]:
     """Implausible values among a robot's masses, link by link, then their sum.
 
     Parameters
@@ -46,7 +43,7 @@ def mass_findings(robot: Robot) -> tuple[MassFinding, ...]:
     beyond = size_of(robot)
     armature = drives_of(robot).armature
     moved_by_one = robot.coupling is None
-    found: list[MassFinding] = []
+    found: list[Finding] = []
     for link in range(robot.rows + 1):
         body = robot.masses.body(link)
         if body is None or not has_mass(body):
@@ -79,10 +76,10 @@ def has_mass(body: MassBody | None) -> bool:
     return body is not None and (body.mass > 0 or any(body.inertia))
 
 
-def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[MassFinding]:
+def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> list[Finding]:
     """What density, centre and inertia of a body say against the link's shape; ``size`` of the arm, m."""
     water, slack = shape.water, GUESSED if shape.guessed else 1.0
-    found: list[MassFinding] = []
+    found: list[Finding] = []
     density = WATER * body.mass / water.mass
     if not LIGHTEST / slack <= density <= HEAVIEST * slack:
         found.append(fact("unlikely_density", link=link, mass_kg=body.mass, density_kg_m3=density))
@@ -115,7 +112,7 @@ def _against_shape(link: int, body: MassBody, shape: LinkShape, size: float) -> 
     return found
 
 
-def _against_weight(robot: Robot, incomplete: bool) -> list[MassFinding]:
+def _against_weight(robot: Robot, incomplete: bool) -> list[Finding]:
     """Whether the sum of the links' masses contradicts the stated weight."""
     weight, total = robot.masses.weight, sum(each.body.mass for each in robot.masses.links)
     if not (np.isfinite(weight) and robot.masses.links):

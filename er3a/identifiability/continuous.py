@@ -173,7 +173,10 @@ class Extents:
         self.watched = [n for n, k in enumerate(self.places) if k in set(relevant)]
         self.met = not relevant or asked.missed_by(table) <= MET
         self.direction, self.start = table.direction[0], np.zeros(len(self.places))
-        self._fit_likelihood()
+        likely = asked.likely
+        if self.met and len(likely) and len(self.places):
+            self.start = self.region.reached(self.direction[None], self.start[None])[0][0]
+            self.region.chi2 = float((asked.near_off(self.met_by)[0][likely] ** 2).sum())
         self.far: list[tuple[Reals, Reals]] = []
         self.goes_far = False
         self._ends: dict[bytes, tuple[float, float]] = {}
@@ -216,13 +219,6 @@ class Extents:
         return self._amounts(
             nearest_rows(self.region.tables(direction[None], amounts[None]), self.region, self.watched)
         )
-
-    def _fit_likelihood(self) -> None:
-        likely = self.region.asked.likely
-        if self.met and len(likely) and len(self.places):
-            self.start = self.region.reached(self.direction[None], self.start[None])[0][0]
-            off = self.region.asked.near_off(self.met_by)[0]
-            self.region.chi2 = float((off[likely] ** 2).sum())
 
     def of(self, entry: Entry) -> Extent:
         """The interval of an entry, the others free.

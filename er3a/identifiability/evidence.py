@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import chain
 from typing import Literal
 
@@ -62,23 +62,17 @@ def judge_limit(
     low, high = value - WIDEST, value + WIDEST
     if not independent:
         return ("consistent" if reacts else "open"), (low, high)
-    low, high = _past_poses(entry, independent, low, high)
-    if entry.column != "speed":
-        low, high = _by_extremes(robot, entry, independent, low, high)
-    inside = low - ROUNDING <= value <= high + ROUNDING
-    return ("weak" if inside else "contradicted"), (low, high)
-
-
-def _past_poses(entry: Entry, independent: Sequence[Reference], low: float, high: float) -> tuple[float, float]:
-    """A limit lies beyond every pose at which a document shows the arm."""
     for reference in independent:
-        if isinstance(reference.quantity, LimitExcess):
+        if isinstance(reference.quantity, LimitExcess):  # it lies beyond every pose at which a document shows the arm
             angle = value_at(reference.quantity.pose, entry.joint)
             if entry.column == "upper":
                 low = max(low, angle - reference.uncertainty)
             else:
                 high = min(high, angle + reference.uncertainty)
-    return low, high
+    if entry.column != "speed":
+        low, high = _by_extremes(robot, entry, independent, low, high)
+    inside = low - ROUNDING <= value <= high + ROUNDING
+    return ("weak" if inside else "contradicted"), (low, high)
 
 
 def _by_extremes(
@@ -310,8 +304,9 @@ class _Judge:
         if entry.column in LIMITS:
             return self._bound(entry, relevant)
         view = self.view(own)
-        judged = self._direction if entry.column == "direction" else self._number
-        return judged(entry, own, relevant, view)
+        if entry.column == "direction":
+            return self._direction(entry, own, relevant, view)
+        return self._number(entry, relevant, view)
 
     def _independent(self, document: str) -> tuple[int, ...]:
         """Trusted references of documents that are independent of one; of those that contradict another which the table
@@ -349,7 +344,7 @@ class _Judge:
     def _documents(self, places: Sequence[int]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.references[i].document for i in places))
 
-    def _number(self, entry: Entry, own: tuple[int, ...], relevant: tuple[int, ...], view: _View) -> EntryEvidence:
+    def _number(self, entry: Entry, relevant: tuple[int, ...], view: _View) -> EntryEvidence:
         gauge = bool(self.gauge.support()[self.free.index(entry)])
         extent = view.extents.free_choice(entry) if gauge else view.extents.of(entry)
         concerned = [each for each in view.alternatives if entry.name in each.names]
@@ -378,7 +373,7 @@ class _Judge:
         elif own and extents.met and not doubtful:
             status = self._settled(view, [entry.name])
         ends = (-1.0, 1.0) if doubtful or concerned else (value, value)
-        off = _worst([each.off for each in concerned])
+        off = reduce(ToolOff.worse, (each.off for each in concerned), NOT_OFF)
         return self._described(entry, status, Extent(*ends, off), concerned, relevant)
 
     def _bound(self, entry: Entry, relevant: tuple[int, ...]) -> EntryEvidence:
@@ -389,16 +384,7 @@ class _Judge:
             status = "contradicted"
         if status == "contradicted" and not self.robot.states("speeds" if entry.column == "speed" else "limits"):
             status = "open"  # er3a assumed it: nobody is contradicted
-        return EntryEvidence(
-            entry=entry.name,
-            value=self.values[entry.name],
-            unit=entry.unit,
-            status=status,
-            interval=interval,
-            by=self._documents(relevant or every),
-            alternatives=(),
-            document=document_of(self.robot, entry),
-        )
+        return self._described(entry, status, Extent(*interval, NOT_OFF), [], relevant)
 
     def _described(
         self, entry: Entry, status: Status, extent: Extent, concerned: list[Alternative], relevant: Sequence[int]
@@ -411,7 +397,7 @@ class _Judge:
         ]
         if entry in self.free:
             readings += [self._shift(row) for row in self.gauge.directions if row[self.free.index(entry)]]
-        off = _worst([extent.off, *(each.off for each in concerned)])
+        off = reduce(ToolOff.worse, (each.off for each in concerned), extent.off)
         return EntryEvidence(
             entry=entry.name,
             value=self.values[entry.name],
@@ -508,13 +494,6 @@ def _sum_of(factors: Sequence[tuple[Entry, float]]) -> str:
     return text
 
 
-def _worst(found: Sequence[ToolOff]) -> ToolOff:
-    worst = NOT_OFF
-    for each in found:
-        worst = worst.worse(each)
-    return worst
-
-
 PartName = Literal["geometry", "zero_and_directions", "limits", "speeds"]
 PartStatus = Literal["settled", "settled_up_to_signs", "consistent", "weak", "open", "contradicted"]
 PART_OF_GROUP: dict[str, PartName] = {
@@ -544,7 +523,5 @@ def together(evidence: Evidence, names: list[str]) -> ToolOff:
     for each in readings:
         free = [own for own in combined if not {n for other in own for n in other.names} & set(each.names)]
         combined += [(*own, each) for own in free][: MAX_COMBINED - len(combined)]
-    off = NOT_OFF
-    for own in combined[1:]:
-        off = off.worse(tool.off(with_readings(tool.table, evidence.robot, own)))
-    return off
+    offs = (tool.off(with_readings(tool.table, evidence.robot, own)) for own in combined[1:])
+    return reduce(ToolOff.worse, offs, NOT_OFF)

@@ -38,10 +38,7 @@ OBSERVATIONS: tuple[tuple[Point, Manner], ...] = (
 )
 
 
-Proposal = Finding
-
-
-def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
+def proposals_of(evidence: Evidence) -> dict[str, Finding]:
     """For each entry that isn't settled, the cheapest measurement that would settle it.
 
     Parameters
@@ -55,7 +52,7 @@ def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
     robot = evidence.robot
     tool = ToolRange(robot, tables_of(robot))
     by_name = {entry.name: entry for entry in entries_of(robot)}
-    found: dict[str, Proposal] = {}
+    found: dict[str, Finding] = {}
     for each in (*evidence.entries, *evidence.combinations):
         if each.status in SETTLED:
             continue
@@ -65,7 +62,7 @@ def proposals_of(evidence: Evidence) -> dict[str, Proposal]:
     return found
 
 
-def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolRange) -> Proposal | None:
+def _proposal(evidence: Evidence, each: EntryEvidence, entry: Entry, tool: ToolRange) -> Finding | None:
     name, j = each.entry, entry.joint
     if entry.column == "direction":
         return _look(evidence, entry)

@@ -68,25 +68,6 @@ class CheckCounts:
     claims: CheckTally
 
 
-def count_checks(kinds: Sequence[CheckKind], statuses: Sequence[Literal["pass", "fail", "conflict"]]) -> CheckCounts:
-    """Counts of checks by kind and status.
-
-    Parameters
-    ----------
-    kinds, statuses : of each check
-
-    Returns
-    -------
-    counts : a tally for each kind
-    """
-
-    def tally(kind: CheckKind) -> CheckTally:
-        own = [status for each, status in zip(kinds, statuses) if each == kind]
-        return CheckTally(own.count("pass"), own.count("fail"), own.count("conflict"))
-
-    return CheckCounts(tally("independent"), tally("consistency"), tally("claim"))
-
-
 def bases_of(robot: Robot, references: Sequence[Reference], documents: Documents) -> list[CheckBasis]:
     """What the check against each reference rests on.
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.comparison.compare import shift_between, turn_between
-from er3a.diagnosis.conclusions import Conclusion
 from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.diagnosis.faults import entry_of
 from er3a.diagnosis.ranking import usable
@@ -27,21 +26,7 @@ from er3a.references.reference import Documents, Reference, ReferenceSet, confli
 from er3a.robots.robot import Robot
 
 
-def is_unexplained(conclusion: Conclusion | None) -> bool:
-    """Whether references are missed by a table, and nothing explains it.
-
-    Parameters
-    ----------
-    conclusion : of a diagnosis; None without one
-
-    Returns
-    -------
-    unexplained : neither by one or two faults nor by any zeros, directions, base and flange; False without a diagnosis
-    """
-    return is_one(conclusion, "no_fault_stands_out", "unexplained")
-
-
-def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bool:
+def is_another_arm(failed: int, total: int, conclusion: Finding | None) -> bool:
     """Whether references describe another arm than a table: most of them are missed, and nothing explains it.
 
     Parameters
@@ -53,10 +38,10 @@ def is_another_arm(failed: int, total: int, conclusion: Conclusion | None) -> bo
     -------
     another : False without a diagnosis
     """
-    return failed > total / 2 and is_unexplained(conclusion)
+    return failed > total / 2 and is_one(conclusion, "no_fault_stands_out", "unexplained")
 
 
-def not_the_robot_described(robot: Robot, references: ReferenceSet, conclusion: Conclusion | None) -> Finding | None:
+def not_the_robot_described(robot: Robot, references: ReferenceSet, conclusion: Finding | None) -> Finding | None:
     """Whether trusted documents of another origin describe another robot.
 
     Parameters

@@ -14,13 +14,11 @@ from er3a.collision.scene import Scene
 from er3a.errors import InputError
 from er3a.files.path_file import load_paths
 from er3a.finding import Finding
-from er3a.kinematics.singularity import USUAL_NEAR
 from er3a.pipeline.scope import Open
-from er3a.pipeline.stages.trajectory.judgement import MotionJudge, min_clearance
-from er3a.pipeline.stages.trajectory.motion import CHOSEN, listed_motions
+from er3a.pipeline.stages.trajectory.judgement import judged, min_clearance
+from er3a.pipeline.stages.trajectory.motion import CHOSEN, MotionTask, listed_motions
 from er3a.pipeline.stages.trajectory.written_programs import LONGEST_NAME, near_assumed_shapes, written
 from er3a.planning.names import PathVerdict
-from er3a.planning.way_around import PlanningTask
 from er3a.program_check.check_program import CheckOptions, assumed_limits
 from er3a.programs.languages import WITHOUT_JOINTS, not_written
 from er3a.programs.program_names import LanguageName
@@ -60,13 +58,12 @@ def programs_of(
     if reason := not_written(language, robot):
         raise InputError(None, None, reason, WITHOUT_JOINTS)
     bodies, limits = Bodies(robot, scene), assumed_limits(robot, CheckOptions())
-    judge = MotionJudge(robot, bodies, PENETRATION_TOLERANCE, USUAL_NEAR, limits)
-    task = PlanningTask(robot, bodies, PENETRATION_TOLERANCE, limits, SEED)
+    task = MotionTask(robot, bodies, PENETRATION_TOLERANCE, limits, SEED)
     listed = load_paths(file).paths
     missing = next((name for name in only or () if name not in {entry.name for entry in listed}), None)
     if missing is not None:
         raise InputError(file, "paths", f"there is no path '{missing}'", f"Known: {', '.join(e.name for e in listed)}")
-    for each in listed_motions(file, task, USUAL_NEAR, CHECKS_PER_SAMPLE):
+    for each in listed_motions(file, task, CHECKS_PER_SAMPLE):
         if only and each.listed not in only:
             continue
         if each.refused:
@@ -74,7 +71,7 @@ def programs_of(
         if each.motion is None:
             yield PathProgram(each.name, each.outcome_unfollowed, None)
             continue
-        found = judge.judged(each.motion)
+        found = judged(task, each.motion)
         verdict = found.verdict
         rest = tuple(left for left in each.open if left.reason not in CHOSEN)
         elsewhere = language != "csv" and any(left.reason == "points_missed" for left in rest)

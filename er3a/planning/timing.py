@@ -384,14 +384,13 @@ def toppra_library() -> Any:
     return toppra
 
 
-def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float = 0.0) -> Any:
+def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline) -> Any:
     """The path in the form that toppra takes.
 
     Parameters
     ----------
     s : (N,), path parameter at the nodes, rising
     spline : joints (n,), rad, over the path parameter
-    at_rest : slope, rad per unit of s, up to which a joint counts as at rest and has no friction
 
     Returns
     -------
@@ -404,8 +403,7 @@ def toppra_path(s: Reals, spline: scipy.interpolate.CubicSpline, at_rest: float 
         path_interval = np.array([s[0], s[-1]])
 
         def __call__(self, at: Reals, order: int = 0) -> Any:
-            values = spline(at, order)
-            return np.where(np.abs(values) > at_rest, values, 0.0) if order == 1 and at_rest else values
+            return spline(at, order)
 
     return Path()
 

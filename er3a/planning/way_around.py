@@ -81,7 +81,7 @@ class PlanningTask:
     """
 
     robot: Robot
-    bodies: Bodies | None
+    bodies: Bodies
     tolerance: float
     limits: JointLimits
     seed: int
@@ -103,9 +103,7 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | Find
     ----------
     RRT-Connect [1]_ as OMPL has it [2]_.
     """
-    if task.bodies is None:
-        return fact("nothing_measured")
-    clear = _clear_at_ends(task, task.bodies, start, end)
+    clear = _clear_at_ends(task, start, end)
     if not isinstance(clear, float):
         return clear
     depth = min(task.tolerance, SPARE * clear)
@@ -132,19 +130,19 @@ def way_around(task: PlanningTask, start: Reals, end: Reals) -> WayAround | Find
     return fact("none_found", rounds=rounds)
 
 
-def _clear_at_ends(task: PlanningTask, bodies: Bodies, start: Reals, end: Reals) -> float | Finding:
+def _clear_at_ends(task: PlanningTask, start: Reals, end: Reals) -> float | Finding:
     """The smaller clearance (m) of the two ends (n,); which of them can't be one, and why."""
     ends: tuple[tuple[Literal["start", "end"], Reals], ...] = (("start", start), ("end", end))
     for name, q in ends:
         if outside := limits_exceeded(task.robot, q):
             return fact("no_end", end=name, why=outside)
-    clear, pairs = bodies.min_distance(np.stack([start, end]))
+    clear, pairs = task.bodies.min_distance(np.stack([start, end]))
     for (name, _), distance, pair in zip(ends, clear, pairs):
         if distance <= 0:
             return fact(
                 "no_end",
                 end=name,
-                why=fact("pair_overlaps", pair=bodies.pairs[pair], depth_mm=-float(distance) * 1000),
+                why=fact("pair_overlaps", pair=task.bodies.pairs[pair], depth_mm=-float(distance) * 1000),
             )
     return float(clear.min())
 
@@ -384,7 +382,6 @@ def _with_jerk(route: JointSequence, limits: JointLimits) -> Timed:
 
 def _proven(task: PlanningTask, corners: Reals, motion: Timed, depth: float) -> WayAround | None:
     """The motion with its clearance, if it touches nothing and keeps its limits."""
-    assert task.bodies is not None
     curve = motion.curve
     if limit_intervals(task.robot, curve):
         return None

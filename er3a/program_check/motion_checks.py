@@ -305,7 +305,7 @@ def joint_path(arm: Robot, motion: ArmMotion, start: Reals, end: Reals, rules: C
 
 
 def tool_path(
-    arm: Robot, motion: ArmMotion, start: Reals, end: Reals, via: Reals | None, rules: CheckRules
+    arm: Robot, motion: ArmMotion, start: Reals, end: Reals, via: Reals | None
 ) -> MotionPath | Finding | None:
     """The way of a line or arc, followed from given joints.
 
@@ -527,7 +527,7 @@ def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
             share, moves = float(path.share[at]), kind == "shoulder"
             distance = turned_or_moved(float(size[at]) * (1000.0 if moves else float(np.degrees(1.0))), moves)
             if a < at + 1 < len(values) and values[max(at - 1, 0)] * values[at + 1] < 0:
-                found[fact("meets_singularity", type=kind, at_mm=path.along_mm(share), bounded=True)] = share
+                found[fact("meets_singularity", type=kind, at_mm=path.along_mm(share))] = share
             else:
                 found[fact("passes_singularity", type=kind, at_mm=path.along_mm(share), distance=distance)] = share
     return found

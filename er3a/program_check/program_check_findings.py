@@ -59,7 +59,7 @@ FAILS = frozenset(
         *("combination_exceeded", "too_fast", "acceleration_too_great", "load_above_payload"),
     )
 )
-NOTES = frozenset(("frames_from_robot_file", "clear_of_assumed", "passes_singularity"))
+NOTES = frozenset(("frames_from_robot_file", "meets_singularity", "clear_of_assumed", "passes_singularity"))
 WRONG = frozenset(("not_understood", "not_finite", "too_far", "too_many_joints"))
 """Why a target is none: the program gives it, but not as a target of its motion or of the arm."""
 
@@ -76,8 +76,6 @@ def level_of(finding: Finding) -> Level:
     level : ``note``, ``caution`` or ``fail``; ``caution`` for all that no rule names
     """
     match finding:
-        case Finding(code="meets_singularity", bounded=bounded):
-            return "note" if bounded else "fail"
         case Finding(code="not_followed", reason=reason):
             return "fail" if reason in WRONG else "caution"
         case Finding(code="speed_not_given", word=word, refused=refused):

@@ -226,7 +226,7 @@ class Judge:
             text = getattr(motion.via, "text", motion.form)
             checked.add(fact("not_followed", text=text, reason=getattr(motion.via, "reason", "undefined")))
             return
-        found = tool_path(arm, motion, checked.start, end, via, self.rules)
+        found = tool_path(arm, motion, checked.start, end, via)
         if not isinstance(found, MotionPath):
             checked.stays = found is None
             checked.end = checked.start if found is None else None

@@ -116,7 +116,7 @@ def transfer(task: PlanningTask, start: Reals, end: Reals, needed: float) -> tup
     if outside := limits_exceeded(task.robot, start):
         return fact("no_end", end="start", why=outside)
     straight = joint_legs("move", np.stack([start, end]), task.limits)
-    if task.bodies is None or ((clear := _clearance(task.bodies, straight)) > 0 and clear >= needed):
+    if (clear := _clearance(task.bodies, straight)) > 0 and clear >= needed:
         return straight
     found = way_around(task, start, end)
     if not isinstance(found, WayAround):

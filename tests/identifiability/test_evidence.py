@@ -14,13 +14,13 @@ from er3a.diagnosis.diagnose import diagnosis_of
 from er3a.errors import InputError
 from er3a.files.reference_sets import load_references
 from er3a.files.robot_library import load_robot
-from er3a.finding import is_one
+from er3a.finding import Finding, is_one
 from er3a.identifiability.alternatives import reversed_about
 from er3a.identifiability.continuous import Extent
 from er3a.identifiability.entries import continuous_of, entries_of
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import NOT_OFF, evidence_of
-from er3a.identifiability.proposals import Proposal, proposals_of
+from er3a.identifiability.proposals import proposals_of
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.pipeline.stages.validation.checks import parts_found
 from er3a.references.quantities import Limit, PointCoordinate, QuantityAtPose
@@ -188,7 +188,7 @@ def test_what_is_not_settled_has_a_measurement_proposed(name):
     assert set(proposals_of(found)) == unsettled
 
 
-def as_rows(proposal: Proposal, robot: Robot) -> tuple[str, str]:
+def as_rows(proposal: Finding, robot: Robot) -> tuple[str, str]:
     """The file that a person enters a measurement in, and its line, as read off the robot."""
     j = proposal.joint
     if is_one(proposal, "look_at_motion"):

@@ -132,7 +132,6 @@ def test_ends_that_can_not_be_are_named():
     if one.bodies.min_distance(low[None])[0][0] < 0:
         assert is_one(way_around(one, home, low), "no_end")
     assert way_between(one, home[None], np.empty((0, 6))) == fact("no_end", end="end", why=fact("none_within_limits"))
-    assert way_around(PlanningTask(ROBOT, None, 1e-3, LIMITS, 3), home, home) == fact("nothing_measured")
 
 
 @pytest.mark.long

@@ -60,7 +60,6 @@ from er3a.pipeline.stages.trajectory.compute import compute as trajectory
 from er3a.pipeline.stages.trajectory.model import RESULTS
 from er3a.pipeline.stages.trajectory.motion import (
     listed_motions,
-    near_singular,
     planning_of,
 )
 from er3a.pipeline.stages.trajectory.page.played import faults
@@ -287,9 +286,8 @@ def test_paths_of_a_program_name_its_lines_that_they_leave_out(study, tmp_path, 
     job = {"name": "job", "title": "Job", "kind": "program", "program": str(tmp_path / "a.src"), "samples": 11}
     listed = {"kind": "paths", "paths": [job | {"start_deg": [0, -10, -10, 0, -70, 0]}]}
     (tmp_path / "paths.yaml").write_text(yaml.safe_dump(listed))
-    near = near_singular(study.trajectory)
-    task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
-    motions = [*listed_motions(tmp_path / "paths.yaml", task, near, 5)]
+    task = planning_of(study.robot(ROBOT), study.trajectory, bodies_of(study.robot(ROBOT), None))
+    motions = [*listed_motions(tmp_path / "paths.yaml", task, 5)]
     left_out = {each.reason: each.names for each in by_reason(rest for each in motions for rest in each.open)}
     assert left_out.get("program_rest", ()) == ((f"job: {lines}",) if lines else ())
 
@@ -364,9 +362,8 @@ def test_a_line_that_is_left_out_breaks_the_path(study, tmp_path):
     entry = {
         "paths": program_paths(tmp_path, {"job": "PTP {near}\nDRIVE_ANYWHERE( )\nPTP {far}\nPTP {near}\nPTP {far}"})
     }
-    near = near_singular(study.trajectory)
-    task = planning_of(study.robot(ROBOT), study.trajectory, None, 0)
-    found = [each for each in listed_motions(Path(entry["paths"]), task, near, 5) if each.listed == "job"]
+    task = planning_of(study.robot(ROBOT), study.trajectory, bodies_of(study.robot(ROBOT), None))
+    found = [each for each in listed_motions(entry["paths"], task, 5) if each.listed == "job"]
     assert [each.title for each in found] == ["job, line 2", "job, lines 5 to 6"]
     ends = [np.degrees(each.motion.q[[0, -1], 0]) for each in found]
     np.testing.assert_allclose(ends, [[0, 10], [20, 20]], atol=1e-6)
@@ -956,8 +953,8 @@ def test_what_a_path_leaves_open_is_named(tmp_path, arm, given, status, named):
     path = {"name": "turn", "title": "T", "kind": "line", "start": start, "end": end, "samples": 10, "duration_s": 5.0}
     (tmp_path / "paths.yaml").write_text(yaml.safe_dump({"kind": "paths", "paths": [path | given]}), encoding="utf-8")
     robot, settings = load_robot(arm), load_study("config/small.yaml").trajectory
-    task = planning_of(robot, settings, None, 0)
-    (listed,) = listed_motions(tmp_path / "paths.yaml", task, near_singular(settings), 1)
+    task = planning_of(robot, settings, bodies_of(robot, None))
+    (listed,) = listed_motions(tmp_path / "paths.yaml", task, 1)
     assert tuple(listed.open) == named
     summary = Summary(Verdict("pass", fact("not_checked", checks=())), (), checked=coverages({"reach": 1}, listed.gaps))
     assert summary.verdict.status == status

@@ -16,6 +16,7 @@ import pytest
 import yaml
 from lxml import html
 
+from er3a.collision.along import bodies_of
 from er3a.collision.pairs import label_of
 from er3a.errors import InputError
 from er3a.files.path_file import ProgramPath
@@ -43,7 +44,7 @@ from er3a.pipeline.stages.trajectory.model import (
     TrajectoryResults,
     TriedStrategy,
 )
-from er3a.pipeline.stages.trajectory.motion import limits_of, near_singular, planned_entries, planning_of
+from er3a.pipeline.stages.trajectory.motion import limits_of, planned_entries, planning_of
 from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.stages.trajectory.page.record import record
 from er3a.pipeline.stages.trajectory.page.report import answer_of, report, strategies_shown
@@ -679,9 +680,9 @@ def test_study_and_path_files_give_joints_that_slide_in_mm(monkeypatch):
     monkeypatch.setattr(motion, "check_program", check)
     path = {"name": "a", "title": "A", "kind": "program", "samples": 9, "program": "data/programs/weld_seam.src"}
     entry = ProgramPath.model_validate(path | {"start_deg": [500.0, -20.0, 150.0, 0.0]})
-    task = planning_of(robot, settings, None, 0)
+    task = planning_of(robot, settings, bodies_of(robot, None))
     with pytest.raises(InputError, match="not checked here"):
-        list(planned_entries(task, entry, CommandSource(Path("paths.yaml"), "paths[0]"), near_singular(settings)))
+        list(planned_entries(task, entry, CommandSource(Path("paths.yaml"), "paths[0]")))
     np.testing.assert_allclose(starts[0], [*np.radians([500.0, -20.0]), 0.15, 0.0])
 
 

@@ -34,10 +34,10 @@ from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory.compute import compute
-from er3a.pipeline.stages.trajectory.judgement import MotionJudge, advised_end, in_order
+from er3a.pipeline.stages.trajectory.judgement import advised_end, in_order
+from er3a.pipeline.stages.trajectory.judgement import judged as judgement_of
 from er3a.pipeline.stages.trajectory.model import Singularity, Stretch
-from er3a.pipeline.stages.trajectory.motion import limits_of as limits_in
-from er3a.pipeline.stages.trajectory.motion import near_singular, study_motions
+from er3a.pipeline.stages.trajectory.motion import listed_motions, planning_of
 from er3a.pipeline.stages.trajectory.page.played import advised, faults, motions, slowed
 from er3a.pipeline.study import Study, load_study
 from er3a.pipeline.verdicts import read_verdicts
@@ -279,9 +279,9 @@ def test_too_fast_beside_what_is_expected_is_another_outcome_unless_it_follows_f
     study, robot = study_of(tmp_path, name, **changes), load_robot("er3_600")
     trajectory = study.section(TrajectorySettings)
     bodies = Bodies(robot, study.scene("er3_600", "trajectory"))
-    judge = MotionJudge(robot, bodies, 0.001, near_singular(trajectory), limits_in(robot, trajectory))
-    (each,) = study_motions(study, "er3_600", trajectory.checks_per_sample)
-    assert judge.judged(each.motion).outcomes == came_to  # the stage of dynamics says the same
+    task = planning_of(robot, trajectory, bodies)
+    (each,) = listed_motions(study.entry("er3_600").paths, task, trajectory.checks_per_sample)
+    assert judgement_of(task, each.motion).outcomes == came_to  # the stage of dynamics says the same
 
 
 def test_a_line_that_only_another_branch_can_end_is_singular():

@@ -14,7 +14,7 @@ from er3a.calibration.cross_validation import TriedTerm
 from er3a.calibration.observations import Measurement
 from er3a.calibration.terms import starting_table
 from er3a.finding import plain
-from er3a.pipeline.language import as_text, tr, words
+from er3a.pipeline.language import N_, as_text, tr, words
 from er3a.pipeline.messages.say import say
 from er3a.robots.robot import Robot
 
@@ -37,6 +37,14 @@ TERMS = words(
     }
 )
 KINDS = words({"place": "place", "plane": "plane"})
+CONTRADICTED = N_(
+    "{count} positions held back contradict the calibration: {mean} mm off on average, poses left out {usual} mm. "
+    "Check that both files have the same frame, tool point and units."
+)
+ELSEWHERE = N_(
+    "{count} positions beyond the fitted joint values are {mean} mm off on average, poses left out {usual} mm. Measure "
+    "there, too."
+)
 VERDICTS = words(
     {
         "taken": "taken",
@@ -63,7 +71,11 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         *warning_texts(found),
         f"{found.coordinates} coordinates at {found.poses} poses settle {settled} of {numbers} numbers{not_settled}",
         f"root mean square difference {found.rms_before_mm:.4g} mm before, {found.rms_after_mm:.4g} mm after",
-        *_turned_line(found),
+        *(
+            []
+            if found.turned_before_deg is None
+            else [f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"]
+        ),
         *_entry_lines(found.estimates),
         *(f"not estimated: {say(reason)}" for reason in found.held),
         *(f"set aside: row {each.row}, {each.distance_mm:.3g} mm off" for each in found.outliers),
@@ -82,12 +94,6 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
         lines.append(f"to estimate more: {say(found.more)}")
     lines += [f"not examined: {text}" for text in not_examined_texts(found, others) if fitted]
     return "\n".join(lines)
-
-
-def _turned_line(found: Calibration) -> list[str]:
-    if found.turned_before_deg is None:
-        return []
-    return [f"orientations: {found.turned_before_deg:.4g} deg before, {found.turned_after_deg:.4g} deg after"]
 
 
 def not_examined_texts(found: Calibration, others: Sequence[Measurement] = ()) -> list[str]:
@@ -191,27 +197,9 @@ def _held_back_contradicts(
     poses, seen = (np.array([each.pose for each in rows]) for rows in (others, fitted))
     inside = ((poses >= seen.min(axis=0)) & (poses <= seen.max(axis=0))).all(axis=1)
     distances, usual = found.distances_mm(others), max(expected.mean_mm, expected.far_mean_mm)
-    numbers = {"usual": f"{usual:.3g}"}
-    if inside.any() and (mean := float(distances[inside].mean())) > CONTRADICTING * usual:
-        return [
-            tr(
-                "{count} positions held back contradict the calibration: {mean} mm off on average, poses left out "
-                "{usual} mm. Check that both files have the same frame, tool point and units.",
-                count=int(inside.sum()),
-                mean=f"{mean:.3g}",
-                **numbers,
-            )
-        ]
-    if not inside.all() and (mean := float(distances[~inside].mean())) > CONTRADICTING * usual:
-        return [
-            tr(
-                "{count} positions beyond the fitted joint values are {mean} mm off on average, poses left out "
-                "{usual} mm. Measure there, too.",
-                count=int((~inside).sum()),
-                mean=f"{mean:.3g}",
-                **numbers,
-            )
-        ]
+    for where, text in ((inside, CONTRADICTED), (~inside, ELSEWHERE)):
+        if where.any() and (mean := float(distances[where].mean())) > CONTRADICTING * usual:
+            return [tr(text, count=int(where.sum()), mean=f"{mean:.3g}", usual=f"{usual:.3g}")]
     return []
 
 

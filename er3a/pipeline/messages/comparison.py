@@ -67,12 +67,8 @@ def headline(found: Comparison, doubts: Iterable[str] = ()) -> str:
     found : the comparison; units that it found to differ stand before its verdict
     doubts : about units of what was read, which stand before all else: what follows rests on these units
     """
-    return joined([*doubts, _verdict(found)])
-
-
-def _verdict(found: Comparison) -> str:
     causes = (*(found.units.causes if found.units else ()), *found.causes)
-    text = joined([*map(say, causes), word("comparison", HEADLINES, found.verdict)])
+    text = joined([*doubts, *map(say, causes), word("comparison", HEADLINES, found.verdict)])
     if found.as_printed_mm is None or found.aligned_mm is None:
         a, b = found.joints
         return tr("{verdict}: {a} and {b}", verdict=text, a=a, b=b) if found.verdict == "other_joint_count" else text

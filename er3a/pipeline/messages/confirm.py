@@ -20,14 +20,7 @@ RECORDED = (
     *("verdict", "layers", "renamed", "factor", "joints", "digits_mm", "digits_deg", "noise", "held_out_mm", "alike"),
     *("not_settled", "taken_up", "notes"),
 )
-OF_A_ROW = {
-    "line": "lines",
-    "before_mm": "before_mm",
-    "left_mm": "left_mm",
-    "before_deg": "before_deg",
-    "left_deg": "left_deg",
-    "fits": "fits",
-}
+OF_A_ROW = "before_mm", "left_mm", "before_deg", "left_deg", "fits"
 SHOWN_ENTRIES, SHOWN_LINES = 4, 8
 FORMS = {
     "abc": "A, B, C: Rz(A) Ry(B) Rx(C)",
@@ -83,7 +76,12 @@ def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: boo
     """
     fits = found.fits
     off = _off(found, float(found.left_mm[fits].max()), float(found.left_deg[fits].max()))
-    lines = [_read_line(found), HEADLINES[found.verdict].format(off=off), *_found_lines(found, nearest)]
+    form = f"; orientations read as {FORMS[found.form]}" if found.oriented else " without orientations"
+    lines = [
+        f"{len(found.lines)} poses{form}; rounding explains {_off(found, found.digits_mm, found.digits_deg)}",
+        HEADLINES[found.verdict].format(off=off),
+        *_found_lines(found, nearest),
+    ]
     if found.verdict != "agrees":
         before = _off(found, float(found.before_mm.max()), float(found.before_deg.max()))
         lines.append(f"  as it is, the model is up to {before} off")
@@ -103,11 +101,6 @@ def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: boo
 
 def _off(found: Confirmation, mm: float, deg: float) -> str:
     return f"{number(mm, 3)} mm" + (f" and {number(deg, 3)} deg" if found.oriented else "")
-
-
-def _read_line(found: Confirmation) -> str:
-    form = f"; orientations read as {FORMS[found.form]}" if found.oriented else " without orientations"
-    return f"{len(found.lines)} poses{form}; rounding explains {_off(found, found.digits_mm, found.digits_deg)}"
 
 
 def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
@@ -137,7 +130,10 @@ def _found_lines(found: Confirmation, nearest: str) -> Iterator[str]:
             else "  another arm, maybe of the same family: compare names and drawings; --output corrected.yaml"
         )
     if found.small:
-        largest = ", ".join(_change(each) for each in found.small[:SHOWN_ENTRIES])
+        largest = ", ".join(
+            f"{each.entry.name} {as_text(each.found - each.given, '+.3f')} {each.entry.unit}"
+            for each in found.small[:SHOWN_ENTRIES]
+        )
         yield (
             f"  {len(found.small)} small corrections, as of a factory; the largest: {largest}; --output mine.yaml; UR: "
             "er3a import-calibration; intervals: er3a calibrate"
@@ -195,10 +191,6 @@ def _for_a_file(values: Reals, decimals: int) -> str:
     return "[" + ", ".join(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values) + "]"
 
 
-def _change(each: FoundEntry) -> str:
-    return f"{each.entry.name} {as_text(each.found - each.given, '+.3f')} {each.entry.unit}"
-
-
 def _listed(lines: Integers) -> str:
     shown = ", ".join(str(line) for line in sorted(lines.tolist())[:SHOWN_LINES])
     return shown + (" ..." if len(lines) > SHOWN_LINES else "")
@@ -221,23 +213,21 @@ def confirmation_record(found: Confirmation, robot: str, nearest: str = "") -> d
     """
 
     def placed(place: Placed | None) -> dict[str, object] | None:
-        return (
-            None
-            if place is None
-            else {
-                "xyz_mm": place.xyz_mm.tolist(),
-                "rpy_deg": place.rpy_deg.tolist(),
-                "half_width_mm": place.half_width_mm,
-                "half_width_deg": place.half_width_deg if np.isfinite(place.half_width_deg) else None,
-            }
-        )
+        if place is None:
+            return None
+        return {
+            "xyz_mm": place.xyz_mm.tolist(),
+            "rpy_deg": place.rpy_deg.tolist(),
+            "half_width_mm": place.half_width_mm,
+            "half_width_deg": place.half_width_deg if np.isfinite(place.half_width_deg) else None,
+        }
 
     def entries(found: Sequence[FoundEntry]) -> list[dict[str, object]]:
         values = ("given", "found", "half_width")
         of = ({"name": each.entry.name, "unit": each.entry.unit} for each in found)
         return [named | {key: float(getattr(each, key)) for key in values} for named, each in zip(of, found)]
 
-    rows = zip(*(getattr(found, name).tolist() for name in OF_A_ROW.values()))
+    rows = zip(found.lines.tolist(), *(getattr(found, name).tolist() for name in OF_A_ROW))
     return {
         "robot": robot,
         **{name: plain(getattr(found, name)) for name in RECORDED},
@@ -247,7 +237,7 @@ def confirmation_record(found: Confirmation, robot: str, nearest: str = "") -> d
         "entries": entries(found.entries),
         "small": entries(found.small),
         "nearest": nearest or None,
-        "rows": [dict(zip(OF_A_ROW, row)) for row in rows],
+        "rows": [dict(zip(("line", *OF_A_ROW), row)) for row in rows],
     }
 
 

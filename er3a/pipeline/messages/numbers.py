@@ -92,22 +92,12 @@ def at_least(value: float, measure: int | str) -> str:
 
     ``measure``: how many decimals, or the unit, which decides: see :func:`decimals_of_bound`.
     """
-    return _shown(value, measure, rounded_down)
+    return _shown(value, measure, floor, NOISE)
 
 
 def at_most(value: float, measure: int | str) -> str:
     """An upper bound, its last decimal rounded up; ``measure`` as of :func:`at_least`."""
-    return _shown(value, measure, rounded_up)
-
-
-def rounded_down(value: float, decimals: int) -> float:
-    """A lower bound with so many decimals."""
-    return floor(value * 10**decimals + NOISE) / 10**decimals
-
-
-def rounded_up(value: float, decimals: int) -> float:
-    """An upper bound with so many decimals."""
-    return ceil(value * 10**decimals - NOISE) / 10**decimals
+    return _shown(value, measure, ceil, -NOISE)
 
 
 def decimals_of_bound(value: float, unit: str) -> int:
@@ -118,8 +108,8 @@ def decimals_of_bound(value: float, unit: str) -> int:
     return min(MOST_DECIMALS, max(least, digits - 1 - floor(log10(abs(value)))))
 
 
-def _shown(value: float, measure: int | str, rounded: Callable[[float, int], float]) -> str:
+def _shown(value: float, measure: int | str, rounded: Callable[[float], int], noise: float) -> str:
     if not isfinite(value):
         return number(value)
     decimals = decimals_of_bound(value, measure) if isinstance(measure, str) else measure
-    return fixed(rounded(value, decimals), decimals)
+    return fixed(rounded(value * 10**decimals + noise) / 10**decimals, decimals)

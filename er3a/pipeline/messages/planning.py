@@ -33,7 +33,6 @@ TEXTS = texts(
         "must_stand_still": "the arm would have to stop along the path",
         "no_time_law_found": "no timing found within the joints' limits",
         "library_missing": "the library {name} is not installed; it has wheels for Linux on x86-64 only",
-        "nothing_measured": "distances can't be measured here, so nothing can be planned",
         "no_end": "at its {end:end}: {why}",
         "none_within_limits": "no joint angles within the limits reach it",
         "none_found": "no path found in {rounds} rounds; there may be one",

@@ -141,7 +141,7 @@ TEXTS = texts(
         "target_out_of_reach": "target out of reach: {reasons:; }",
         "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons:; }",
         "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",
-        "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds {bounded:bounded}",
+        "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds stay bounded",
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
         "arrives_otherwise": "the arm arrives in other joint angles: J{joint} differs by {difference:.2f}",
         "motion_collides": "collision ({assumed:shapes}): {touches:3; }",
@@ -173,7 +173,6 @@ WORDS.update(
             "target_reason": REASONS,
             "not_followed": {"": "from here on"},
             "shapes": {True: "assumed shapes", False: "stated shapes"},
-            "bounded": {True: "stay bounded", False: "have no bound"},
             "speed_given": {"": "none"},
             "suspect": {
                 "impossible_speed": "more than any point of the arm can do",
@@ -236,17 +235,11 @@ def _(found: Finding) -> str:
     return sentence("remedy.links")
 
 
-@advises("too_fast")
-def _(found: Finding) -> str:
-    percent = math.floor(1000 / rate_ratio(found)) / 10
-    return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
-
-
-@advises("acceleration_too_great")
+@advises("too_fast", "acceleration_too_great")
 def _(found: Finding) -> str:
     ratio = rate_ratio(found)
-    percent = math.floor(1000 / math.sqrt(ratio)) / 10
-    return sentence("remedy.slower", percent=percent, acceleration=math.floor(1000 / ratio) / 10)
+    percent = math.floor(1000 / (ratio if is_one(found, "too_fast") else math.sqrt(ratio))) / 10
+    return sentence("remedy.slower", percent=percent, acceleration=math.floor(percent**2 / 10) / 10)
 
 
 @advises("zone_too_large")

@@ -159,9 +159,9 @@ def gap_text(found: Open, most: int | None = MAX_NAMED) -> str:
     return bracketed(tr(GAP_WORDS[found.reason], amount=found.amount), open_names(found, most))
 
 
-def assumed_text(found: Open, most: int | None = None) -> str:
+def assumed_text(found: Open) -> str:
     """What is assumed, and of what."""
-    return bracketed(tr(ASSUMED[found.reason], amount=found.amount), open_names(found, most))
+    return bracketed(tr(ASSUMED[found.reason], amount=found.amount), open_names(found, None))
 
 
 def check_name(check: Check) -> str:

@@ -143,12 +143,6 @@ def path_text(path: model.PathSummary) -> str:
     return sentence("path.harmless", places=joined(met)) if met else sentence("path.no_fault")
 
 
-def _only_too_fast(path: model.PathSummary) -> bool:
-    """Whether speed and acceleration are all that is wrong with a path."""
-    other = path.unreachable or path.out_of_limits or path.collisions or path.jumps
-    return bool(path.too_fast) and not other and not any(is_one(each.cause, "jerk_too_great") for each in path.too_fast)
-
-
 @say.register
 def _(event: model.Singularity) -> str:
     when = f"{event.t_s:.4g}" if event.t_s == event.until_s else f"{event.t_s:.4g} – {event.until_s:.4g}"
@@ -316,7 +310,9 @@ def end_text(path: model.PathSummary, end: model.SoundEnd) -> str:
 def whole_pace(path: model.PathSummary) -> str:
     """The pace at which the whole path keeps the limits, and the setting that gives it; empty where none does."""
     speed, acceleration = path.max_joint_speed_ratio, path.max_joint_acceleration_ratio
-    if path.strategy != "slow" or speed is None or acceleration is None or not _only_too_fast(path):
+    other = bool(path.unreachable or path.out_of_limits or path.collisions or path.jumps)
+    other = other or any(is_one(each.cause, "jerk_too_great") for each in path.too_fast)
+    if path.strategy != "slow" or speed is None or acceleration is None or other or not path.too_fast:
         return ""
     longer = PACE_MARGIN * max(1.0, speed, acceleration**0.5)
     return sentence("advice.slower", percent=100 / longer, needed=path.duration_s * longer, longer=longer)
@@ -352,7 +348,9 @@ def repair_text(path: model.PathSummary, slowed: Slowed | None = None, switch: s
 def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
     """What the strategy that was chosen does, and what it costs."""
     tried, motion = _chosen(path)
-    tool = _leaves(motion.max_deviation_mm, motion.max_deviation_deg)
+    far, turned = motion.max_deviation_mm, motion.max_deviation_deg
+    stays = far < NO_DEVIATION and turned < NO_DEVIATION
+    tool = sentence("advice.tool", far="" if stays else _shortly(far), turned=_shortly(turned))
     swings = {j: swing for j, swing in enumerate(motion.joint_swing_deg, 1) if j not in path.sliding}
     if tried.name in BY_JOINTS and swings:
         joint = max(swings, key=swings.__getitem__)
@@ -363,7 +361,9 @@ def repair_lead(path: model.PathSummary, slowed: Slowed | None = None) -> str:
         percent = math.floor(100 * slowed.part)
         way = sentence("advice.slow_there", start=slowed.start_s, end=slowed.end_s, percent=percent)
     clear = "" if clearance is None else sentence("advice.clear", clearance=clearance)
-    parts = joined([tool, _takes(motion.duration_s, path.duration_s), clear])
+    takes = None if abs(motion.duration_s - path.duration_s) < NO_TIME else motion.duration_s
+    time = sentence("advice.time", takes=takes, programmed=path.duration_s)
+    parts = joined([tool, time, clear])
     return sentence("path.cause", event=way, pose=parts)
 
 
@@ -372,11 +372,6 @@ def _chosen(path: model.PathSummary) -> tuple[model.TriedStrategy, model.Strateg
     if tried is None or tried.motion is None:
         raise ValueError(f"{path.name} has no motion that repairs it")
     return tried, tried.motion
-
-
-def _leaves(far_mm: float, turned_deg: float) -> str:
-    stays = far_mm < NO_DEVIATION and turned_deg < NO_DEVIATION
-    return sentence("advice.tool", far="" if stays else _shortly(far_mm), turned=_shortly(turned_deg))
 
 
 def _shortly(value: float) -> str:
@@ -393,8 +388,3 @@ def switch_text(change: Sequence[float], sliding: Sequence[int]) -> str:
     moved = [(joint, value) for joint, value in enumerate(change, 1) if abs(value) >= LEAST_CHANGE]
     changes = [with_unit(f"J{j} {as_text(value, '+.0f')}", "mm" if j in sliding else "deg") for j, value in moved]
     return sentence("advice.switch", changes=changes)
-
-
-def _takes(takes_s: float, programmed_s: float) -> str:
-    takes = None if abs(takes_s - programmed_s) < NO_TIME else takes_s
-    return sentence("advice.time", takes=takes, programmed=programmed_s)

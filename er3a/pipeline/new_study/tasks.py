@@ -30,8 +30,8 @@ from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.language import written_title
 from er3a.pipeline.settings import TrajectorySettings
-from er3a.pipeline.stages.trajectory.judgement import MotionJudge
-from er3a.pipeline.stages.trajectory.motion import limits_of, motion_of, near_singular
+from er3a.pipeline.stages.trajectory.judgement import judged
+from er3a.pipeline.stages.trajectory.motion import motion_of, planning_of
 from er3a.planning.commands import CommandSource
 from er3a.robots.joint_limits import limit_margin, shown, within
 from er3a.robots.robot import Robot
@@ -169,8 +169,8 @@ class TaskSearch:
 
     def __init__(self, robot: Robot, reach: SampledReach, scene: Scene, settings: TrajectorySettings) -> None:
         self.robot, self.reach, self.settings = robot, reach, settings
-        self.limits, self.near = limits_of(robot, settings), near_singular(settings)
         self.bodies = Bodies(robot, scene)
+        self.task = planning_of(robot, settings, self.bodies)
         self.margin = settings.assumed_margin_mm / 1000 if arm_shapes(robot).assumed else 0.0
         self.drawn = reach.q[:JUDGED]
         self.fit = self.drawn[self._fits(self.drawn)]
@@ -266,7 +266,7 @@ class TaskSearch:
         robot = self.robot
         smallest = np.minimum(np.where(robot.slides, np.inf, LIMIT_MARGIN_RAD), (robot.upper - robot.lower) / 20)
         room = (np.minimum(q - robot.lower, robot.upper - q) > smallest) | robot.continuous
-        fits: Flags = room.all(axis=-1) & (self.near.margin(robot, q) > SINGULAR_MARGIN)
+        fits: Flags = room.all(axis=-1) & (self.task.near.margin(robot, q) > SINGULAR_MARGIN)
         fits[fits] = self.bodies.free(q[fits], self.margin)
         return fits
 
@@ -320,8 +320,7 @@ class TaskSearch:
             motion = motion_of(self.robot, entry, self.settings.checks_per_sample, CommandSource(None, ""), {})
         except Er3aError:
             return False
-        tolerance = self.settings.penetration_tolerance_mm / 1000
-        found = MotionJudge(self.robot, self.bodies, tolerance, self.near, self.limits).judged(motion)
+        found = judged(self.task, motion)
         at, distance = found.along.closest, found.along.distance
         return found.verdict == "safe" and not found.events and bool(at < 0 or distance[at] >= self.margin)
 

@@ -106,15 +106,14 @@ def record_pose(value: Value | None) -> Reals | None:
     return pose_of(plain, "kuka") if plain is not None and syntax.finite(plain) else None
 
 
-def frame_record(pose: Reals, kind: str = "FRAME") -> Record:
+def frame_record(pose: Reals) -> Record:
     """A transform as a frame of KRL; the inverse of :func:`record_pose`.
 
     Parameters
     ----------
     pose : (4, 4), m
-    kind : the type's name, such as ``FRAME`` or ``E6POS``
     """
-    return Record(kind, tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
+    return Record("FRAME", tuple(zip(FRAME_KEYS, numbers_of(pose, "kuka"))))
 
 
 def target(memory: ProgramMemory, value: Value, frames: Frames, said: tuple[str, bool]) -> Target:

@@ -24,7 +24,7 @@ from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.entry import CollisionSettings
 from er3a.pipeline.stages.covered import Covered, assumed_tool, covered_collisions, gaps_in_solids
 from er3a.pipeline.stages.trajectory.judgement import measured
-from er3a.pipeline.stages.trajectory.motion import ListedMotion, study_motions
+from er3a.pipeline.stages.trajectory.motion import ListedMotion, listed_motions, task_of
 from er3a.pipeline.study import Study
 from er3a.robots.joint_limits import meant, shown
 from er3a.robots.robot import Robot
@@ -171,7 +171,7 @@ def compute(study: Study, name: str) -> model.CollisionResults:
         places.joined[:] = free_space.joined_to_home(
             bodies, places, q_home, solved[bodies.free(solved)], settings.neighbours
         )
-    motions = list(study_motions(study, name, CHECKS))
+    motions = list(listed_motions(study.entry(name).paths, task_of(study, name), CHECKS))
     paths, on_paths, first_touch = path_clearances(motions, bodies, settings.penetration_tolerance_mm / 1000)
     pairs, matrix, places_found = _pair_shares(bodies, space), _matrix(bodies), _places_summary(places)
     mounting = tuple(stated(model.Mounting, contact) for contact in base_contacts(robot, scene))

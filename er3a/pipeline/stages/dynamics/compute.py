@@ -9,11 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.collision.bodies import Bodies
 from er3a.collision.shapes import shapes_assumed
 from er3a.dynamics import margins
 from er3a.dynamics.arm_model import ArmModel, arm_model, drives_of, estimated_links
-from er3a.dynamics.plausibility import MassFinding, has_mass, mass_findings
+from er3a.dynamics.plausibility import has_mass, mass_findings
 from er3a.dynamics.torques import Demand, TorqueParts, demand, known, power_imbalance, torque_parts, worst_holding
 from er3a.files.robot_library import LoadFields, load_of
 from er3a.finding import Finding, fact, is_one
@@ -23,16 +22,9 @@ from er3a.pipeline.scope import GAPS, OF_MOTIONS, Check, Coverage, Open, by_reas
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.entry import DynamicsSettings
-from er3a.pipeline.stages.trajectory.judgement import Judgement, MotionJudge
-from er3a.pipeline.stages.trajectory.motion import (
-    Motion,
-    PartOfProgram,
-    limits_of,
-    near_singular,
-    study_motions,
-)
+from er3a.pipeline.stages.trajectory.judgement import Judgement, judged
+from er3a.pipeline.stages.trajectory.motion import Motion, PartOfProgram, listed_motions, task_of
 from er3a.pipeline.study import Study
-from er3a.planning.timing import JointLimits
 from er3a.robots.joint_limits import shown
 from er3a.robots.masses import LinkMass, Load, MassBody, Masses, together
 from er3a.robots.robot import Grade, Robot, Source
@@ -147,7 +139,7 @@ def verdict_of(
     paths: list[PathTorques],
     holding: tuple[model.HoldingTorque, ...],
     uses: tuple[model.Use, ...],
-    findings: tuple[MassFinding, ...],
+    findings: tuple[Finding, ...],
     unknown: tuple[Open, ...],
     masses: model.MassesUsed | None,
     *,
@@ -212,35 +204,34 @@ class LoadedArm:
 
     Attributes
     ----------
-    unit_payload : 1 kg of the payload whose greatest mass is computed
+    settings : gravity, and the place of the payload whose greatest mass is computed
     links_grade, load_grade : of the masses
-    limits : joint speeds and accelerations, partly assumed
     """
 
     robot: Robot
     load: Load | None
-    unit_payload: MassBody
-    gravity: float
+    settings: DynamicsSettings
     links_grade: Grade
     load_grade: Grade
-    limits: JointLimits
 
     @cached_property
     def model(self) -> ArmModel:
         """The arm's model of its motion, with its load."""
-        return arm_model(self.robot, self.load, self.gravity)
+        return arm_model(self.robot, self.load, self.settings.gravity_m_s2)
 
     @cached_property
     def with_unit(self) -> ArmModel:
         """The arm's model with its load and 1 kg more, at the place of the payload."""
-        bodies = [body for body in (self.load, self.unit_payload) if body]
-        whole = together(bodies)
-        return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.gravity)
+        x, y, z = (value / 1000 for value in self.settings.payload_centre_mm)
+        square = (self.settings.payload_gyration_mm / 1000) ** 2
+        unit = MassBody(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0))
+        whole = together([body for body in (self.load, unit) if body])
+        return arm_model(self.robot, Load(whole.mass, whole.centre, whole.inertia), self.settings.gravity_m_s2)
 
     @cached_property
     def bare(self) -> ArmModel:
         """The arm's model without its load."""
-        return arm_model(self.robot, None, self.gravity)
+        return arm_model(self.robot, None, self.settings.gravity_m_s2)
 
     def tolerance(self, q: Reals, qd: Reals, qdd: Reals) -> Reals:
         """By how much torques may be off, by the tolerances of links and load.
@@ -275,24 +266,22 @@ class PathTorques:
     imbalance: float | None
 
 
-def path_torques(
-    arm: LoadedArm, motion: Motion, judged: Judgement, samples: int, wrist: tuple[int, ...]
-) -> PathTorques:
+def path_torques(arm: LoadedArm, motion: Motion, found: Judgement, wrist: tuple[int, ...]) -> PathTorques:
     """Torques of a path: its table at evenly spread times; peaks and means also where the path was solved and checked,
     and within pieces of it that are shorter than their steps.
 
     Parameters
     ----------
-    judged : what it came to
+    found : what it came to
     wrist : joints whose moments by the load are wanted
     """
     entry, n = motion.entry, arm.robot.joints
     asked = set(entry.expected) <= {"safe"}
-    t = np.linspace(0.0, motion.built.duration, samples)
+    t = np.linspace(0.0, motion.built.duration, arm.settings.samples)
     q, qd, qdd = motion.rates(t)
     if not np.isfinite([q, qd, qdd]).all():
         nothing = (float(t[-1]), (), (), None, None)
-        absent = model.PathLoad(entry.name, entry.title, judged.outcomes, False, False, *nothing)
+        absent = model.PathLoad(entry.name, entry.title, found.outcomes, False, False, *nothing)
         return PathTorques(absent, asked, model.TorqueRows.empty(), None, np.full((n, 2), np.nan), None)
     evenly, checked = t, np.union1d(t, motion.t)
     t = np.union1d(checked, within_short_pieces(motion, float(np.diff(checked).max(initial=0.0))))
@@ -308,8 +297,8 @@ def path_torques(
     summary = model.PathLoad(
         name=entry.name,
         title=entry.title,
-        outcomes=judged.outcomes,
-        counts=judged.may_run,
+        outcomes=found.outcomes,
+        counts=found.may_run,
         complete=True,
         duration_s=float(t[-1]),
         joints=_joint_loads(arm.robot, t, parts, tolerance, needed),
@@ -479,10 +468,11 @@ def compute(study: Study, name: str) -> model.DynamicsResults:
     robot = with_estimates(given, settings.capsule_density_kg_m3)
     loads = study.loads(name)
     load, load_grade = load_of(loads), _worst_grade([each.grade for each in loads])
-    grade = "inferred" if robot is not given else _links_grade(given)
+    source = given.sources.get("inertia")
+    grade = source.grade if source and robot is given else "inferred"
     moving = any(each.link > 0 for each in robot.masses.links)
-    arm = _loaded_arm(study, robot, load, (grade, load_grade), settings)
-    paths, skipped, rest = _paths(study, name, arm, settings) if moving else ([], (), ())
+    arm = LoadedArm(robot, load, settings, grade, load_grade)
+    paths, skipped, rest = _paths(study, name, arm) if moving else ([], (), ())
     holding = _holding(arm) if moving else ()
     motors = _motors(robot, paths, holding) if any(path.summary.counts for path in paths) else ()
     summaries = tuple(path.summary for path in paths)
@@ -545,31 +535,9 @@ def with_estimates(robot: Robot, density: float | None) -> Robot:
     return robot.replace(masses=Masses(links, kept.drives, kept.wrist, kept.weight))
 
 
-def _links_grade(robot: Robot) -> Grade:
-    source = robot.sources.get("inertia")
-    return source.grade if source else "inferred"
-
-
 def _worst_grade(grades: list[Grade]) -> Grade:
     order: tuple[Grade, ...] = ("measured", "official", "cad", "export", "claim", "inferred")
     return max(grades, key=order.index, default="official")
-
-
-def _loaded_arm(
-    study: Study, robot: Robot, load: Load | None, grades: tuple[Grade, Grade], settings: DynamicsSettings
-) -> LoadedArm:
-    trajectory = study.section(TrajectorySettings)
-    x, y, z = (value / 1000 for value in settings.payload_centre_mm)
-    square = (settings.payload_gyration_mm / 1000) ** 2
-    return LoadedArm(
-        robot=robot,
-        load=load,
-        unit_payload=MassBody(1.0, (x, y, z), (square, square, square, 0.0, 0.0, 0.0)),
-        gravity=settings.gravity_m_s2,
-        links_grade=grades[0],
-        load_grade=grades[1],
-        limits=limits_of(robot, trajectory),
-    )
 
 
 def _checked(paths: Sequence[PathTorques], rest: tuple[Open, ...], settings: DynamicsSettings) -> tuple[Coverage, ...]:
@@ -593,23 +561,19 @@ def _mounting(study: Study, name: str) -> tuple[Open, ...]:
     return () if placed else (Open("mounting"),)
 
 
-def _paths(
-    study: Study, name: str, arm: LoadedArm, settings: DynamicsSettings
-) -> tuple[list[PathTorques], tuple[str, ...], tuple[Open, ...]]:
+def _paths(study: Study, name: str, arm: LoadedArm) -> tuple[list[PathTorques], tuple[str, ...], tuple[Open, ...]]:
     """The paths, the names of those that an arm of its class can't follow, and what programs have besides."""
-    joints, trajectory = arm.robot.joints, study.section(TrajectorySettings)
+    joints, task = arm.robot.joints, task_of(study, name)
     last = range(max(1, joints - WRIST_JOINTS + 1), joints + 1)
     wrist = tuple(joint for joint in last if not arm.robot.slides[joint - 1])
-    bodies = Bodies(study.robot(name), study.scene(name, "trajectory"))
-    tolerance = trajectory.penetration_tolerance_mm / 1000
-    judge = MotionJudge(bodies.robot, bodies, tolerance, near_singular(trajectory), arm.limits)
     found, skipped, rest = [], [], list[Open]()
-    for each in study_motions(study, name, trajectory.checks_per_sample):
+    checks = study.section(TrajectorySettings).checks_per_sample
+    for each in listed_motions(study.entry(name).paths, task, checks):
         rest += each.open if each.meant_safe else ()
         if each.motion is None:
             skipped.append(each.name)
         else:
-            found.append(path_torques(arm, each.motion, judge.judged(each.motion), settings.samples, wrist))
+            found.append(path_torques(arm, each.motion, judged(task, each.motion), wrist))
             if isinstance(each.motion.entry, PartOfProgram) and each.motion.entry.part.load is not None:
                 rest.append(Open("program_loads", (each.name,)))
     return found, tuple(skipped), by_reason(rest)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from er3a.dynamics.margins import Binding, WristQuantity
-from er3a.dynamics.plausibility import MassFinding
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_
 from er3a.pipeline.results import Results, Summary
@@ -275,7 +275,7 @@ class DynamicsSummary(Summary):
 
     gravity_m_s2: float
     masses: MassesUsed | None
-    findings: tuple[MassFinding, ...]
+    findings: tuple[Finding, ...]
     payload_centre_mm: tuple[float, ...]
     payload_gyration_mm: float
     paths: tuple[PathLoad, ...]

@@ -24,7 +24,7 @@ from er3a.kinematics.neighbours import Usable, neighbours
 from er3a.kinematics.round_trips import MAX_BY_CLASS, SAME_JOINTS_RAD, BatchRoundTrips, batch_round_trips
 from er3a.kinematics.self_motions import SelfMotionCurve
 from er3a.kinematics.singularity import TYPES, characteristic_length, conditioning, determinant_factors
-from er3a.kinematics.solutions import MANY_TARGETS, Method, Solutions, Target, TargetOutcome
+from er3a.kinematics.solutions import MANY_TARGETS, Solutions, Target, TargetOutcome
 from er3a.kinematics.wrist_partitioned import has_branches, solve_slots
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.numerics.si_units import stated
@@ -86,8 +86,8 @@ def solve_target(
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
     near: model.NeighbourPoses | None = None
-    obstacle: model.Obstacle | None = None
-    advice: tuple[model.Advice, ...] = ()
+    obstacle: Finding | None = None
+    advice: tuple[Finding, ...] = ()
     if chosen is not None:
         advice = _what_to_know(robot, rows, chosen)
     else:
@@ -197,7 +197,7 @@ def _self_motion(family: Family | SelfMotionCurve) -> model.SelfMotion:
     return stated(model.SelfMotion, family, q0_deg=shown(family.robot, family.q0), direction=direction)
 
 
-def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
+def _obstacle(robot: Robot, target: Target, branches: int) -> Finding:
     """Why there is no solution within the limits: of the branch that misses the pose by least."""
     if branches:
         return fact("branches_leave_limits", count=branches)
@@ -210,7 +210,7 @@ def _obstacle(robot: Robot, target: Target, branches: int) -> model.Obstacle:
     return fact("reach_missing", gap_mm=float(gap[smallest] * 1000))
 
 
-def _outcome(obstacle: model.Obstacle | None) -> TargetOutcome:
+def _outcome(obstacle: Finding | None) -> TargetOutcome:
     match obstacle:
         case None:
             return "reached"
@@ -234,8 +234,8 @@ def _usable(robot: Robot, scene: Scene | None, clearance: float) -> Usable:
     return usable
 
 
-def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[model.Advice, ...]:
-    turn: model.Advice = fact("turning_does_not_help")
+def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[Finding, ...]:
+    turn = fact("turning_does_not_help")
     if near.least_turn_deg is not None and near.turned_to_deg is not None:
         turn = fact(
             "turn_tool",
@@ -245,7 +245,7 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
             margin_deg=LITTLE_MARGIN_DEG,
             clearance_mm=1000 * clearance,
         )
-    shift: model.Advice = fact("shifting_does_not_help")
+    shift = fact("shifting_does_not_help")
     if near.least_shift_mm is not None and near.shifted_to_mm is not None:
         shift = fact(
             "shift_tool",
@@ -257,10 +257,8 @@ def _what_would_help(near: model.NeighbourPoses, clearance: float) -> tuple[mode
     return turn, shift
 
 
-def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[model.Advice, ...]:
-    found: list[model.Advice] = [
-        fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on
-    ]
+def _what_to_know(robot: Robot, rows: model.SolutionRows, chosen: int) -> tuple[Finding, ...]:
+    found: list[Finding] = [fact("at_singularity", kind=kind) for kind, on in zip(TYPES, rows.singular[chosen]) if on]
     margin = float(rows.limit_margin_deg[chosen])
     near = fact("near_limit", margin=Amount(margin, unit_compared(robot)))
     return (*found, near) if margin < LITTLE_MARGIN_DEG else tuple(found)
@@ -420,13 +418,12 @@ def _checked(
 
 def _assumed(targets: Sequence[model.TargetResult]) -> tuple[Open, ...]:
     """Targets whose solutions may not be all that there are."""
-    names = tuple(each.name for each in targets if not _is_certain(each.method))
+    names = tuple(
+        each.name
+        for each in targets
+        if is_one(each.method, "iteration") or (is_one(each.method, "by_class") and not each.method.certain)
+    )
     return (Open("solutions_complete", names),) if names else ()
-
-
-def _is_certain(method: Method) -> bool:
-    """Whether the solutions that it found are all."""
-    return bool(method.certain) if is_one(method, "by_class") else not is_one(method, "iteration")
 
 
 def _verdict(

@@ -17,12 +17,6 @@ from er3a.pipeline.tables import Findings, Table, Texts, column, findings, per_j
 from er3a.selection.nearest import WhyFirst
 from er3a.selection.rule_names import RuleName
 
-Obstacle = Finding
-
-
-Advice = Finding
-
-
 SINGULAR_PARTS = ("wrist", "elbow", "shoulder", "rank")
 
 
@@ -92,14 +86,14 @@ class TargetResult:
     chosen_deg: tuple[float, ...] | None
     chosen_branch: int | None
     reason: WhyFirst | Finding
-    obstacle: Obstacle | None
+    obstacle: Finding | None
     outcome: TargetOutcome
     expect: TargetOutcome | None
     unsolved: tuple[Unsolved, ...]
     method: Method
     families: tuple[SelfMotion, ...]
     neighbours: NeighbourPoses | None
-    advice: tuple[Advice, ...]
+    advice: tuple[Finding, ...]
     clearance: TargetClearance | None = None
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from er3a.collision.along import ClearanceAlong, clearance_along
-from er3a.collision.bodies import Bodies
-from er3a.collision.scene import Scene
+from er3a.collision.along import clearance_along
 from er3a.collision.shapes import arm_shapes, shapes_assumed
 from er3a.finding import Finding, fact
 from er3a.kinematics.forward import forward
@@ -31,11 +28,10 @@ from er3a.pipeline.stages.trajectory import judgement, model
 from er3a.pipeline.stages.trajectory.motion import (
     ListedMotion,
     Motion,
+    MotionTask,
     corner_misses,
-    limits_of,
     listed_motions,
-    near_singular,
-    planning_of,
+    task_of,
     times_in,
 )
 from er3a.pipeline.stages.trajectory.written_programs import near_assumed_shapes, program_files
@@ -45,7 +41,7 @@ from er3a.planning.avoidance.strategies import StrategyCost, StrategyResult, bes
 from er3a.planning.motion_faults import Interval, SingularEvent
 from er3a.planning.names import PATH_VERDICTS, PathVerdict, StrategyName
 from er3a.planning.timing import JointLimits, Timed, TimingError, fastest, nodes_along
-from er3a.planning.way_around import PlanningTask, WayAround, way_between
+from er3a.planning.way_around import WayAround, way_between
 from er3a.robots.joint_limits import shown, speeds_given, within
 from er3a.robots.robot import Robot
 
@@ -70,8 +66,8 @@ class Avoided:
     rows: model.AvoidanceRows
 
 
-@dataclass(frozen=True)
-class AvoidanceTask:
+@dataclass(frozen=True, eq=False)
+class AvoidanceTask(MotionTask):
     """What all paths of a robot have in common.
 
     Attributes
@@ -80,20 +76,8 @@ class AvoidanceTask:
     only : the strategy that the study asks for; None to compare all
     """
 
-    judge: judgement.MotionJudge
-    only: StrategyName | None
-    planning: PlanningTask
-    margin: float
-
-    @property
-    def robot(self) -> Robot:
-        """The arm."""
-        return self.judge.robot
-
-    @property
-    def limits(self) -> JointLimits:
-        """Its rates' limits."""
-        return self.judge.limits
+    only: StrategyName | None = None
+    margin: float = 0.0
 
     def avoid(self, motion: Motion, found: judgement.Judgement) -> Avoided:
         """Compare the strategies where a path is not safe; find its fastest time law where it can be run as it is.
@@ -107,7 +91,7 @@ class AvoidanceTask:
             quickest, results = self._joint_move(motion, found)
         else:
             fixed_start = motion.built.q_start is not None
-            segment = singular_segment(motion.followed, self.judge.near, self.limits, found.events, fixed_start)
+            segment = singular_segment(motion.followed, self.near, self.limits, found.events, fixed_start)
             quickest = _quickest(segment)
             if found.of_joints != "safe":
                 results = compare_strategies(
@@ -116,7 +100,8 @@ class AvoidanceTask:
         collides = bool(found.along.contacts)
         if (collides or found.beyond or found.limits) and motion.not_planned is None and self.only in (None, "planned"):
             results += self._planned(motion)
-        margin, name = self._margin_of(found.along), motion.entry.name
+        ends, name = found.along.distance[[0, -1]], motion.entry.name
+        margin = float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))  # no more than the ends of the path have
         met = {result.name: self._meets(result.cost, margin) for result in results if result.cost}
         free = [result for result in results if result.name not in met or met[result.name][0] is None]
         meets = motion.followed is not None and any(event.crossing for event in found.events)
@@ -147,7 +132,7 @@ class AvoidanceTask:
         """The planner's motion between the ends of a path, where both can be reached."""
         tool = motion.tool(np.array([0.0, motion.built.duration]))
         ends = [self._end(q, T) for q, T in zip(motion.q[[0, -1]], tool)]
-        found = way_between(self.planning, *ends)
+        found = way_between(self, *ends)
         if not isinstance(found, WayAround):
             return [StrategyResult("planned", None, (found,))]
         timed = found.motion
@@ -184,7 +169,7 @@ class AvoidanceTask:
         nothing can meet)."""
         curve = cost.motion.curve
         grid = np.linspace(0.0, curve.duration, CLEARANCE_TIMES)
-        along = clearance_along(self.judge.bodies, curve.joints, curve.rate_bounds, grid, grid, self.judge.tolerance)
+        along = clearance_along(self.bodies, curve.joints, curve.rate_bounds, grid, grid, self.tolerance)
         smallest = judgement.min_clearance(along)
         if smallest is None:
             return None, None
@@ -194,11 +179,6 @@ class AvoidanceTask:
         return fact(
             "pair_too_near", pair=smallest.between, clearance_mm=smallest.least_mm, margin_mm=1000 * margin
         ) if near else None, smallest
-
-    def _margin_of(self, along: ClearanceAlong) -> float:
-        """The margin (m) that a motion is to keep which has the ends of a path: no more than these ends have."""
-        ends = along.distance[[0, -1]]
-        return float(min([self.margin, *(ends[ends > 0] - ROUNDED)]))
 
     def _rows(self, path: str, strategy: str, timed: Timed, cost: StrategyCost | None) -> model.AvoidanceRows:
         """At most ROWS rows of a motion, and those of its maximum speed and deviation."""
@@ -414,12 +394,12 @@ def _judged(
 ) -> JudgedPath:
     """A path with its faults, what avoids them, and its programs; ``assumed_margin``: m, around assumed shapes."""
     robot, limits = task.robot, task.limits
-    found = task.judge.judged(motion)
+    found = judgement.judged(task, motion)
     avoided = task.avoid(motion, found)
-    checks = _checks(robot, motion, found, task.judge.near, limits)
+    checks = _checks(robot, motion, found, task.near, limits)
     path = replace(
         path_summary(task, motion, found, avoided, assumed_margin),
-        clear_until=judgement.last_safe_stop(task.judge, motion, found, task.margin),
+        clear_until=judgement.last_safe_stop(task, motion, found, task.margin),
         of_program=tuple(map(finding_at, each.found)),
     )
     path = replace(path, sound_end=judgement.advised_end(path, checks, _limits_used(robot, limits, settings)))
@@ -436,21 +416,17 @@ def compute(study: Study, name: str) -> model.TrajectoryResults:
     :class:`InputError` if a file of the study can't be used.
     """
     robot, settings = study.robot(name), study.section(TrajectorySettings)
-    near, limits = near_singular(settings), limits_of(robot, settings)
-    scene, assumed_margin = study.scene(name, "trajectory"), study.assumed_margin(name)
-    tolerance = settings.penetration_tolerance_mm / 1000
-    judge = judgement.MotionJudge(robot, Bodies(robot, scene), tolerance, near, limits)
+    plain, assumed_margin = task_of(study, name), study.assumed_margin(name)
     only = None if settings.avoidance == "compare" else settings.avoidance
-    planning = planning_of(robot, settings, judge.bodies, study.seed)
-    margin = (assumed_margin if arm_shapes(robot).assumed else tolerance) + ROUNDED
-    task = AvoidanceTask(judge, only, planning, margin)
-    listed = list(listed_motions(Path(study.entry(name).paths), planning, near, settings.checks_per_sample))
+    margin = (assumed_margin if arm_shapes(robot).assumed else plain.tolerance) + ROUNDED
+    task = AvoidanceTask(**vars(plain), only=only, margin=margin)
+    listed = list(listed_motions(study.entry(name).paths, task, settings.checks_per_sample))
     judged = [_judged(task, each, each.motion, settings, assumed_margin) for each in listed if each.motion]
     checks = model.PathChecks.stacked([each.checks for each in judged]).of_joints(robot.slides)
     own = checks.take(checks.sample)
     avoidance = model.AvoidanceRows.stacked([each.avoidance for each in judged])
     return model.TrajectoryResults(
-        summary=_summary(task, listed, [each.path for each in judged], settings, scene, assumed_margin),
+        summary=_summary(task, listed, [each.path for each in judged], settings, assumed_margin),
         samples=model.Samples(**{name: getattr(own, name) for name in model.Samples.columns()}).of_joints(robot.slides),
         checks=checks,
         clearance=model.Clearances.stacked([each.clearance for each in judged]),
@@ -464,18 +440,17 @@ def _summary(
     listed: Sequence[ListedMotion],
     paths: list[model.PathSummary],
     settings: TrajectorySettings,
-    scene: Scene | None,
     assumed_margin: float,
 ) -> model.TrajectorySummary:
     """The stage's answer, its paths, and what it did not look at."""
-    robot, limits, bodies = task.robot, task.limits, task.judge.bodies
+    robot, limits, bodies = task.robot, task.limits, task.bodies
     skipped = [_not_followed(robot, each) for each in listed if each.motion is None]
     safe = [each for each in listed if each.meant_safe]
     turned = [asked for each in safe if each.motion for asked in _asked_of_tool(each.name, each.motion)]
     length, used = characteristic_length(robot), _limits_used(robot, limits, settings)
     clearance = {path.name: path.clearance.least_mm / 1000 for path in paths if path.clearance and path.meant_safe}
     assumed_shapes = shapes_assumed(robot, assumed_margin, clearance)
-    covered = covered_collisions(robot, bodies, scene)
+    covered = covered_collisions(robot, bodies, bodies.scene)
     gaps = (*(gap for each in safe for gap in each.gaps), *gaps_of_orientations(robot, turned))
     return model.TrajectorySummary(
         verdict=_verdict(paths, skipped, assumed_shapes).with_assumed_shapes(assumed_shapes),
@@ -483,7 +458,7 @@ def _summary(
         characteristic_length_m=length,
         near=model.NearThresholds(settings.near_wrist_deg, settings.near_elbow_deg, settings.near_shoulder_mm),
         joint_limits=used,
-        scene=scene.title if scene else None,
+        scene=bodies.scene.title if bodies.scene else None,
         penetration_tolerance_mm=settings.penetration_tolerance_mm,
         paths=tuple(paths),
         not_followed=tuple(skipped),

@@ -14,13 +14,11 @@ from er3a.collision.pairs import label_of
 from er3a.collision.shapes import surely_touch
 from er3a.finding import Finding, fact
 from er3a.geometry.transforms import rpy_of
-from er3a.kinematics.singularity import NearSingular
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.motion import Motion
+from er3a.pipeline.stages.trajectory.motion import Motion, MotionTask
 from er3a.planning import motion_faults
 from er3a.planning.names import NOT_TO_BE_RUN, PathVerdict, gravest
-from er3a.planning.timing import JointLimits
 from er3a.planning.tool_curve import open_stretches
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -77,82 +75,66 @@ class Judgement:
         return set(self.outcomes).isdisjoint(NOT_TO_BE_RUN) and self.speed_bounded
 
 
-@dataclass(frozen=True, eq=False)
-class MotionJudge:
-    """What motions of an arm are judged by, for all stages and programs.
+def judged(task: MotionTask, motion: Motion, along: ClearanceAlong | None = None) -> Judgement:
+    """Check a motion, whatever made it: its polynomials, exactly.
 
-    Attributes
+    Parameters
     ----------
-    bodies : that must not meet; tolerance : m, the overlap that may go unnoticed
-    near : distances below which a pass counts as near-singular
-    limits : of speeds and accelerations, rad or m
+    task : what it is judged by
+    motion : of the arm, with its times
+    along : its clearance, if that has been measured
+
+    Returns
+    -------
+    found : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
     """
-
-    robot: Robot
-    bodies: Bodies
-    tolerance: float
-    near: NearSingular
-    limits: JointLimits
-
-    def judged(self, motion: Motion, along: ClearanceAlong | None = None) -> Judgement:
-        """Check a motion, whatever made it: its polynomials, exactly.
-
-        Parameters
-        ----------
-        motion : of the arm, with its times
-        along : its clearance, if that has been measured
-
-        Returns
-        -------
-        found : gaps of the polynomials are undecided; where the path ends or is singular, they are what that leaves
-        """
-        curve, followed = motion.curve, motion.followed
-        events = motion_faults.singular_events(self.robot, curve, self.near)
-        crossed, jumps = any(event.crossing for event in events), followed.jumps if followed else ()
-        ends = followed is not None and (jumps or np.isnan(followed.q).any() or crossed)
-        times = np.unique(np.concatenate([motion.checks, [event.t for event in events]]))
-        q, velocity, acceleration = motion.rates(times)
-        beyond = motion_faults.unreachable(self.robot, followed) if followed else []
-        edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
-        bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
-        known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
-        limits = motion_faults.limit_intervals(self.robot, curve)
-        fast = [part for limit in self.limits.rates for part in motion_faults.rate_intervals(curve, limit)]
-        undecided = [] if ends else open_stretches(curve)
-        along = along or measured(self.bodies, self.tolerance, motion)
-        spans: dict[PathVerdict, list[tuple[float, float]]] = {
-            "unreachable": [(part.start, part.end) for part in beyond],
-            "leaves limits": [(part.start, part.end) for part in limits],
-            "collides": [(contact.start, contact.end) for contact in along.contacts],
-            "too fast": [(part.start, part.end) for part in fast if part.cause.basis != "assumed"],
-        }
-        faults: dict[PathVerdict, object] = {
-            **spans,
-            "none found": motion.not_planned,
-            "singular": followed and (jumps or crossed),
-            "too fast for the assumed limits": fast,
-            "undecided": undecided,
-            "near-singular": followed and events,
-        }
-        there = [name for name, found in faults.items() if found]
-        verdict = gravest(there)
-        return Judgement(
-            verdict=verdict,
-            of_joints=gravest(name for name in there if name != "collides"),
-            outcomes=in_order(verdict, spans, float(motion.built.duration)),
-            events=events,
-            limits=limits,
-            fast=fast,
-            undecided=undecided,
-            beyond=beyond,
-            along=along,
-            max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known and bounded else None,
-            times=times,
-            q=q,
-            velocity=velocity,
-            acceleration=acceleration,
-            speed_bounded=bounded,
-        )
+    curve, followed = motion.curve, motion.followed
+    events = motion_faults.singular_events(task.robot, curve, task.near)
+    crossed, jumps = any(event.crossing for event in events), followed.jumps if followed else ()
+    ends = followed is not None and (jumps or np.isnan(followed.q).any() or crossed)
+    times = np.unique(np.concatenate([motion.checks, [event.t for event in events]]))
+    q, velocity, acceleration = motion.rates(times)
+    beyond = motion_faults.unreachable(task.robot, followed) if followed else []
+    edge = any(interval.start > 0 or interval.end < times[-1] for interval in beyond)
+    bounded = not edge and not jumps and not (np.isfinite(q[:, 0]) & np.isnan(velocity[:, 0])).any()
+    known = np.isfinite(curve.velocity).any()  # not where the tool reaches no point of its path
+    limits = motion_faults.limit_intervals(task.robot, curve)
+    fast = [part for limit in task.limits.rates for part in motion_faults.rate_intervals(curve, limit)]
+    undecided = [] if ends else open_stretches(curve)
+    along = along or measured(task.bodies, task.tolerance, motion)
+    spans: dict[PathVerdict, list[tuple[float, float]]] = {
+        "unreachable": [(part.start, part.end) for part in beyond],
+        "leaves limits": [(part.start, part.end) for part in limits],
+        "collides": [(contact.start, contact.end) for contact in along.contacts],
+        "too fast": [(part.start, part.end) for part in fast if part.cause.basis != "assumed"],
+    }
+    faults: dict[PathVerdict, object] = {
+        **spans,
+        "none found": motion.not_planned,
+        "singular": followed and (jumps or crossed),
+        "too fast for the assumed limits": fast,
+        "undecided": undecided,
+        "near-singular": followed and events,
+    }
+    there = [name for name, found in faults.items() if found]
+    verdict = gravest(there)
+    return Judgement(
+        verdict=verdict,
+        of_joints=gravest(name for name in there if name != "collides"),
+        outcomes=in_order(verdict, spans, float(motion.built.duration)),
+        events=events,
+        limits=limits,
+        fast=fast,
+        undecided=undecided,
+        beyond=beyond,
+        along=along,
+        max_rates=(curve.max_abs(curve.velocity), curve.max_abs(curve.acceleration)) if known and bounded else None,
+        times=times,
+        q=q,
+        velocity=velocity,
+        acceleration=acceleration,
+        speed_bounded=bounded,
+    )
 
 
 def in_order(
@@ -253,7 +235,7 @@ def min_clearance(along: ClearanceAlong) -> model.MinClearance | None:
     return model.MinClearance(float(along.distance[at] * 1000), float(along.t[at]), pair, along.measured)
 
 
-def last_safe_stop(judge: MotionJudge, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
+def last_safe_stop(task: MotionTask, motion: Motion, found: Judgement, margin: float) -> model.ClearUntil | None:
     """The last point from which a motion still stops with a margin (m) kept; None if it meets nothing, or keeps it
     nowhere.
 
@@ -262,7 +244,7 @@ def last_safe_stop(judge: MotionJudge, motion: Motion, found: Judgement, margin:
     design at their joint, which have no margin to keep there, those that overlap elsewhere keep half of their first
     distance.
     """
-    contacts, bodies, acceleration = found.along.contacts, judge.bodies, judge.limits.acceleration
+    contacts, bodies, acceleration = found.along.contacts, task.bodies, task.limits.acceleration
     if not contacts:
         return None
     first, met = contacts[0].start, {pair for contact in contacts for pair in contact.pairs}
@@ -281,7 +263,7 @@ def last_safe_stop(judge: MotionJudge, motion: Motion, found: Judgement, margin:
 
     stops = [part.start for part in found.limits] + [part.start for part in found.beyond]
     last = min([first, *(BEFORE_STOP * stop for stop in stops)])
-    kept_to = _margin_end(judge, motion, beyond, last, margin)
+    kept_to = _margin_end(task, motion, beyond, last, margin)
     if kept_to is None:
         return None
     end = kept_to
@@ -300,13 +282,13 @@ def last_safe_stop(judge: MotionJudge, motion: Motion, found: Judgement, margin:
         float(motion.way(np.array([end]))[0]),
         tuple((1000 * pose[:3, 3]).tolist()),
         tuple(np.degrees(rpy_of(pose)).tolist()),
-        tuple(shown(judge.robot, q[0]).tolist()),
+        tuple(shown(task.robot, q[0]).tolist()),
         tuple((1000 * touching).tolist()),
     )
 
 
 def _margin_end(
-    judge: MotionJudge, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
+    task: MotionTask, motion: Motion, beyond: Callable[[Reals], Reals], last: float, margin: float
 ) -> float | None:
     """Up to when (s, ``last`` at most) a motion keeps a margin (m), proven; None if nowhere.
 
@@ -322,8 +304,8 @@ def _margin_end(
         if k > 0:
             end = scipy.optimize.brentq(lambda t: beyond(np.array([t]))[0], grid[k - 1], grid[k], xtol=1e-9 * last)
         known = np.append(motion.t[motion.t < end], end)
-        until = clearance_along(judge.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], judge.tolerance)
-        short = until.distance < margin - judge.tolerance
+        until = clearance_along(task.bodies, motion.joints, motion.rate_bounds, known, known[[0, -1]], task.tolerance)
+        short = until.distance < margin - task.tolerance
         if not short.any():
             return float(end)
         end = float(until.t[int(np.argmax(short))])

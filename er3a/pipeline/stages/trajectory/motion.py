@@ -19,7 +19,7 @@ from er3a.finding import Finding
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import NearSingular
+from er3a.kinematics.singularity import USUAL_NEAR, NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Flags, Reals
 from er3a.pipeline.scope import GAPS, Open
@@ -90,9 +90,20 @@ def times_in(entry: PlannedEntry) -> TimesIn:
     return "table" if isinstance(entry, TablePath) and entry.duration_s is None else "path_file"
 
 
-def planned_entries(
-    task: PlanningTask, entry: PathEntry | ProgramPath, source: CommandSource, near: NearSingular
-) -> Iterator[PlannedEntry]:
+@dataclass(frozen=True, eq=False)
+class MotionTask(PlanningTask):
+    """What motions of an arm are planned and judged by, for all stages and programs.
+
+    Attributes
+    ----------
+    bodies : that must not meet; tolerance : m, the overlap that may go unnoticed
+    near : distances below which a pass counts as near-singular
+    """
+
+    near: NearSingular = USUAL_NEAR
+
+
+def planned_entries(task: MotionTask, entry: PathEntry | ProgramPath, source: CommandSource) -> Iterator[PlannedEntry]:
     """A path as it is, a program as its stretches, named by their numbers.
 
     Raises
@@ -106,11 +117,10 @@ def planned_entries(
     start = None if entry.start_deg is None else joint_values(task.robot, entry.start_deg, "start_deg")
     options = CheckOptions(
         start=start,
-        scene=task.bodies.scene if task.bodies else None,
-        near=near,
+        scene=task.bodies.scene,
+        near=task.near,
         joint_limits=task.limits,
         penetration_tolerance=task.tolerance,
-        measures=task.bodies is not None,
     )
     check = check_program(read_program(entry.program), task.robot, options)
     parts, rest = parts_of(check, task.robot, source)
@@ -377,12 +387,12 @@ def near_singular(settings: TrajectorySettings) -> NearSingular:
     return NearSingular(float(wrist), float(elbow), settings.near_shoulder_mm / 1000)
 
 
-def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | None, seed: int) -> PlanningTask:
-    """How motions are planned.
+def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies, seed: int = 0) -> MotionTask:
+    """How motions are planned and judged.
 
     Parameters
     ----------
-    bodies : what they must not meet; None where nothing can be measured
+    bodies : what they must not meet
     seed : of the planner's random numbers
 
     Returns
@@ -390,7 +400,19 @@ def planning_of(robot: Robot, settings: TrajectorySettings, bodies: Bodies | Non
     task : tolerance in m, limits in rad and m
     """
     tolerance = settings.penetration_tolerance_mm / 1000
-    return PlanningTask(robot, bodies, tolerance, limits_of(robot, settings), seed)
+    return MotionTask(robot, bodies, tolerance, limits_of(robot, settings), seed, near=near_singular(settings))
+
+
+def task_of(study: Study, name: str) -> MotionTask:
+    """How motions of a robot of the study are planned and judged, in the scene of its trajectory stage.
+
+    Parameters
+    ----------
+    name : of a robot
+    """
+    robot = study.robot(name)
+    bodies = Bodies(robot, study.scene(name, "trajectory"))
+    return planning_of(robot, study.section(TrajectorySettings), bodies, study.seed)
 
 
 def assumed_speeds(robot: Robot, settings: TrajectorySettings) -> Reals:
@@ -476,33 +498,12 @@ class ListedMotion:
         return "unreachable" if self.ends.kind == "out_of_reach" else "singular"
 
 
-def study_motions(study: Study, name: str, checks_per_sample: int) -> Iterator[ListedMotion]:
-    """The motions of a robot of the study, in the scene of its trajectory stage.
-
-    Parameters
-    ----------
-    name : of a robot
-    checks_per_sample : points between two samples at which motions are checked, at least
-
-    Returns
-    -------
-    motions : as of :func:`listed_motions`, made one after another
-    """
-    robot, settings = study.robot(name), study.section(TrajectorySettings)
-    bodies = Bodies(robot, study.scene(name, "trajectory"))
-    task = planning_of(robot, settings, bodies, study.seed)
-    return listed_motions(Path(study.entry(name).paths), task, near_singular(settings), checks_per_sample)
-
-
-def listed_motions(
-    file: Path, task: PlanningTask, near: NearSingular, checks_per_sample: int
-) -> Iterator[ListedMotion]:
+def listed_motions(file: str | Path, task: MotionTask, checks_per_sample: int) -> Iterator[ListedMotion]:
     """Plan the paths of a file.
 
     Parameters
     ----------
     task : the arm, what it must not meet and its limits, for motions that are to be planned
-    near : distances below which a program's check calls a pose near-singular
     checks_per_sample : points checked between two samples to begin with
 
     Raises
@@ -513,9 +514,9 @@ def listed_motions(
     ends: dict[str, Reals] = {}
     nowhere, lost = np.full(task.robot.joints, np.nan), set[str]()
     for i, listed in enumerate(load_paths(file).paths):
-        source = CommandSource(file, f"paths[{i}]")
+        source = CommandSource(Path(file), f"paths[{i}]")
         try:
-            entries = [*planned_entries(task, listed, source, near)]
+            entries = [*planned_entries(task, listed, source)]
         except InputError as error:
             ends[listed.name] = nowhere
             lost.add(listed.name)

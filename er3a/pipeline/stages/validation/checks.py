@@ -16,8 +16,7 @@ from er3a.finding import Amount, Finding, fact, is_one
 from er3a.identifiability.entries import GROUP_OF, column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, Status
 from er3a.identifiability.evidence import GRAVEST, PART_OF_GROUP, PartName, together
-from er3a.identifiability.proposals import Proposal
-from er3a.identifiability.reactions import CheckBasis, CheckCounts, count_checks
+from er3a.identifiability.reactions import CheckBasis, CheckCounts, CheckKind, CheckTally
 from er3a.identifiability.statements import (
     NOT_OFF,
     ToolOff,
@@ -446,13 +445,13 @@ def _left_of(evidence: model.TableEvidence | None) -> dict[str, Any]:
     }
 
 
-def _next_measurement(evidence: model.TableEvidence | None) -> Proposal | None:
+def _next_measurement(evidence: model.TableEvidence | None) -> Finding | None:
     """What would settle the entry for which the tool could be off farthest; of equals, what documents leave open."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in (*evidence.entries, *evidence.combinations)}
 
-    def gravity(proposal: Proposal) -> tuple[float, float, bool]:
+    def gravity(proposal: Finding) -> tuple[float, float, bool]:
         each = by_name[proposal.entry]
         return each.off.mm, each.off.deg, each.status == "open"
 
@@ -471,7 +470,12 @@ def counts_of(checks: Iterable[model.Check]) -> CheckCounts:
     counts : passed, failed and in conflict, of independent checks, those of consistency, and claims
     """
     referenced = _referenced(checks)
-    return count_checks([check.kind for check in referenced if check.kind], [check.status for check in referenced])
+
+    def tally(kind: CheckKind) -> CheckTally:
+        own = [check.status for check in referenced if check.kind == kind]
+        return CheckTally(own.count("pass"), own.count("fail"), own.count("conflict"))
+
+    return CheckCounts(tally("independent"), tally("consistency"), tally("claim"))
 
 
 def _referenced(checks: Iterable[model.Check]) -> list[model.Judged]:

@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, Self
 
-from er3a.diagnosis.conclusions import Conclusion, RankedHypothesis
+from er3a.diagnosis.conclusions import RankedHypothesis
 from er3a.files.robot_library import robot_of
 from er3a.finding import Finding, is_one
 from er3a.identifiability.entry_evidence import EntryEvidence, Tolerance
-from er3a.identifiability.proposals import Proposal
 from er3a.identifiability.reactions import CheckCounts, CheckKind
 from er3a.kinematics.wrist_partitioned import ClosedFormMissing
 from er3a.numerics.arrays import Integers, Reals
@@ -151,7 +150,7 @@ class SetDiagnosis:
     """
 
     reference_set: str
-    conclusion: Conclusion
+    conclusion: Finding
     against: tuple[str, ...]
     from_table: tuple[str, ...]
     references: int
@@ -255,7 +254,7 @@ class TableEvidence:
     entries: tuple[EntryEvidence, ...]
     combinations: tuple[EntryEvidence, ...]
     parts: tuple[Finding, ...]
-    proposals: tuple[Proposal, ...]
+    proposals: tuple[Finding, ...]
     table_meets: bool
     other: OtherTableFound | None
 
