@@ -58,7 +58,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(fontsize=8)
-    parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
     power.set_xlabel(axis_label(rows, "t_s"))

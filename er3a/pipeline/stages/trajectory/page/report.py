@@ -114,12 +114,12 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
+    faulty, others = paths[: len(wrong)], paths[len(wrong) :]
     fault_rows = {}
-    for path in paths[: len(wrong)]:
+    for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-    mended = [fault_rows[path.name] for path in paths[: len(wrong)] if path.chosen and path.name not in hindered]
-    others = paths[len(wrong) :]
+    mended = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
         replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
@@ -138,7 +138,7 @@ def answer_of(
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(paths[: len(wrong)], len(mended)), keys, groups, fix)
+    return Answer(headline, rest, _in_short(faulty, len(mended)), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
