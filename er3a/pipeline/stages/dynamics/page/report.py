@@ -63,14 +63,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     power.set_ylabel(axis_label(rows, "power_w"))
     power.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
-    caption = tr(
-        "J{joint} needs most, {peak} {unit} at {t:.2f} s; largest part: {part}. Shaded: tolerance of the masses.",
-        joint=load.joint,
-        peak=within(load.peak, load.tolerance),
-        unit=load.unit,
-        t=load.peak_at_s,
-        part=names[most],
-    )
+    caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
     alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 

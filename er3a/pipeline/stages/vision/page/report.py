@@ -52,7 +52,7 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     axes[0].legend(ncols=3, loc="upper right")
     worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
     caption = tr(
-        "Residual of each sample. Above the dashed line: outliers. Worst used: {name}, {mm} mm.",
+        "Residuals; outliers are above the line. Worst used: {name}, {mm} mm.",
         name=rows.sample[worst],
         mm=fixed(sizes[0][worst], 2),
     )
