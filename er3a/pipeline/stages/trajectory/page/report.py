@@ -40,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -120,16 +120,17 @@ def answer_of(
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
     mended = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
+    limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        replace(_sound_row(path, shares[path.name], limits), mark="fail", note=as_expected(path), fix=None)
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Can be repaired"), mended),
-        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
+        Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
@@ -161,10 +162,12 @@ def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     )
 
 
-def _sound_row(path: model.PathSummary, length: float) -> ListRow:
-    """A path that may be run, with how near it comes to anything."""
+def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
+    """A path that may be run, with how near it comes to anything, and the joint speed that is nearest to its limit."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
+    rate = tr("joint speed nearest its limit (deg/s)")
+    said = Fix(f"{path.name}: {rate}: {_speed(path, limits)}; {_clear_of(path)}", f"#{path.name}")
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=said)
 
 
 def _programs(
