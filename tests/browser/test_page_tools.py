@@ -84,24 +84,6 @@ def test_csv_holds_no_formulas(page):
     assert [row[0] for row in csv.reader(io.StringIO(text))] == formulas
 
 
-def test_csv_of_a_table_of_entries_has_numbers_apart_from_their_marks(page):
-    table = """<table class="entries"><tr><th>joint</th><th class="n">a (mm)</th></tr>
-    <tr><th>1</th><td class="n"><a href="#a1">−1 050</a> <b>one source</b></td></tr>
-    <tr><th>2</th><td class="n"><a href="#a2">90</a> → <strong>−90</strong> <b>✗</b></td></tr>
-    <tr><th>3</th><td class="n">–</td></tr></table>"""
-    text = page.execute_script(
-        "document.querySelector('main').insertAdjacentHTML('beforeend', arguments[0]);"
-        "return csvOf(document.querySelector('table.entries'))",
-        table,
-    )
-    assert list(csv.reader(io.StringIO(text))) == [
-        ["joint", "a (mm)", "a (mm): what is known of it"],
-        ["1", "-1050", "one source"],
-        ["2", "90", "→ −90 ✗"],
-        ["3", "–", ""],
-    ]
-
-
 def test_branch_and_bound_is_not_explained_as_a_branch(browser, tmp_path):
     template = tmp_path / "page.html.j2"
     template.write_text(

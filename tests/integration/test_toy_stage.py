@@ -70,11 +70,12 @@ def compute(study, name):
 ''',
     "pipeline/stages/toy/page/__init__.py": '"""Its page."""\n',
     "pipeline/stages/toy/page/report.py": '''"""The page."""
+from er3a.pipeline.viewing.answer import Answer
 from er3a.pipeline.viewing.page import render_stage
 
 def report(study, stored, output):
     """Write it."""
-    render_stage(study, stored, output)
+    render_stage(study, stored, output, Answer("Long enough."))
 ''',
     "pipeline/stages/toy/page/report.html.j2": '{% extends "base.html.j2" %}\n',
     "pipeline/messages/toy.py": '''"""The verdict, and words."""

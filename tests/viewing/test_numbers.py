@@ -130,5 +130,5 @@ def test_bounds_are_rounded_outwards(value, measure, least, most):
 
 @pytest.mark.parametrize(("name", "shown"), [("voids_lower", 3.91), ("voids_upper", 3.92), ("voids", 3.92)])
 def test_a_key_figure_that_is_a_bound_is_rounded_as_one(name, shown):
-    figure = ShownFigure(name, "voids", 3.917848, "L", None, False, "L")
+    figure = ShownFigure(name, "voids", 3.917848, "L", None, "L")
     assert figure.text == f"{shown:.2f}"

@@ -91,7 +91,9 @@ def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it()
 )
 def test_a_stage_has_one_sign_on_all_pages(status, demonstrations, foundation, sign):
     caveats = {"validation": Caveat(foundation, "read this")} if foundation != "pass" else {}
-    head = Head("arm", "trajectory", status, "", (), None, caveats, demonstrations, None)
+    finding = SimpleNamespace(params={"demonstrations": [None] * demonstrations})
+    summary = SimpleNamespace(verdict=SimpleNamespace(finding=finding))
+    head = Head("arm", "trajectory", status, "", (), None, caveats, summary)
     assert head.sign == sign
 
 

@@ -101,7 +101,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         command=page.run_command(study, "index.html"),
         provenance=Provenance(inputs=result_records(results, study.names), code=code_digest(), seed=study.seed),
     )
-    _write_marks(stored, folder / "marks.js")
+    _write_marks(entries, folder / "marks.js")
     write_junit(verdicts, folder / "junit.xml")
 
 
@@ -205,12 +205,12 @@ def _reach(stored: Results) -> WorkspaceSummary | None:
 def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
     kind: Kind
     robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
-    if summary is None:
-        return seen_arm(robot, own_title(robot.title), "", kind)
-    far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    border = stored["workspace"].results.border
-    lines = border_lines(border.arc, border.rho_m, border.z_m)
-    return seen_arm(robot, own_title(robot.title), tr("reaches {far}", far=far), kind, lines)
+    note, lines = "", []
+    if summary:
+        note = tr("reaches {far}", far=with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm"))
+        border = stored["workspace"].results.border
+        lines = border_lines(border.arc, border.rho_m, border.z_m)
+    return seen_arm(robot, own_title(robot.title), note, kind, lines)
 
 
 def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
@@ -260,14 +260,8 @@ def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Map
     return [tile for tile in found if tile]
 
 
-def _mark(stored: Stored[Any]) -> str:
-    """What a stage came to; of a table that evidence contradicts it counts for nothing."""
-    head = head_of(stored)
-    return "no_verdict" if head.no_verdict else head.status
-
-
-def _write_marks(stored: Mapping[str, Results], file: Path) -> None:
+def _write_marks(entries: Sequence[RobotRow], file: Path) -> None:
     """What each stage of each robot came to, for the marks in the headers of their pages."""
-    marks = {robot: {stage: _mark(each) for stage, each in stages.items()} for robot, stages in stored.items()}
+    marks = {entry.name: {cell.stage: cell.status for cell in entry.cells if cell} for entry in entries}
     text = f"globalThis.MARKS = {json.dumps(marks, sort_keys=True)};\n"
     write_text(file, text)

@@ -19,9 +19,10 @@ from er3a.pipeline.stages.validation.page.evidence_section import evidence_secti
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Group, Mark
+from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
+FEW = 6  # rows of a tile
 LETTERS = 0.14  # of the reach, in the small view from above
 
 
@@ -29,8 +30,8 @@ LETTERS = 0.14  # of the reach, in the small view from above
 class Tile:
     """A question, its picture, and its answer, which leads to the page.
 
-    ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``groups``, ``drawing``: what is
-    shown, one of them.
+    ``answer``, in the colour of ``mark``, and ``rest``, in plain ink. ``entries``, ``rows``, ``drawing``: what is
+    shown, one of them; ``more``: how many rows are left to the page.
     """
 
     title: str
@@ -39,7 +40,8 @@ class Tile:
     mark: Mark
     address: str
     entries: Mapping[str, Any] | None = None
-    groups: Sequence[Group] = ()
+    rows: Sequence[ListRow] = ()
+    more: int = 0
     drawing: str = ""
 
 
@@ -83,7 +85,17 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     said = programs_answer(robot, results) if programs else paths_answer(robot, results)
     title = tr("Which programs may run?") if programs else tr("Which paths may run?")
     sound: Mark = "pass" if found.results.summary.verdict.status == "pass" else "caution"
-    return Tile(title, said.headline, said.rest, sound, f"{name}/{found.stage}.html", groups=said.shown_groups)
+    rows = [row for group in said.groups for row in group.rows]
+    few = _few(rows)
+    address = f"{name}/{found.stage}.html"
+    return Tile(title, said.headline, said.rest, sound, address, rows=few, more=len(rows) - len(few))
+
+
+def _few(rows: Sequence[ListRow]) -> list[ListRow]:
+    """The first rows of both kinds: half of them may not run, or more where few may."""
+    good = [row for row in rows if row.mark == "pass"]
+    bad = [row for row in rows if row.mark != "pass"][: max(FEW // 2, FEW - len(good))]
+    return [*bad, *good[: FEW - len(bad)]]
 
 
 def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:

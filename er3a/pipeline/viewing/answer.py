@@ -58,15 +58,10 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Group:
-    """Rows under one title; ``count`` is what the title says of how many there are."""
+    """Rows under one title."""
 
     title: str
     rows: Sequence[ListRow]
-
-    @property
-    def count(self) -> int:
-        """How many rows there are."""
-        return len(self.rows)
 
 
 @dataclass(frozen=True)

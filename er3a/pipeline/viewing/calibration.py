@@ -179,7 +179,7 @@ def _figures(found: Calibration, errors: MeasuredErrors) -> list[ShownFigure]:
         if deviation is not None:
             label = tr("standard deviation of a coordinate, estimated: {model}", model=tr(MODELS[model]))
             figures.append((label, deviation))
-    return [ShownFigure(label, label, value, "mm", None, False, "mm") for label, value in figures]
+    return [ShownFigure(label, label, value, "mm", None, "mm") for label, value in figures]
 
 
 def _errors(found: Calibration, errors: MeasuredErrors, held_back: Sequence[Measurement]) -> list[list[str]]:

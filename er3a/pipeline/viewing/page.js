@@ -93,15 +93,7 @@ function makeSortable(table) {
 function csvOf(table) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const asText = (text) => (/^[=+@\t\r]/.test(text) || (text[0] === "-" && Number.isNaN(Number(text))) ? `'${text}` : text);
-  return [...table.rows].map((row) => [...row.cells].flatMap(partsOf).map((text) => quoted(asText(plain(text)))).join(",")).join("\n") + "\n";
-}
-
-// A cell's texts: of a D-H table's entry its value, and apart from it what is known of it.
-function partsOf(cell) {
-  if (!cell.matches(".entries .n")) return [textOf(cell)];
-  if (cell.tagName === "TH") return [textOf(cell), `${textOf(cell)}${WORDS.colon}${WORDS.known}`];
-  const [value, ...known] = [...cell.childNodes].map((part) => part.textContent.trim()).filter(Boolean);
-  return [value ?? "", known.join(" ")];
+  return [...table.rows].map((row) => [...row.cells].map(textOf).map((text) => quoted(asText(plain(text)))).join(",")).join("\n") + "\n";
 }
 
 function nameFor(element) {
@@ -770,7 +762,12 @@ const mark = (shown) => {
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
 const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
-rows.forEach((row) => row.addEventListener("click", () => [mark, pick].forEach((tell) => tell(row))));
+for (const row of rows) {
+  row.addEventListener("click", () => {
+    mark(row);
+    pick(row);
+  });
+}
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];

@@ -22,7 +22,6 @@ from markupsafe import Markup
 
 from er3a.errors import ResultError
 from er3a.files.kept_files import INSTALLED, ROOT, from_here, view_command, write_text
-from er3a.finding import Finding
 from er3a.pipeline import language
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.messages.numbers import (
@@ -88,7 +87,6 @@ FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's hea
 SCRIPT_WORDS = {
     "sort": N_("sort by this column"),
     "csv": N_("CSV"),
-    "known": N_("what is known of it"),
     "svg": N_("download"),
     "enlarge": N_("enlarge"),
     "close": N_("close"),
@@ -177,7 +175,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class ShownFigure:
-    """A key figure in the page's language; the unit of ``part`` of a whole is the whole, in words.
+    """A key figure in the page's language; the unit of a part of a whole is the whole, in words.
 
     ``measure`` : the unit as results name it
     """
@@ -187,7 +185,6 @@ class ShownFigure:
     value: float | int | None
     unit: str
     uncertainty: float | None
-    part: bool
     measure: str
 
     @property
@@ -213,7 +210,7 @@ class Head:
     """What frames a stage's page: its verdict as a sentence, key figures, and where the numbers come from.
 
     ``summary`` is the stage's, with the finding that the sentence says; ``caveats`` by the stage that it rests on: what
-    to know first; ``demonstrations``: how many targets, paths, programs or objects fail as they are meant to.
+    to know first.
     ``checked``: each check, how much it covers, and why not all. ``assumed``: without a document. ``numerics``: figures
     of the computation, not of the arm.
     """
@@ -225,7 +222,6 @@ class Head:
     figures: tuple[ShownFigure, ...]
     provenance: Provenance
     caveats: Mapping[str, Caveat]
-    demonstrations: int
     summary: Any
     checked: tuple[tuple[str, str, str], ...] = ()
     assumed: tuple[str, ...] = ()
@@ -242,7 +238,8 @@ class Head:
         """The classes of its mark, the same on every page: a pass beside what is expected to fail has its own."""
         if self.no_verdict:
             return "no_verdict"
-        return "pass as_meant" if self.status == "pass" and self.demonstrations else self.status
+        meant = self.status == "pass" and self.finding.params.get("demonstrations")
+        return "pass as_meant" if meant else self.status
 
     @property
     def foundation(self) -> str:
@@ -260,15 +257,15 @@ class Head:
         return self.summary.verdict.finding
 
     @property
-    def shapes(self) -> Finding | None:
-        """On what assumed shapes of the arm the verdict rests."""
-        found: Finding | None = self.summary.verdict.shapes
-        return found
+    def gaps(self) -> list[str]:
+        """Why checks that the verdict needs don't cover all."""
+        return [gap_text(gap) for each in self.summary.verdict.missed for gap in each.gaps]
 
     @property
     def banner(self) -> str:
         """On what assumed shapes all rests, as the text ends; empty where no shapes are assumed."""
-        return say(self.shapes) if self.shapes else ""
+        shapes = self.summary.verdict.shapes
+        return say(shapes) if shapes else ""
 
     @property
     def own_text(self) -> str:
@@ -283,7 +280,8 @@ def head_of(stored: Stored[Any]) -> Head:
     -------
     head : verdict and key figures in the page's language
     """
-    verdict, stage = stored.results.summary.verdict, stored.stage
+    summary, stage = stored.results.summary, stored.stage
+    verdict = summary.verdict
     words = import_module(STAGES[stage].messages).KEY_FIGURES
     shown = tuple(
         ShownFigure(
@@ -292,14 +290,11 @@ def head_of(stored: Stored[Any]) -> Head:
             figure.value,
             tr("of {total}", total=figure.of) if figure.of is not None else tr(figure.unit),
             figure.uncertainty,
-            figure.of is not None,
             figure.unit,
         )
-        for figure in stored.results.summary.figures
+        for figure in summary.figures
     )
     caveats = {other: first for other, status in stored.rests_on.items() if (first := caveat(status))}
-    meant = len(getattr(verdict.finding, "demonstrations", ()))
-    summary = stored.results.summary
     found = say(verdict.finding)
     text = joined([found, *listed(verdict.findings[1:])], " ")
     checked = tuple(
@@ -314,7 +309,6 @@ def head_of(stored: Stored[Any]) -> Head:
         tuple(figure for figure in shown if figure.name not in NUMERICS),
         stored.provenance,
         caveats,
-        meant,
         summary,
         checked,
         tuple(map(assumed_text, summary.assumed)),
@@ -425,9 +419,7 @@ def render_stage(
     study: Study,
     stored: Stored[Any],
     output: Path,
-    answer: Answer | None = None,
-    *,
-    head: Head | None = None,
+    answer: Answer,
     **context: Any,
 ) -> None:
     """Render the page of a stage of a robot, from the template beside its ``report.py``.
@@ -437,36 +429,31 @@ def render_stage(
     study : that the results are of; the command at the page's foot names its file
     stored : what the stage found of a robot
     output : replaced whole, or left as it is
-    answer : its first screen, but where evidence contradicts the table that all rests on; None for the verdict alone
-    head : if it is another than the results give
+    answer : its first screen, but where evidence contradicts the table that all rests on; what was not checked comes
+        before it where the verdict is no pass because of that
     context : what the template needs besides, by name
     """
+    stage, framed = stored.stage, _framed(study, stored)
+    head = framed["head"]
+    if head.status == "caution" and head.gaps:
+        below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
+        answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
+    if head.no_verdict:
+        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."))
+    box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
+    template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
+    render(template, output, head.summary, answer=answer, never=never_text(stage), box=box, **framed | context)
+
+
+def _framed(study: Study, stored: Stored[Any]) -> dict[str, Any]:
+    """What frames the page of a stage of a robot, whether or not there are numbers of it."""
     name, stage = stored.robot, stored.stage
-    head = head or head_of(stored)
-    first = answer or Answer(f"{status_word(head.status)}.", below=language.first_sentence(head.own_text)[0])
-    shared: dict[str, Any] = {
-        "head": head,
-        "answer": replace(first, **_void_of_meaning()) if head.no_verdict else first,
+    return {
+        "head": head_of(stored),
         "robots": robots_with(study, stage),
-        "never": never_text(stage),
         "command": run_command(study, f"{name}/{stage}.html"),
         "robot": study.robot(name),
         "robot_pages": study.pages(name),
-        "box": _tray_edges(study, stored) if STAGES[stage].obstacles else "",
-    }
-    template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
-    render(template, output, stored.results.summary, **shared | context)
-
-
-def _void_of_meaning() -> dict[str, Any]:
-    """What a page says first of a table that evidence contradicts."""
-    return {
-        "headline": tr("Another arm's table."),
-        "rest": tr("Nothing here holds for this robot."),
-        "below": "",
-        "keys": (),
-        "groups": (),
-        "fix": None,
     }
 
 
@@ -675,15 +662,6 @@ def report_absent(study: Study, stored: Stored[AbsentResults], output: Path) -> 
     stored : with the reason
     output : the page, written whole or not at all
     """
-    render(
-        Path(__file__).with_name("absent.html.j2"),
-        output,
-        head=head_of(stored),
-        answer=Answer(tr("Not computed."), below=head_of(stored).own_text),
-        never="",
-        command=run_command(study, f"{stored.robot}/{stored.stage}.html"),
-        robot=study.robot(stored.robot),
-        robots=robots_with(study, stored.stage),
-        robot_pages=study.pages(stored.robot),
-        box="",
-    )
+    framed = _framed(study, stored)
+    answer = Answer(tr("Not computed."), below=framed["head"].own_text)
+    render(_HERE / "absent.html.j2", output, answer=answer, never="", box="", **framed)

@@ -97,7 +97,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         left=_left(summary),
         player=player(robot, [*played, *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
-        home=_angles(robot, np.array(summary.home_deg)) if summary.home_deg else "",
+        home=_angles(robot, np.array(summary.home_deg or ())),
         home_from=word("collision.home", HOMES, summary.home_from),
     )
 
@@ -119,16 +119,17 @@ def _answer(
     touch = sum(each.clearance_mm < 0 for each in closest)
     rest = tr("{count} of {all} cases collide.", count=touch, all=len(closest)) if closest else ""
     keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
-    rows = [(each.kind, _row(each, unreached, bars)) for each in closest[:MAX_ROWS]]
+    near = summary.verdict.shapes.near if summary.verdict.shapes else ()
+    rows = [(each.kind, _row(each, unreached, near, bars)) for each in closest[:MAX_ROWS]]
     titles = ("path", tr("Paths")), ("target", tr("Targets"))
     groups = [Group(title, [row for own, row in rows if own == kind]) for kind, title in titles]
     return Answer(headline, rest, "", keys, groups)
 
 
-def _row(found: model.Closest, unreached: set[str], bars: Mapping[str, Sequence[Part]]) -> ListRow:
-    """A path with its bar, or a chosen solution: how near it comes, and to what."""
+def _row(found: model.Closest, unreached: set[str], near: Sequence[str], bars: Mapping[str, Sequence[Part]]) -> ListRow:
+    """A path with its bar, or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
-    mark: Mark = "fail" if found.clearance_mm < 0 else "pass"
+    mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     of_path = found.kind == "path"
     if mark == "pass" and of_path and found.name in unreached:
         mark, note = "none", joined([note, tr("not all of it is reached")], ", ")

@@ -58,19 +58,12 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(fontsize=8)
-    parts.set_ylabel(tr("contributions at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
     power.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
-    caption = tr(
-        "J{joint} needs most, {peak} {unit} at {t:.2f} s; largest part: {part}. Shaded: tolerance of the masses.",
-        joint=load.joint,
-        peak=within(load.peak, load.tolerance),
-        unit=load.unit,
-        t=load.peak_at_s,
-        part=names[most],
-    )
+    caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
     alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
 

@@ -33,14 +33,13 @@ MAX_SELF_MOTIONS = 6
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
     """Write the page from the stage's results."""
     name, results, summary = stored.robot, stored.results, stored.results.summary
-    robot, trips, chosen = study.robot(name), summary.round_trips, model.shown_targets(summary.targets)
+    robot, chosen = study.robot(name), model.shown_targets(summary.targets)
     names = results.solutions.target
 
     def of_target(target: model.TargetResult) -> model.SolutionRows:
         return results.solutions.take(names == target.name)
 
     played = [solutions_played(robot, target, best_of_branches(of_target(target))) for target in chosen]
-    contradicted = stored.rests_on.get("validation") == "fail"
     render_stage(
         study,
         stored,
@@ -49,20 +48,19 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         player=player(robot, played, study.scene(name, stored.stage), opened=_opened(chosen)),
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
-        sections=[_section(robot, target, of_target(target), contradicted) for target in chosen],
+        sections=[_section(robot, target, of_target(target)) for target in chosen],
         units=_units(robot),
-        slides=bool(robot.slides.any()),
-        trips=trips,
     )
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached and should be, or else the one that the most solutions serve; the best of these."""
-
-    def order(target: model.TargetResult) -> tuple[bool, int]:
-        return target.outcome in ("reached", target.expect), -target.within_limits
-
-    return min(shown, key=order).name, 0.0
+    """A target that is not reached and should be, or else one that the most solutions serve: of these the farthest
+    from axis 1, where they differ most."""
+    ranks = {
+        each.name: (each.outcome in ("reached", each.expect), -each.within_limits, -np.hypot(*each.xyz_mm[:2]))
+        for each in shown
+    }
+    return min(ranks, key=ranks.__getitem__), 0.0
 
 
 def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) -> Answer:
@@ -117,11 +115,9 @@ def _section(
     robot: Robot,
     target: model.TargetResult,
     rows: model.SolutionRows,
-    contradicted: bool,
 ) -> dict[str, Any]:
     branches = best_of_branches(rows)
     cells = _branch_rows(rows, branches)
-    own = [tr("Evidence contradicts this table: move nothing because of what it says here.")] if target.advice else []
     return dict(
         target=target,
         position=_listed(target.xyz_mm),
@@ -129,7 +125,7 @@ def _section(
         reference=_joints(target.q_ref_deg),
         reason=say(target.reason),
         clearance=_clearance(target),
-        advice=own if contradicted else listed(target.advice),
+        advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if is_one(target.method, "closed_form") else say(target.method),
         families=_self_motions(robot, target.families),

@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
-from er3a.kinematics.singularity import SingularityType
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
@@ -86,7 +85,7 @@ def _joint_curves(axes: list[Axes], robot: Robot, path: model.PathSummary, rows:
 
 def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> None:
     """Distance from each singular set, in parts of the distance below which a pass counts as near."""
-    curves: tuple[tuple[SingularityType, Reals, float], ...] = (
+    curves = (
         ("wrist", rows.wrist_deg, near.wrist_deg),
         ("elbow", rows.elbow_deg, near.elbow_deg),
         ("shoulder", rows.shoulder_mm, near.shoulder_mm),
@@ -154,7 +153,7 @@ def _cut(ax: Axes, values: Reals) -> None:
 
 def _shades(path: model.PathSummary) -> list[tuple[tuple[model.Stretch, ...], str, float, str]]:
     """Stretches that are wrong, with the colour, opacity and name of their shade."""
-    shades: list[tuple[tuple[model.Stretch, ...], str, float, str]] = [
+    shades = [
         (path.out_of_limits, palette.VERDICTS["caution"], 0.16, tr("outside a joint limit")),
         (path.too_fast, palette.VERDICTS["fail"], 0.14, tr("joint too fast")),
         (path.unreachable, palette.INK, 0.14, tr("not reachable")),

@@ -40,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -114,22 +114,23 @@ def answer_of(
     paths = [known[name] for name in (*wrong, *(name for name in known if name not in wrong))]
     shares = dict(zip((path.name for path in paths), lengths(path.duration_s for path in paths)))
     hindered = [name for name, fault in wrong.items() if fault.instead and fault.instead[0] in met]
+    faulty, others = paths[: len(wrong)], paths[len(wrong) :]
     fault_rows = {}
-    for path in paths[: len(wrong)]:
+    for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-    mended = [fault_rows[path.name] for path in paths[: len(wrong)] if path.chosen and path.name not in hindered]
-    others = paths[len(wrong) :]
+    mended = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
+    limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
-        replace(_sound_row(path, shares[path.name]), mark="fail", note=as_expected(path))
+        replace(_sound_row(path, shares[path.name], limits), mark="fail", note=as_expected(path), fix=None)
         for path in others
         if path.expect and not is_met(path)
     ]
     groups = (
         Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
         Group(tr("Can be repaired"), mended),
-        Group(tr("May run"), [_sound_row(path, shares[path.name]) for path in sound]),
+        Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
@@ -138,7 +139,7 @@ def answer_of(
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(paths[: len(wrong)], len(mended)), keys, groups, fix)
+    return Answer(headline, rest, _in_short(faulty, len(mended)), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
@@ -161,10 +162,12 @@ def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
     )
 
 
-def _sound_row(path: model.PathSummary, length: float) -> ListRow:
-    """A path that may be run, with how near it comes to anything."""
+def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
+    """A path that may be run, with how near it comes to anything, and the joint speed that is nearest to its limit."""
     clear = path.clearance and tr("{far} mm clear", far=fixed(path.clearance.least_mm, 1))
-    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length)
+    rate = tr("joint speed nearest its limit (deg/s)")
+    said = Fix(f"{path.name}: {rate}: {_speed(path, limits)}; {_clear_of(path) or '–'}", f"#{path.name}")
+    return ListRow("pass", path.name, clear or tr("passes"), f"#{path.name}", (path.name, 0.0), length, fix=said)
 
 
 def _programs(

@@ -14,6 +14,7 @@ from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
+from er3a.pipeline.viewing.answer import ListRow
 from er3a.references.quantities import MM
 from er3a.references.reference import NO_DOCUMENT
 from er3a.robots.robot import Robot
@@ -28,6 +29,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
+FIRST = 4  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",
@@ -50,7 +52,6 @@ OPEN_COLUMNS = (
     N_("Fits as well"),
     N_("What would settle it"),
 )
-SETTLED_COLUMNS = OPEN_COLUMNS[:5]
 OTHER_COLUMNS = ("a", "alpha", "d", "beta", "offset", "direction")
 LIMITS = ("lower", "upper")
 DIFFERS = 2e-3
@@ -59,7 +60,8 @@ IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta",
 
 def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
-    legend, and the entries in words; rows of entries begin with the name, which is the address on the page."""
+    legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Of
+    those not settled the open ones come first, then by how far the tool may be off; ``first``: the first."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -68,6 +70,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
+    left.sort(key=lambda each: (each.status != "open", -each.off.mm))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
     return dict(
@@ -79,9 +82,9 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
             if status in present
         ],
         open_columns=OPEN_COLUMNS,
-        settled_columns=SETTLED_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
+        first=[ListRow("caution", each.entry, _tool_off(each), f"#entry-{each.entry}") for each in left[:FIRST]],
         unmet=not evidence.table_meets and evidence.other is None,
         allowed=evidence.other is not None and evidence.other.code == "allowed",
         tolerance=tr(

@@ -39,7 +39,7 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     """Length of each sample's residual, position above, rotation below."""
     sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
     usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
-    figure, axes = new_figure(2, 1, height=4.6, sharex=True)
+    figure, axes = new_figure(2, 1, 5.2, 4.6, sharex=True)
     for ax, size, mean, label in zip(axes, sizes, usual, (tr("position (mm)"), tr("rotation (deg)"))):
         number = np.arange(1, len(rows) + 1)
         ax.bar(number[rows.used], size[rows.used], color=MODEL, label=tr("used"))
@@ -52,8 +52,7 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     axes[0].legend(ncols=3, loc="upper right")
     worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
     caption = tr(
-        "Residual of each sample, on a logarithmic scale. Bars far above the dashed line are outliers; samples "
-        "left out are coloured. Of the samples used, {name} is farthest off: {mm} mm.",
+        "Residuals; outliers are above the line. Worst used: {name}, {mm} mm.",
         name=rows.sample[worst],
         mm=fixed(sizes[0][worst], 2),
     )
@@ -169,8 +168,8 @@ def _answer(results: model.VisionResults) -> Answer:
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [Group(tr("Objects"), shown)]
     if found and (found.suspects or found.warnings):
-        doubts = [(each.params.get("sample", tr("camera")), say(each)) for each in (*found.suspects, *found.warnings)]
-        rows = [ListRow("caution", name, text.removeprefix(f"{name}: "), "#samples") for name, text in doubts]
+        rows = [ListRow("caution", each.sample, tr("left out"), "#samples") for each in found.suspects]
+        rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
 
