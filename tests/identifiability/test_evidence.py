@@ -22,7 +22,10 @@ from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import NOT_OFF, evidence_of
 from er3a.identifiability.proposals import Proposal, proposals_of
 from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.pipeline.results import read_results
 from er3a.pipeline.stages.validation.checks import parts_found
+from er3a.pipeline.stages.validation.model import RESULTS
+from er3a.pipeline.study import load_study
 from er3a.references.quantities import Limit, PointCoordinate, QuantityAtPose
 from er3a.references.reference import Document, Documents, Reference
 from er3a.references.subjects import JointLimit, PointAtPose
@@ -140,6 +143,11 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
             if each.interval is not None:
                 assert each.interval[0] <= each.value <= each.interval[1]
             assert each.by or each.status in ("open", "given")
+
+
+def test_the_validation_of_a_study_says_the_same_to_the_last_digit(small_results):
+    folder = small_results("validation", "er3_600", load_study("config/small.yaml"))
+    assert read_results(folder, RESULTS).results.summary.evidence.entries == evidence("er3_600").entries
 
 
 @pytest.mark.long

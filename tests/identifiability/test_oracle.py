@@ -248,7 +248,7 @@ def test_what_is_open_is_met_by_all_documents_and_moves_the_tool(name):
 def test_signs_of_the_er3_600_are_open_one_by_one_and_all_together():
     rows, found = oracle.table_of("er3_600"), evidence("er3_600")
     signs = ("direction1", "direction4", "direction5", "direction6")
-    for count in (1, 2, 3, 4):
+    for count in (1, len(signs)):
         for chosen in combinations(signs, count):
             other = oracle.changed(rows, **{entry: -oracle.value_of(rows, entry) for entry in chosen})
             assert oracle.worst(other, all_trusted("er3_600"))[0] <= 1
