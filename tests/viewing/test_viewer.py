@@ -107,6 +107,7 @@ def test_it_listens_on_the_loopback_address_alone(recording):
     assert {address.ip for address in listening} == {"127.0.0.1"}
 
 
+@pytest.mark.long
 def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkeypatch):
     from typer.testing import CliRunner
 
