@@ -25,7 +25,7 @@ run: $(VENV)/run.stamp  ## set up, run the study, write reports/index.html (ARGS
 	@$(BIN)/er3a run --study "$$STUDY" -- $(ARGS)
 
 test: $(VENV)/dev.stamp  ## set up and run the fast tests (ARGS="-k workspace")
-	@$(UV_SETTINGS) $(BIN)/python -m pytest $(ARGS)
+	@$(BIN)/python -m pytest $(ARGS)
 
 test-all: $(VENV)/dev.stamp  ## set up and run all tests, the long ones too
 	@$(UV_SETTINGS) $(BIN)/python -m pytest -m "" $(ARGS)
@@ -91,11 +91,12 @@ clean:  ## remove results, reports and recordings
 distclean: clean  ## also remove the environment
 	rm -rf $(VENV) .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 
-# uv does not read what pip was told: certificate, proxy and index of pip's settings are handed on to it, unless its own
-# variables name others; and it takes the system's certificates, as pip does.
-pip_setting = $$($(BIN)/python -m pip config list 2>/dev/null | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
+# uv does not read what pip was told: certificate, proxy and index of pip's settings, asked for once, are handed on to it,
+# unless its own variables name others; and it takes the system's certificates, as pip does.
+pip_setting = $$(printf '%s' "$$told" | sed -En "s/^(global|install)\.$(1)=.(.*).$$/\2/p" | tail -n 1)
 export_setting = value=$${$(1):-$${$(2):-$(call pip_setting,$(3))}}; [ -z "$$value" ] || export $(1)="$$value";
-UV_SETTINGS = $(call export_setting,SSL_CERT_FILE,PIP_CERT,cert) $(call export_setting,HTTPS_PROXY,PIP_PROXY,proxy) \
+UV_SETTINGS = told=$$($(BIN)/python -m pip config list 2>/dev/null); \
+	$(call export_setting,SSL_CERT_FILE,PIP_CERT,cert) $(call export_setting,HTTPS_PROXY,PIP_PROXY,proxy) \
 	$(call export_setting,UV_DEFAULT_INDEX,PIP_INDEX_URL,index-url) export UV_SYSTEM_CERTS=1;
 UV = $(UV_SETTINGS) $(BIN)/uv
 
@@ -109,6 +110,6 @@ $(VENV)/uv.stamp: requirements/uv.txt
 
 $(VENV)/%.stamp: requirements/%.txt pyproject.toml $(VENV)/uv.stamp
 	@echo "Setting up $(VENV) from $< ..."
-	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r $<
-	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r $< && \
+		$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
 	@touch $@

@@ -370,6 +370,7 @@ def test_every_public_object_equals_its_copies_and_hashes_alike(shown):
                 assert hash(again) == hash(each), (name, way)
 
 
+@pytest.mark.long
 def test_all_that_public_objects_hold_can_be_compared(shown):
     left, met = list(shown.values()), list[Any]()
     seen: set[int] = set()

@@ -173,39 +173,37 @@ def test_a_robot_without_camera_and_programs_goes_through_neither_stage(study):
 
 
 @pytest.mark.long
-def test_part_of_a_study_has_verdicts_an_index_and_a_report(study, tmp_path, monkeypatch):
+def test_part_of_a_study_has_verdicts_an_index_and_a_report_until_er3a_is_another(study, tmp_path, monkeypatch):
+    """Of the stage that takes least; the index says that the validation is missing."""
     monkeypatch.chdir(ROOT)
     results, reports = tmp_path / "results", tmp_path / "reports"
     with pytest.raises(ResultError, match=r"er3_600/validation/summary\.json: missing"):
         read_verdicts(study, results)
-    run.compute("validation", study, "er3_600", results / "er3_600/validation")
-    first, *others = read_verdicts(study, results)
-    assert (first.stage, first.status) == ("validation", "caution")
+    run.compute("dynamics", study, "er3_600", results / "er3_600/dynamics")
+    *others, last = read_verdicts(study, results)
+    assert (last.stage, last.status, last.outdated) == ("dynamics", "no_reference", ())
     assert {verdict.status for verdict in others} == {"not_examined"}
     assert not any(verdict.counts("caution") for verdict in others)
 
     write_index(study, results, reports)
     page = (reports / "index.html").read_text(encoding="utf-8")
     assert cells_of(page, "er3_600") == {
-        "validation": "caution",
-        **dict.fromkeys(("workspace", "collision", "inverse", "trajectory", "dynamics"), "not_computed"),
+        **dict.fromkeys(("validation", "workspace", "collision", "inverse", "trajectory"), "not_computed"),
+        "dynamics": "no_reference",
     }
     marks = json.loads((reports / "marks.js").read_text().removeprefix("globalThis.MARKS = ").removesuffix(";\n"))
     assert marks == {"er3_600": cells_of(page, "er3_600")}
     skipped = etree.parse(reports / "junit.xml").findall(".//skipped")
-    assert len(skipped) == len(others)
-
-
-@pytest.mark.long
-def test_an_index_without_validation_says_so(study, tmp_path, monkeypatch):
-    monkeypatch.chdir(ROOT)
-    run.compute("dynamics", study, "er3_600", tmp_path / "results/er3_600/dynamics")
-    write_index(study, tmp_path / "results", tmp_path)
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert cells_of(page, "er3_600")["validation"] == "not_computed"
+    assert len(skipped) == len(others) + 1
     assert decision_of(page, "er3_600") == ("measure", "not examined yet")
     assert re.findall(r'<ol><li><a href="([^"]*)">', page) == ["er3_600/validation.html"]
     assert '<span class="never">' not in page
+
+    # As after an upgrade, which may have mended what passed wrongly: verdicts count until the study is run again.
+    monkeypatch.setattr("er3a.pipeline.results.numbers_digest", lambda: "another")
+    after = read_verdicts(study, results)[-1]
+    assert (after.outdated, after.counts("fail")) == (("er3a itself",), True)
+    assert "Changed since" in after.text
 
 
 @pytest.mark.long
@@ -256,19 +254,6 @@ def test_an_input_that_is_edited_while_a_stage_is_computed_makes_its_verdict_out
         run.compute("dynamics", study, "er3_600", tmp_path / "er3_600/dynamics")
         (found,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
         assert found.outdated == outdated
-
-
-@pytest.mark.long
-def test_verdicts_of_another_er3a_are_outdated(study, tmp_path, monkeypatch):
-    """As after an upgrade, which may have mended what passed wrongly: they count until the study is run again."""
-    monkeypatch.chdir(ROOT)
-    run.compute("dynamics", study, "er3_600", tmp_path / "er3_600/dynamics")
-    (before,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
-    assert before.outdated == ()
-    monkeypatch.setattr("er3a.pipeline.results.numbers_digest", lambda: "another")
-    (after,) = (each for each in read_verdicts(study, tmp_path) if each.status != "not_examined")
-    assert (after.outdated, after.counts("fail")) == (("er3a itself",), True)
-    assert "Changed since" in after.text
 
 
 def row_of(page: str, robot: str) -> str:

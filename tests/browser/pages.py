@@ -11,5 +11,6 @@ STAGE_PAGES_OF_EACH_KIND = [
     *(page for page in STAGE_PAGES if page.startswith("er3a_c60/")),
     "er3a_c60_article/validation.html",  # of a table that evidence contradicts
 ]
-PAGES_OF_EACH_KIND = [*OVER_ALL, *STAGE_PAGES_OF_EACH_KIND, "er3a_c60/teach.html"]
+PAGES_WITH_SORTED_TABLES = [*OVER_ALL, *STAGE_PAGES_OF_EACH_KIND]
+PAGES_OF_EACH_KIND = [*PAGES_WITH_SORTED_TABLES, "er3a_c60/teach.html"]
 PAGES_WITH_EACH_CONTROL = [*OVER_ALL, "er3a_c60/validation.html", "er3a_c60/trajectory.html", "er3a_c60/teach.html"]

@@ -11,7 +11,7 @@ from axe_core_python.selenium import Axe
 from selenium.webdriver.support.ui import WebDriverWait
 
 from testing import chromium
-from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND
+from tests.browser.pages import OVER_ALL, PAGES, PAGES_OF_EACH_KIND, PAGES_WITH_SORTED_TABLES
 from tests.browser.test_page_sizes import check_fit, check_print
 from tests.browser.test_page_use import check_sorting
 
@@ -78,10 +78,10 @@ def test_page_prints_on_a4_with_nothing_cut(browser, page):
     check_print(browser)
 
 
+@pytest.mark.parametrize("page", PAGES_WITH_SORTED_TABLES, indirect=True, scope="module")
 def test_every_table_sorts_by_every_column(browser, page):
     """The last test of a page: what it sorts stays so. Tables of the teach panel are the arm's, in its order."""
-    if not page.endswith("teach.html"):
-        check_sorting(browser)
+    check_sorting(browser)
 
 
 MENUS = """

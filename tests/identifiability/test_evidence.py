@@ -22,7 +22,10 @@ from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import NOT_OFF, evidence_of
 from er3a.identifiability.proposals import proposals_of
 from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.pipeline.results import read_results
 from er3a.pipeline.stages.validation.checks import parts_found
+from er3a.pipeline.stages.validation.model import RESULTS
+from er3a.pipeline.study import load_study
 from er3a.references.quantities import Limit, PointCoordinate, QuantityAtPose
 from er3a.references.reference import Document, Documents, Reference
 from er3a.robots.robot import Robot
@@ -142,17 +145,22 @@ def test_every_interval_holds_its_value_and_every_status_has_its_reason():
             assert each.by or each.status in ("open", "given")
 
 
+def test_the_validation_of_a_study_says_the_same_to_the_last_digit(small_results):
+    folder = small_results("validation", "er3_600", load_study("config/small.yaml"))
+    assert read_results(folder, RESULTS).results.summary.evidence.entries == evidence("er3_600").entries
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("entry", "by", "status"),
-    [
-        ("d4", 0.5, "contradicted"),
-        ("lower1", 10.0, "contradicted"),
-    ],
-)
-def test_a_value_is_contradicted_outside_its_interval(entry, by, status):
-    found = about(changed(load_robot("er3a_c60"), entry, by), entry)
-    assert found[entry].status == status
+def test_values_are_contradicted_outside_their_intervals():
+    found = about(changed(changed(load_robot("er3a_c60"), "d4", 0.5), "lower1", 10.0), "d4", "lower1")
+    assert found["d4"].status == found["lower1"].status == "contradicted"
+
+
+def test_a_table_that_documents_contradict_is_judged_from_the_one_that_diagnosis_finds(monkeypatch):
+    """The article's, by its own text."""
+    monkeypatch.setattr("er3a.files.by_name.evidence_of", lambda *_, corrected: corrected)
+    found = er3a.evidence(load_robot("er3a_c60_article"), "er3a_c60_article")
+    assert [np.degrees(each.offset[1]) for each in found] == [pytest.approx(-90)]
 
 
 @pytest.mark.long

@@ -18,6 +18,9 @@ from er3a.identifiability.proposals import proposals_of
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import ToolRange
 from er3a.kinematics.table_batch import tables_of
+from er3a.pipeline.results import read_results
+from er3a.pipeline.stages.validation.model import RESULTS
+from er3a.pipeline.study import load_study
 from testing import plain_oracle as oracle
 from tests.identifiability.test_evidence import evidence
 
@@ -245,7 +248,7 @@ def test_what_is_open_is_met_by_all_documents_and_moves_the_tool(name):
 def test_signs_of_the_er3_600_are_open_one_by_one_and_all_together():
     rows, found = oracle.table_of("er3_600"), evidence("er3_600")
     signs = ("direction1", "direction4", "direction5", "direction6")
-    for count in (1, 2, 3, 4):
+    for count in (1, len(signs)):
         for chosen in combinations(signs, count):
             other = oracle.changed(rows, **{entry: -oracle.value_of(rows, entry) for entry in chosen})
             assert oracle.worst(other, all_trusted("er3_600"))[0] <= 1
@@ -255,13 +258,17 @@ def test_signs_of_the_er3_600_are_open_one_by_one_and_all_together():
 
 
 @pytest.mark.long
-def test_what_contradicts_the_article_is_what_the_real_arm_has_otherwise():
-    """The table of the er3a_c60 meets both documents; what evidence says of the article's is where the two differ."""
+def test_what_contradicts_the_article_is_what_the_real_arm_has_otherwise(small_results):
+    """The table of the er3a_c60 meets both documents; what evidence says of the article's is where the two differ.
+
+    The small study works it out, for half a minute.
+    """
     stated = [said for said in oracle.statements_of("er3a_c60") if said.trusted]
     real, article = oracle.table_of("er3a_c60"), oracle.table_of("er3a_c60_article")
     assert oracle.worst(real, stated)[0] <= 1
     assert oracle.worst(article, stated)[0] > 1000
-    found = evidence("er3a_c60_article")
+    folder = small_results("validation", "er3a_c60_article", load_study("config/small.yaml"))
+    found = {each.entry: each for each in read_results(folder, RESULTS).results.summary.evidence.entries}
     for entry in [*CONTINUOUS, *(f"direction{joint}" for joint in range(1, 7))]:
         if entry in ("d2", "d3", "alpha6", "offset6"):
             continue  # a free choice, and how the flange is turned

@@ -44,7 +44,7 @@ def test_a_study_and_a_checkout_with_blanks_quotes_and_umlauts(fresh_project, tm
     folder = copied(fresh_project, tmp_path / "my cöpy of it")
     study = folder / ODD_STUDY
     study.write_text((folder / "config/small.yaml").read_text(encoding="utf-8"), encoding="utf-8")
-    table = "results/er3_600/validation/summary.json"
+    table = "results/er3_600/dynamics/summary.json"  # the stage that takes least
     as_set_up = ["-o", ".venv/run.stamp", "-o", ".venv/uv.stamp"]
     command = ["make", *as_set_up, "run", f"STUDY={ODD_STUDY}", f"ARGS=--cores 1 {table}"]
     done = run(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)})
@@ -110,17 +110,25 @@ class _Silent(SimpleHTTPRequestHandler):
         """Nothing is told of requests."""
 
 
+@pytest.fixture(scope="module")
+def own_venv(tmp_path_factory) -> Path:
+    """An environment with pip, whose settings the Makefile asks for, and this environment's uv; to be copied."""
+    venv = tmp_path_factory.mktemp("made") / ".venv"
+    subprocess.run([sys.executable, "-m", "venv", venv], check=True)
+    (venv / "bin/uv").symlink_to(Path(sys.prefix, "bin/uv"))
+    (venv / "uv.stamp").touch()
+    return venv
+
+
 @needs_make
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
 @pytest.mark.skipif(not Path(sys.prefix, "bin/uv").is_file(), reason="uv is not installed here")
 @pytest.mark.parametrize("told_to", ["environment", "settings"])
-def test_uv_takes_certificate_and_index_that_only_pip_was_told(tmp_path, told_to):
+def test_uv_takes_certificate_and_index_that_only_pip_was_told(tmp_path, own_venv, told_to):
     folder = tmp_path / "an office"
     (folder / "requirements").mkdir(parents=True)
     shutil.copy2(ROOT / "Makefile", folder)
-    subprocess.run([sys.executable, "-m", "venv", folder / ".venv"], check=True)
-    (folder / ".venv/bin/uv").symlink_to(Path(sys.prefix, "bin/uv"))
-    (folder / ".venv/uv.stamp").touch()
+    shutil.copytree(own_venv, folder / ".venv", symlinks=True)
     (folder / "pyproject.toml").touch()  # nothing to build: make ends behind the lock, which is what counts here
     (folder / "requirements/uv.txt").touch()
     with https_index(tmp_path) as (address, certificate):

@@ -195,6 +195,7 @@ def test_turns_at_the_start_are_those_that_keep_the_limits_on_the_whole_way():
     np.testing.assert_allclose(motion.joints(np.array([0.0]))[0], q[1], atol=1e-9)
 
 
+@pytest.mark.long
 def test_seven_joints_say_where_a_path_leaves_their_reach():
     q = np.radians([20, 40, -30, -80, 25, 60, 10])
     T = forward(IIWA, q)

@@ -16,6 +16,7 @@ from er3a.planning.moves import line
 from er3a.planning.tool_curve import curve_of
 from testing.arms import DEG, joints_at_random, make_arm, pose_errors
 
+pytestmark = pytest.mark.long  # kernels of a class that no fast test compiles
 GRID = np.linspace(0, 1, 80)
 UR5 = make_arm(
     a=[0, -0.425, -0.39225, 0, 0, 0],

@@ -7,7 +7,6 @@ import warnings
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from spatialmath import SE3
 
 import er3a
 from er3a.planning.moves import JointMove
@@ -25,7 +24,7 @@ def arm() -> er3a.Robot:
 
 def test_jtraj_is_the_toolbox_s_with_a_time_vector():
     q, qd, qdd = er3a.jtraj(np.zeros(6), GOAL, T)
-    from roboticstoolbox import jtraj  # takes a second to import
+    from roboticstoolbox import jtraj  # takes a second to import, as spatialmath does
 
     theirs = jtraj(np.zeros(6), GOAL, T)
     for own, other in ((q, theirs.q), (qd, theirs.qd), (qdd, theirs.qdd)):
@@ -58,12 +57,15 @@ def test_ctraj_goes_straight_and_turns_about_one_axis(arm):
 def test_ctraj_is_on_the_toolbox_s_trapezoid(arm):
     start, end = er3a.forward(arm, 0.3 * GOAL), er3a.forward(arm, GOAL)
     from roboticstoolbox import ctraj
+    from spatialmath import SE3
 
     theirs = ctraj(SE3(start, check=False), SE3(end, check=False), len(T))
     assert np.allclose(er3a.ctraj(start, end, T)[:, :3, 3], theirs.t, atol=1e-9)
 
 
 def test_a_pose_is_its_position_and_any_one_orientation():
+    from spatialmath import SE3
+
     random = np.random.default_rng(2)
     for place, angles in zip(random.uniform(-1, 1, (20, 3)), random.uniform(-1.5, 1.5, (20, 3))):
         T = er3a.pose(place, angles)

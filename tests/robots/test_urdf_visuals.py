@@ -82,6 +82,7 @@ def test_looks_come_back_from_a_robot_file_and_change_no_robot(imported, tmp_pat
     assert hash(again) == hash(again.replace(visuals=()))
 
 
+@pytest.mark.long
 def test_pages_get_the_looks_beside_all_shapes_that_are_checked(imported):
     looks = drawn_arm(imported.robot)["looks"]
     assert [each["frame"] for each in looks["visual"] if each["kind"] == "mesh"] == [1, 2]

@@ -325,6 +325,7 @@ def test_no_torque_with_its_tolerance_is_above_the_peak_with_its_own(full):
         assert all(load.peak + load.tolerance >= most - 1e-9 for load, most in zip(path.joints, upper.tolist()))
 
 
+@pytest.mark.long
 def test_the_wrist_is_compared_at_rest_and_along_the_paths(full):
     uses = [use for use in full[1].results.summary.uses if use.quantity == "moment"]
     at_rest = {use.joint: use.asked for use in uses if use.path is None}

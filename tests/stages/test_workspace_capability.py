@@ -134,6 +134,7 @@ def test_an_arm_without_a_known_inverse_is_told_so():
     assert not any(isinstance(value, Picture) for value in context.values())
 
 
+@pytest.mark.long
 def test_a_tool_that_points_elsewhere_is_told_so():
     robot = scara()
     found = tool_capability(robot, settings(placement={"tool_direction": [1, 0, 0]}), 0.15)

@@ -56,6 +56,7 @@ def test_a_gap_of_joint_1_opens_the_hollow():
     assert cavities(prove_robot(robot, 2000, 1).section)[0] == []
 
 
+@pytest.mark.long
 def test_a_locked_arm_stays_on_its_sphere():
     robot = two_link_arm([-180, -180, 90, 0, 0, 0], [180, 180, 90, 0, 0, 0])
     grid, _, counts = tally_of(robot, 50_000, 2, 32)

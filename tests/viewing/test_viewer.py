@@ -71,6 +71,7 @@ def test_rerun_collects_statistics_by_itself(home, recording):
     assert kept_in(home), "if this fails, Rerun has changed its ways, and without_statistics() may be of no use"
 
 
+@pytest.mark.long
 def test_without_statistics_it_does_not(home, recording):
     with without_statistics() as environment:
         quiet = home | {"XDG_CONFIG_HOME": environment["XDG_CONFIG_HOME"]}
@@ -92,6 +93,7 @@ def listened_to(process: psutil.Process) -> list:
     return [connection.laddr for connection in connections if connection.status == psutil.CONN_LISTEN]
 
 
+@pytest.mark.long
 def test_it_listens_on_the_loopback_address_alone(recording):
     port = free_port()
     with viewer_running([recording], "--headless", "--port", str(port)) as viewer:
@@ -105,6 +107,7 @@ def test_it_listens_on_the_loopback_address_alone(recording):
     assert {address.ip for address in listening} == {"127.0.0.1"}
 
 
+@pytest.mark.long
 def test_a_recording_cut_in_half_is_one_line_and_is_not_opened(recording, monkeypatch):
     from typer.testing import CliRunner
 
