@@ -77,7 +77,7 @@ TEXTS = texts(
             "{probability:.1g})."
         ),
         "not_grasped_object": "{name} ({why})",
-        "grasp_out_of_reach": "grasp poses, all out of reach: {poses}",
+        "grasp_out_of_reach": "out of reach: {poses} of {poses} grasps",
         "grasp_near_limits": "best of {solutions} solutions: {margin:.1f} from the joint limits; {needed:g} required",
         "grasp_singular": "all solutions singular: singular value {singular_value:.2g} at best; {needed:g} required",
         "no_transfer": "the straight move to the approach collides, and no other was found: {why}",
