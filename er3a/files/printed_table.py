@@ -23,7 +23,7 @@ from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, code_grids, elements
+from er3a.files.table_code import LIBRARIES, code_grids, code_of, elements
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -55,14 +55,23 @@ _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "re
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 SIGNS = {
     "modified": re.compile(
-        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b", re.I
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|"
+        r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
+        re.I,
     ),
-    "standard": re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I),
+    "standard": re.compile(
+        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|[\"']dh[\"']|"
+        r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
+        r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
+        re.I,
+    ),
 }
-"""What a text around a table says of its convention."""
+"""What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
+``d sin(alpha)`` and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
@@ -310,7 +319,7 @@ class _Table:
         self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
         self.column = {own.quantity: k for k, own in self.headings.items()}
         self._check_headings()
-        self.convention = self._stated(text)
+        self.convention = self._stated(code_of(text).text if from_code else "", text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
@@ -336,8 +345,9 @@ class _Table:
             remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
-    def _stated(self, text: str) -> Convention | None:
-        """The convention that headings, the library, or the text around the table says."""
+    def _stated(self, program: str, text: str) -> Convention | None:
+        """The convention that headings, the program, or the text around the table says; what a program does comes before
+        its comments."""
         if "convention" in self.header:
             return None
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
@@ -345,7 +355,7 @@ class _Table:
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
         library = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        for part in (near, text):
+        for part in (program, near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
             for one in CONVENTIONS if len(said) == 1 else ():
                 if one in said:
@@ -430,7 +440,7 @@ class _Table:
             return None
         given = self.given
         if self.headings[k].quantity == "theta":  # a value of a joint there is a pose
-            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)\d*", name)}
+            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)}
         try:
             found = amount_of(text, given)
         except ValueError as error:

@@ -118,7 +118,7 @@ def latex_grids(text: str) -> list[Grid]:
         grid: Grid = []
         given = 2 if body[1] in ("tabularx", "tabular*") else 1
         inner = re.sub(rf"^\s*(?:\[[^\]]*\]\s*)?(?:\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}\s*){{{given}}}", "\n", body[2])
-        for row in re.split(r"\\\\(?:\[[^\]]*\])?|\\tabularnewline", inner):
+        for row in re.split(r"\\\\\s*(?:\[[^\]]*\])?|\\tabularnewline", inner):
             cells = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
             grid.append((start + row.count("\n"), [without_latex(cell).strip() for cell in cells]))
             start += row.count("\n")
