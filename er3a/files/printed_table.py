@@ -47,6 +47,7 @@ _CELL = (
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
+_TWO = "two values"
 _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
@@ -55,13 +56,14 @@ _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "re
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 SIGNS = {
     "modified": re.compile(
-        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|"
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
         re.I,
     ),
     "standard": re.compile(
-        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|[\"']dh[\"']|"
+        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|[\"']dh[\"']\s*\)|"
+        r"[\"'](?:standard|classic|normal)[\"']|"
         r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
         r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
         re.I,
@@ -71,7 +73,7 @@ SIGNS = {
 ``d sin(alpha)`` and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
@@ -323,7 +325,7 @@ class _Table:
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
         self.kinds = self._kinds()
@@ -374,6 +376,10 @@ class _Table:
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
+        if not re.search(r"\b(?:else|elif|elseif|case)\b", above):  # what was assigned last, if nothing chooses
+            last = {name: value.rstrip(" \t.") for name, value, _ in _GIVEN.findall(above)}
+            found = {name: last.get(name, value) if value == _TWO else value for name, value in found.items()}
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)
@@ -575,7 +581,7 @@ class _Table:
 
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else "two values"
+    found[name] = value if found.get(name, value) == value else _TWO
 
 
 def _in(amount: CellAmount, unit: str) -> float:

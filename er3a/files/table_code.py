@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -76,6 +77,9 @@ class CodeGroup:
 def code_of(text: str) -> Code:
     """A program's text without its comments; the numbers of its lines stay."""
     comments: dict[int, str] = {}
+    for block in _BLOCK.finditer(text):
+        first = text.count("\n", 0, block.start()) + 1
+        comments |= {line: said.strip() for line, said in enumerate(block[0].split("\n"), first)}
     text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
     text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
@@ -180,8 +184,11 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         if each.bracket != "(" or named is None:
             continue
         cells = _arguments(named[2], each.inside) or _of_signature(orders.get(named[2], []), each.inside)
+        toolbox = _TOOLBOX.fullmatch(named[2])
+        if cells and not (toolbox or _says_numbers(code, cells)):
+            continue
         index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if not cells and _TOOLBOX.fullmatch(named[2]) and not (index or named[2] in orders):
+        if not cells and toolbox and not (index or named[2] in orders):
             unread.append(code.line(each.start))
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
@@ -197,6 +204,8 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
     if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
         return [_looped(code, rows)]
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
+        if "convention" not in rows[0].cells:  # by no toolbox: it may be any function
+            return []
         problem = "links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
@@ -227,8 +236,15 @@ def _parameters(text: str) -> list[str]:
 def _of_signature(order: list[str], text: str) -> dict[str, str]:
     """A row of a function's arguments; none of its definition, nor of a call with elements of lists."""
     cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
-    listed = any("[" in cell for cell in _constants(cells))
+    listed = any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in _constants(cells))
     return {} if len(cells) < len(order) or _parameters(text) == order or listed else cells
+
+
+def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
+    """Whether a row holds numbers, or names that get their values by assignments and are no lists."""
+    lists = _lists(code)
+    given = [cell for cell in _constants(cells) if cell not in lists and re.search(rf"(?m)^\s*{cell}\s*=", code.text)]
+    return bool(given) or bool(re.search(r"(?<![\w.])\.?\d|pi\b", " ".join(_constants(cells)), re.I))
 
 
 def _constants(cells: dict[str, str]) -> list[str]:
@@ -354,10 +370,11 @@ def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         if each.bracket == "{":
             pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
             label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
-            cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+            named = [(key.strip(" .\"'\n").lower(), value.strip(" \"'\n")) for key, value in pairs]
+            cells = {key: value for key, value in named if not re.match(r"[(\[].*,", value)}  # no colour, no column
             rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
-    if any(_is_full(cells) for _, cells in rows):
-        return [_grid([row for row in rows if _is_full(row[1])])]
+    if any(_is_row(cells) for _, cells in rows):
+        return [_grid([row for row in rows if _is_row(row[1])])]
     rows = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
@@ -368,13 +385,8 @@ def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [row for row in rows if _is_full(row[1])]
+    full = [row for row in rows if _is_row(row[1])]
     return [_grid(full)] if len(full) > 1 else []
-
-
-def _is_full(cells: dict[str, str]) -> bool:
-    """Whether cells are those of a D-H row, not lists."""
-    return _is_row(key for key, value in cells.items() if value[:1] != "[")
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
@@ -393,6 +405,8 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
         return []
     if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
         return []
+    if any(re.match(r"-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for _, cells in rows for cell in cells):  # a rotation
+        return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
     return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
@@ -401,8 +415,13 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
     rows, labels = Grid(), list[str]()
+    stacked = {name for each in groups for name in re.findall(r"\w+", each.inside)}
     for group in sorted(groups, key=lambda each: each.start):
-        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
+        label = re.search(
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$", group.before
+        )
+        if label and label[2] and label[2] not in stacked:
+            continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
@@ -429,22 +448,46 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
-    near = [code.comments[k] for k in range(max(rows[0][0] - 5, 0), rows[-1][0] + 2) if k in code.comments]
-    unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
+    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     orders = _signatures(code, groups_of(code.text))
     typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
-    for comment in (*reversed(near), *typed, *(unpacked if len(unpacked) == 1 else ())):
-        comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
-        words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
-        for start in range(len(words) - width + 1):
-            window = words[start : start + width]
-            if _names_columns(window):
-                return window
+    near = [names for k in lines for names in _columns_in(code.comments.get(k, ""), width)]
+    for texts in (typed, [*_UNPACKED.findall(code.text), *_indexed(code, orders)], code.comments.values()):
+        said = [names for text in texts for names in _columns_in(text, width)]
+        if not near and len({tuple(quantities_of(names)) for names in said}) == 1:
+            near = said
+    if near:
+        return near[0]
     for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
         if library in code.text and len(names) >= width and width >= 4:
             return names[:width]
     return []
+
+
+def _columns_in(text: str, width: int) -> Iterator[list[str]]:
+    """The names of columns that a text holds one after the other."""
+    text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
+    words = [word for word in re.split(r"[\s,;|\[\]()]+", text) if word]
+    windows = (words[start : start + width] for start in range(len(words) - width + 1))
+    yield from itertools.islice(filter(_names_columns, windows), 1)
+
+
+def _indexed(code: Code, orders: dict[str, list[str]]) -> Iterator[str]:
+    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
+    named = [
+        (re.search(r"(\w+)\s*$", each.before), each.inside) for each in groups_of(code.text) if each.bracket == "("
+    ]
+    calls = [
+        f"{name}={part}" for call, inside in named if call for name, part in zip(orders.get(call[1], ()), parts(inside))
+    ]
+    found: dict[str, dict[int, str]] = {}
+    pattern = r"(\w+)\s*=\s*([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
+    for name, row, number in re.findall(pattern, "\n".join([code.text, *calls])):
+        if heading_of(name):
+            found.setdefault(row, {})[int(number)] = name
+    for names in found.values():
+        yield ",".join(names[k] for k in sorted(names))
 
 
 def _names_columns(names: list[str]) -> bool:
@@ -478,7 +521,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
+        if group.bracket == "(" or name is None or re.search(r"[\[{:%]", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
@@ -495,12 +538,16 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
     header, line = dict[str, str](), 0
     for name, cells, line, mark in lists:
-        heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
+        bare = re.sub(r"(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name)
+        words = name, "theta" if bare == "t" else bare, *reversed(name.split("_"))
+        heading = next(filter(None, map(heading_of, words)), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
-            text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
+            text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
             if not re.search(r"[^\W\d]", text):
                 quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
+        if quantity == "a" and re.search(r"\bpi\b|2rad|radians", " ".join(cells)):
+            quantity = "alpha"
         if quantity not in _OF_VECTORS or not cells:
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
@@ -522,10 +569,15 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
+    pattern = (
+        r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=!\s][^,}\n;:=!]*)"
+    )
     found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(pattern, code.text, re.I):
-        found.setdefault(each[1].lower(), {})[int(each[2])] = each
+    entries_of = list(re.finditer(pattern, code.text, re.I))
+    mark = next((each[3] for each in entries_of if each[1].lower() == "alpha"), "")
+    for each in entries_of:
+        if each[3] == mark:
+            found.setdefault(each[1].lower(), {})[int(each[2])] = each
     if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
