@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 LONGEST = 200  # characters of an expression
+TWO_VALUES = "two values"
+"""Stands for the value of a name that has several."""
 DEEPEST = 20  # brackets within each other, and names that are given by other names
 
 
@@ -101,6 +103,8 @@ def name_of(text: str) -> str:
 
 def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of an expression; ``depth`` counts names that led here."""
+    if text == TWO_VALUES:
+        raise ValueError("has two values")
     if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
         raise ValueError("is too long or too deep")
     values: dict[str, CellAmount | str] = {}

@@ -314,6 +314,9 @@ def _in_own_units(
         elif turned:
             yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
             turned = set()
+        elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
+            problem = f"alpha, {max(abs(row['alpha_deg']) for row in rows):g} at most, says no unit"
+            raise InputError(path, "column alpha", problem, "Give --angle-unit deg or rad")
     elif angle_unit == "deg":
         turned = set()
     for row in rows:

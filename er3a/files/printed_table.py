@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, code_grids, code_of, elements
@@ -47,7 +47,6 @@ _CELL = (
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
 """Marks of variables in cells: of time, of SymPy, a star, and an offset in brackets."""
-_TWO = "two values"
 _STARRED = re.compile(r"^\*$|\w\^?\*+\s*(?:$|[-+])")
 _COMMA = re.compile(r"([-+]?\d+),(\d+)((?:e[-+]?\d+)?\s*(?:°|mm|cm|m|in|deg|rad)?)", re.IGNORECASE)
 _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
@@ -62,7 +61,7 @@ SIGNS = {
         re.I,
     ),
     "standard": re.compile(
-        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|[\"']dh[\"']\s*\)|"
+        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|"
         r"[\"'](?:standard|classic|normal)[\"']|"
         r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
         r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
@@ -348,8 +347,7 @@ class _Table:
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
     def _stated(self, program: str, text: str) -> Convention | None:
-        """The convention that headings, the program, or the text around the table says; what a program does comes before
-        its comments."""
+        """The convention that headings, the program, or the text around the table says: what a program does comes first."""
         if "convention" in self.header:
             return None
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
@@ -377,9 +375,11 @@ class _Table:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
         above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
-        if not re.search(r"\b(?:else|elif|elseif|case)\b", above):  # what was assigned last, if nothing chooses
+        if not re.search(
+            r"\b(?:if|else|elif|elseif|case|switch)\b", above
+        ):  # what was assigned last, if nothing chooses
             last = {name: value.rstrip(" \t.") for name, value, _ in _GIVEN.findall(above)}
-            found = {name: last.get(name, value) if value == _TWO else value for name, value in found.items()}
+            found = {name: last.get(name, value) if value == TWO_VALUES else value for name, value in found.items()}
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)
@@ -562,6 +562,10 @@ class _Table:
         units = sorted({each.unit for each in found if each and each.unit and each.number})
         bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
         unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
+        if unit == "grad":
+            if any(each and each.number % 90 for each in found):
+                self._refuse(None, k, "grad may be degrees or gons", "Name the column's unit deg, or convert it")
+            unit = "deg"
         if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
             unit = "rad"
         if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
@@ -581,7 +585,7 @@ class _Table:
 
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else _TWO
+    found[name] = value if found.get(name, value) == value else TWO_VALUES
 
 
 def _in(amount: CellAmount, unit: str) -> float:

@@ -121,7 +121,8 @@ def latex_grids(text: str) -> list[Grid]:
         inner = re.sub(rf"^\s*(?:\[[^\]]*\]\s*)?(?:\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}\s*){{{given}}}", "\n", body[2])
         for row in re.split(r"\\\\\s*(?:\[[^\]]*\])?|\\tabularnewline", inner):
             cells = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
-            grid.append((start + row.count("\n"), [without_latex(cell).strip() for cell in cells]))
+            if row.strip():
+                grid.append((start + row.count("\n"), [without_latex(cell).strip() for cell in cells]))
             start += row.count("\n")
         found.append(grid)
     return found

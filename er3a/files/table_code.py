@@ -33,13 +33,16 @@ _ORDERS = {
 """The order of arguments without names, by the function."""
 LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
-    "setFixedTransform": ("a,alpha,d,theta", ""),
+    "'dh'": ("a,alpha,d,theta", "standard"),
+    '"dh"': ("a,alpha,d,theta", "standard"),
+    "'mdh'": ("a,alpha,d,theta", "modified"),
+    '"mdh"': ("a,alpha,d,theta", "modified"),
     "pybotics": ("alpha,a,theta,d", "modified"),
     "MDHKinematicChain": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
-"""Columns of a matrix, and the convention, by a name of the library that takes it."""
+"""Columns of a matrix, and the convention, by a name of the library, or its option, that takes it."""
 _UNPACKED = re.compile(
     r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*"
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
@@ -224,7 +227,8 @@ def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
-            orders.setdefault(named[1], names)
+            made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
+            orders.setdefault(made[-1] if made else "", [name for name in names if name != "self"])
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
@@ -243,7 +247,8 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers, or names that get their values by assignments and are no lists."""
     lists = _lists(code)
-    given = [cell for cell in _constants(cells) if cell not in lists and re.search(rf"(?m)^\s*{cell}\s*=", code.text)]
+    names = [cell for cell in _constants(cells) if cell.rpartition(".")[2].lstrip("_") not in lists]
+    given = [name for name in names if re.search(rf"(?m)^\s*{re.escape(name)}\s*=", code.text)]
     return bool(given) or bool(re.search(r"(?<![\w.])\.?\d|pi\b", " ".join(_constants(cells)), re.I))
 
 
@@ -418,7 +423,8 @@ def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
     stacked = {name for each in groups for name in re.findall(r"\w+", each.inside)}
     for group in sorted(groups, key=lambda each: each.start):
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$", group.before
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            group.before,
         )
         if label and label[2] and label[2] not in stacked:
             continue
@@ -454,8 +460,12 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     near = [names for k in lines for names in _columns_in(code.comments.get(k, ""), width)]
     for texts in (typed, [*_UNPACKED.findall(code.text), *_indexed(code, orders)], code.comments.values()):
         said = [names for text in texts for names in _columns_in(text, width)]
-        if not near and len({tuple(quantities_of(names)) for names in said}) == 1:
-            near = said
+        found = {tuple(each.replace("offset", "theta") for each in quantities_of(names)) for names in [*said, *near[:1]]}
+        if len(found) > 1 and near and len(said) == 1 and texts != code.comments.values():
+            problem = f"a comment says {', '.join(near[0])}, and the program {', '.join(said[0])}"
+            raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
+        if len(found) == 1:
+            near = near or said
     if near:
         return near[0]
     for library, (order, _convention) in LIBRARIES.items():
@@ -521,7 +531,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:%]", group.inside):
+        if group.bracket == "(" or name is None or re.search(r"[\[{:%]|;.*[^\s;].*[, ].*;", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
@@ -569,9 +579,7 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = (
-        r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=!\s][^,}\n;:=!]*)"
-    )
+    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}\n;:=!\s][^,}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
     entries_of = list(re.finditer(pattern, code.text, re.I))
     mark = next((each[3] for each in entries_of if each[1].lower() == "alpha"), "")
