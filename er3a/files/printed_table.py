@@ -347,7 +347,7 @@ class _Table:
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
     def _stated(self, program: str, text: str) -> Convention | None:
-        """The convention that headings, the program, or the text around the table says: what a program does comes first."""
+        """The convention that headings, the program, or the text around the table says, a program before words."""
         if "convention" in self.header:
             return None
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:

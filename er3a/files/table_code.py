@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
@@ -53,13 +53,28 @@ LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
-@dataclass(frozen=True)
+@dataclass
 class Code:
     """A program: its text without comments, these by their lines, and the fields of its types by their names."""
 
     text: str
     comments: dict[int, str]
     fields: dict[str, list[str]]
+
+    @cached_property
+    def groups(self) -> list[CodeGroup]:
+        """The pairs of brackets in the order of their beginnings."""
+        return sorted(groups_of(self.text), key=lambda each: each.start)
+
+    @cached_property
+    def lists(self) -> dict[str, list[str]]:
+        """The lists by their names; the last of a name that has several."""
+        return {name: cells for name, cells, _, _ in _named_lists(self)}
+
+    @cached_property
+    def orders(self) -> dict[str, list[str]]:
+        """The arguments of functions of a row's numbers."""
+        return _signatures(self)
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
@@ -168,30 +183,29 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     grids : of each its headings and rows, with their lines
     """
     code = code_of(text)
-    groups = groups_of(code.text)
-    matrices = [grid for each in groups if (grid := _matrix(code, each))]
+    matrices = [grid for each in code.groups if (grid := _matrix(code, each))]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, _listed(code, groups)) if grid and grid[0][1]]
-    return _calls(code, groups) or _records(code, groups) or named or _vectors(code)
+    named = [grid for grid in (*matrices, _listed(code)) if grid and grid[0][1]]
+    return _calls(code) or _records(code) or named or _vectors(code)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _calls(code: Code) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread, orders = list[_Link](), list[int](), _signatures(code, groups)
-    for each in sorted(groups, key=lambda group: group.start):
+    rows, unread = list[_Link](), list[int]()
+    for each in code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        cells = _arguments(named[2], each.inside) or _of_signature(orders.get(named[2], []), each.inside)
+        cells = _arguments(named[2], each.inside) or _of_signature(code.orders.get(named[2], []), each.inside)
         toolbox = _TOOLBOX.fullmatch(named[2])
         if cells and not (toolbox or _says_numbers(code, cells)):
             continue
         index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if not cells and toolbox and not (index or named[2] in orders):
+        if not cells and toolbox and not (index or named[2] in code.orders):
             unread.append(code.line(each.start))
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
@@ -201,8 +215,10 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
-    texts, lists = [cell for row in rows for cell in _constants(row.cells)], _lists(code)
-    if any((own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in lists for text in texts):  # a matrix, by rows
+    texts = [cell for row in rows for cell in _constants(row.cells)]
+    if any(
+        (own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in code.lists for text in texts
+    ):  # a matrix, by rows
         return []
     if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
         return [_looped(code, rows)]
@@ -212,18 +228,18 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
         problem = "links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
-    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
+    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    held = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
     return [_grid([(row.line, row.cells) for row in each]) for each in arms or held or _begun_again(rows)]
 
 
-def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
+def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
-    for each in groups:
+    for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
@@ -246,10 +262,11 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers, or names that get their values by assignments and are no lists."""
-    lists = _lists(code)
-    names = [cell for cell in _constants(cells) if cell.rpartition(".")[2].lstrip("_") not in lists]
-    given = [name for name in names if re.search(rf"(?m)^\s*{re.escape(name)}\s*=", code.text)]
-    return bool(given) or bool(re.search(r"(?<![\w.])\.?\d|pi\b", " ".join(_constants(cells)), re.I))
+    assigned = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
+    return any(
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(assigned.format(re.escape(cell)), code.text)
+        for cell in _constants(cells)
+    )
 
 
 def _constants(cells: dict[str, str]) -> list[str]:
@@ -350,9 +367,8 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
 def _looped(code: Code, rows: list[_Link]) -> Grid:
     """A link made in a loop, of lists with a number for each joint."""
     line, cells = rows[0].line, rows[0].cells
-    lists = _lists(code)
     found = {key: _INDEXED.fullmatch(cell) for key, cell in cells.items()}
-    columns = {key: lists[each[1]] for key, each in found.items() if each and each[1] in lists}
+    columns = {key: code.lists[each[1]] for key, each in found.items() if each and each[1] in code.lists}
     lengths = {len(values) for values in columns.values()}
     counts = {int(each) for each in re.findall(r"(?:range\(|(?:=|in)\s*1\s*:\s*)(\d+)", code.text)}
     if len(rows) > 1 or len(lengths) != 1 or (counts and not counts & lengths):
@@ -367,11 +383,11 @@ def _is_row(cells: Iterable[str]) -> bool:
     return "alpha" in quantities and bool(quantities & {"a", "d"})
 
 
-def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _records(code: Code) -> list[Grid]:
     """Rows as ``{"a": 0, "alpha": 90, ...}``, or as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a
     name or a key that is repeated; if such keys hold lists, these are columns (:func:`_vectors`)."""
     rows = list[tuple[int, dict[str, str]]]()
-    for each in sorted(groups, key=lambda group: group.start):
+    for each in code.groups:
         if each.bracket == "{":
             pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
             label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
@@ -417,11 +433,11 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
 
 
-def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
+def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
     rows, labels = Grid(), list[str]()
-    stacked = {name for each in groups for name in re.findall(r"\w+", each.inside)}
-    for group in sorted(groups, key=lambda each: each.start):
+    stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
+    for group in code.groups:
         label = re.search(
             r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
@@ -455,19 +471,14 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     of a library."""
     width = len(rows[0][1])
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
-    orders = _signatures(code, groups_of(code.text))
-    typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
-    near = [names for k in lines for names in _columns_in(code.comments.get(k, ""), width)]
-    for texts in (typed, [*_UNPACKED.findall(code.text), *_indexed(code, orders)], code.comments.values()):
-        said = [names for text in texts for names in _columns_in(text, width)]
-        found = {tuple(each.replace("offset", "theta") for each in quantities_of(names)) for names in [*said, *near[:1]]}
-        if len(found) > 1 and near and len(said) == 1 and texts != code.comments.values():
-            problem = f"a comment says {', '.join(near[0])}, and the program {', '.join(said[0])}"
-            raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
-        if len(found) == 1:
-            near = near or said
-    if near:
-        return near[0]
+    typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
+    near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
+    used = _columns_in([*map(",".join, typed)] or [*_UNPACKED.findall(code.text), *_indexed(code)], width)
+    if near and used and [*map(_place, near)] != [*map(_place, used)]:
+        problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
+        raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
+    if said := near or used or _columns_in(code.comments.values(), width):
+        return said
     for library, (order, _convention) in LIBRARIES.items():
         names = order.split(",")
         if library in code.text and len(names) >= width and width >= 4:
@@ -475,25 +486,32 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     return []
 
 
-def _columns_in(text: str, width: int) -> Iterator[list[str]]:
-    """The names of columns that a text holds one after the other."""
-    text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
-    words = [word for word in re.split(r"[\s,;|\[\]()]+", text) if word]
-    windows = (words[start : start + width] for start in range(len(words) - width + 1))
-    yield from itertools.islice(filter(_names_columns, windows), 1)
+def _place(name: str) -> str:
+    """What a column is, whether theta or its offset."""
+    return quantities_of([name])[0].replace("offset", "theta")
 
 
-def _indexed(code: Code, orders: dict[str, list[str]]) -> Iterator[str]:
+def _columns_in(texts: Iterable[str], width: int) -> list[str]:
+    """The names of columns that texts hold one after the other; [] if they hold several orders."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
+        words = [word for word in re.split(r"[\s,;|\[\]()]+", text) if word]
+        windows = (words[start : start + width] for start in range(len(words) - width + 1))
+        if names := next(filter(_names_columns, windows), []):
+            found.setdefault(" ".join(map(_place, names)), names)
+    return next(iter(found.values())) if len(found) == 1 else []
+
+
+def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    named = [
-        (re.search(r"(\w+)\s*$", each.before), each.inside) for each in groups_of(code.text) if each.bracket == "("
-    ]
-    calls = [
-        f"{name}={part}" for call, inside in named if call for name, part in zip(orders.get(call[1], ()), parts(inside))
+    calls = [(re.search(r"(\w+)\s*$", each.before), parts(each.inside)) for each in code.groups if each.bracket == "("]
+    pairs = [
+        f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
     ]
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
-    for name, row, number in re.findall(pattern, "\n".join([code.text, *calls])):
+    for name, row, number in re.findall(pattern, "\n".join([code.text, *pairs])):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
     for names in found.values():
@@ -513,21 +531,16 @@ def elements(text: str) -> dict[str, str]:
     value.
     """
     found = dict[str, str]()
-    for name, cells in _lists(code_of(text)).items():
+    for name, cells in code_of(text).lists.items():
         used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
         if not used or used & {0, len(cells)}:
             found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
     return found
 
 
-def _lists(code: Code) -> dict[str, list[str]]:
-    """The lists of a program by their names; the last of a name that has several."""
-    return {name: cells for name, cells, _, _ in _named_lists(code)}
-
-
 def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
-    for group in groups_of(code.text):
+    for group in code.groups:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
@@ -579,7 +592,8 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}\n;:=!\s][^,}\n;:=!]*)"
+    name = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
     entries_of = list(re.finditer(pattern, code.text, re.I))
     mark = next((each[3] for each in entries_of if each[1].lower() == "alpha"), "")
