@@ -7,7 +7,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 LONGEST = 200  # characters of an expression
 TWO_VALUES = "two values"
@@ -209,11 +209,6 @@ def _two_units(a: str, b: str) -> str:
 
 
 def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
-    if {a.unit, b.unit} == {"deg", "rad"}:  # each is said with its own unit
-        a, b = (
-            replace(each, number=math.degrees(each.number), unit="deg") if each.unit == "rad" else each
-            for each in (a, b)
-        )
     if a.unit and b.unit and a.unit != b.unit:
         raise ValueError(_two_units(a.unit, b.unit))
     names = {*a.variables, *b.variables}

@@ -374,12 +374,6 @@ class _Table:
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
-        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
-        if not re.search(
-            r"\b(?:if|else|elif|elseif|case|switch)\b", above
-        ):  # what was assigned last, if nothing chooses
-            last = {name: value.rstrip(" \t.") for name, value, _ in _GIVEN.findall(above)}
-            found = {name: last.get(name, value) if value == TWO_VALUES else value for name, value in found.items()}
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)

@@ -220,8 +220,8 @@ def _calls(code: Code) -> list[Grid]:
         (own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in code.lists for text in texts
     ):  # a matrix, by rows
         return []
-    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
-        return [_looped(code, rows)]
+    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))) and len(rows) == 1:  # made of lists in a loop
+        return []
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
         if "convention" not in rows[0].cells:  # by no toolbox: it may be any function
             return []
@@ -243,8 +243,7 @@ def _signatures(code: Code) -> dict[str, list[str]]:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
-            made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
-            orders.setdefault(made[-1] if made else "", [name for name in names if name != "self"])
+            orders.setdefault(named[1], names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
@@ -254,18 +253,20 @@ def _parameters(text: str) -> list[str]:
 
 
 def _of_signature(order: list[str], text: str) -> dict[str, str]:
-    """A row of a function's arguments; none of its definition, nor of a call with elements of lists."""
+    """A row of a function's arguments; none of its definition."""
     cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
-    listed = any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in _constants(cells))
-    return {} if len(cells) < len(order) or _parameters(text) == order or listed else cells
+    return {} if len(cells) < len(order) or _parameters(text) == order else cells
 
 
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
-    """Whether a row holds numbers, or names that get their values by assignments and are no lists."""
-    assigned = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
+    """Whether a row holds numbers or names of numbers, and no elements of lists."""
+    texts = _constants(cells)
+    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in texts):
+        return False
+    given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
     return any(
-        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(assigned.format(re.escape(cell)), code.text)
-        for cell in _constants(cells)
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(given.format(re.escape(cell)), code.text)
+        for cell in texts
     )
 
 
@@ -362,19 +363,6 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
             problem = f"{found[1]}.{found[2]} is set for a link that is not found"
             raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
         cells[found[2]] = found[3].strip()
-
-
-def _looped(code: Code, rows: list[_Link]) -> Grid:
-    """A link made in a loop, of lists with a number for each joint."""
-    line, cells = rows[0].line, rows[0].cells
-    found = {key: _INDEXED.fullmatch(cell) for key, cell in cells.items()}
-    columns = {key: code.lists[each[1]] for key, each in found.items() if each and each[1] in code.lists}
-    lengths = {len(values) for values in columns.values()}
-    counts = {int(each) for each in re.findall(r"(?:range\(|(?:=|in)\s*1\s*:\s*)(\d+)", code.text)}
-    if len(rows) > 1 or len(lengths) != 1 or (counts and not counts & lengths):
-        problem = f"links are made in a loop, of lists with {', '.join(map(str, sorted(lengths)))} numbers"
-        raise InputError(None, f"line {line}", f"{problem}, and otherwise", "Write a row for each joint")
-    return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
 
 
 def _is_row(cells: Iterable[str]) -> bool:
@@ -504,14 +492,10 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
 
 
 def _indexed(code: Code) -> Iterator[str]:
-    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    calls = [(re.search(r"(\w+)\s*$", each.before), parts(each.inside)) for each in code.groups if each.bracket == "("]
-    pairs = [
-        f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
-    ]
+    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``dh(a=row[0], ...)``."""
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
-    for name, row, number in re.findall(pattern, "\n".join([code.text, *pairs])):
+    for name, row, number in re.findall(pattern, code.text):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
     for names in found.values():
@@ -569,8 +553,6 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
             text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
             if not re.search(r"[^\W\d]", text):
                 quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
-        if quantity == "a" and re.search(r"\bpi\b|2rad|radians", " ".join(cells)):
-            quantity = "alpha"
         if quantity not in _OF_VECTORS or not cells:
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
