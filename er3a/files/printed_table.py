@@ -7,7 +7,6 @@ ways is refused, with both.
 
 from __future__ import annotations
 
-import difflib
 import html
 import itertools
 import math
@@ -23,7 +22,7 @@ from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, code_grids, code_of, elements
+from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -55,7 +54,7 @@ _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "re
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 SIGNS = {
     "modified": re.compile(
-        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
         r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
         re.I,
@@ -156,7 +155,6 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if len(tables) > 1:
         lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
         raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
-    check_size(path, tables[0])
     return _Table(path, text, tables[0], from_code).converted()
 
 
@@ -320,7 +318,7 @@ class _Table:
         self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
         self.column = {own.quantity: k for k, own in self.headings.items()}
         self._check_headings()
-        self.convention = self._stated(code_of(text).text if from_code else "", text)
+        self.convention = self._stated(Code(text).text if from_code else "", text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
@@ -395,7 +393,7 @@ class _Table:
                 self._theta(k)
             elif own and own.quantity not in ("joint", "type"):
                 self._constants(k, own.quantity)
-            elif own is None and (stem in OWN or difflib.get_close_matches(stem.lower(), OWN, n=1, cutoff=0.8)):
+            elif own is None and (stem in OWN):
                 self.columns[name] = [cells[k] for _, cells in self.rows]
             elif own is None and name:
                 unused.append(name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 from er3a.errors import InputError
 from er3a.files.table_cells import Grid
@@ -53,34 +52,6 @@ LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
 
 
-@dataclass
-class Code:
-    """A program: its text without comments, these by their lines, and the fields of its types by their names."""
-
-    text: str
-    comments: dict[int, str]
-    fields: dict[str, list[str]]
-
-    @cached_property
-    def groups(self) -> list[CodeGroup]:
-        """The pairs of brackets in the order of their beginnings."""
-        return sorted(groups_of(self.text), key=lambda each: each.start)
-
-    @cached_property
-    def lists(self) -> dict[str, list[str]]:
-        """The lists by their names; the last of a name that has several."""
-        return {name: cells for name, cells, _, _ in _named_lists(self)}
-
-    @cached_property
-    def orders(self) -> dict[str, list[str]]:
-        """The arguments of functions of a row's numbers."""
-        return _signatures(self)
-
-    def line(self, place: int) -> int:
-        """The number of the line of a place in the text."""
-        return self.text.count("\n", 0, place) + 1
-
-
 @dataclass(frozen=True)
 class CodeGroup:
     """A pair of brackets: where they are, what is in them and what is written before them."""
@@ -92,23 +63,30 @@ class CodeGroup:
     before: str
 
 
-def code_of(text: str) -> Code:
-    """A program's text without its comments; the numbers of its lines stay."""
-    comments: dict[int, str] = {}
-    for block in _BLOCK.finditer(text):
-        first = text.count("\n", 0, block.start()) + 1
-        comments |= {line: said.strip() for line, said in enumerate(block[0].split("\n"), first)}
-    text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
-    text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
+class Code:
+    """A program: its text without comments, these by their lines, and the fields of its types by their names; its
+    brackets in the order of their beginnings, its lists by their names, and arguments of functions of a row's numbers.
+    """
 
-    def kept(found: re.Match[str]) -> str:
-        if found[1] is None and found[2]:
-            comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
-        return found[1] or ""
+    def __init__(self, text: str):
+        self.comments: dict[int, str] = {}
+        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+        text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
-    text = _COMMENT.sub(kept, text)
-    fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
-    return Code(text, comments, fields)
+        def kept(found: re.Match[str]) -> str:
+            if found[1] is None and found[2]:
+                self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
+            return found[1] or ""
+
+        self.text = _COMMENT.sub(kept, text)
+        self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
+        self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
+        self.lists = {name: cells for name, cells, _, _ in _named_lists(self)}
+        self.orders = _signatures(self)
+
+    def line(self, place: int) -> int:
+        """The number of the line of a place in the text."""
+        return self.text.count("\n", 0, place) + 1
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -182,7 +160,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     -------
     grids : of each its headings and rows, with their lines
     """
-    code = code_of(text)
+    code = Code(text)
     matrices = [grid for each in code.groups if (grid := _matrix(code, each))]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
@@ -216,15 +194,11 @@ def _calls(code: Code) -> list[Grid]:
         )
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    if any(
-        (own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in code.lists for text in texts
-    ):  # a matrix, by rows
-        return []
-    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))) and len(rows) == 1:  # made of lists in a loop
+    plain = "0", "revolute", "standard", "modified"
+    of_lists = all(_INDEXED.search(cell) or cell in plain for cell in texts)  # in a loop
+    if len(rows) == 1 and (of_lists or "convention" not in rows[0].cells):
         return []
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
-        if "convention" not in rows[0].cells:  # by no toolbox: it may be any function
-            return []
         problem = "links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
@@ -467,11 +441,8 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
     if said := near or used or _columns_in(code.comments.values(), width):
         return said
-    for library, (order, _convention) in LIBRARIES.items():
-        names = order.split(",")
-        if library in code.text and len(names) >= width and width >= 4:
-            return names[:width]
-    return []
+    taken = (order.split(",") for library, (order, _) in LIBRARIES.items() if library in code.text and width >= 4)
+    return next((names[:width] for names in taken if len(names) >= width), [])
 
 
 def _place(name: str) -> str:
@@ -515,7 +486,7 @@ def elements(text: str) -> dict[str, str]:
     value.
     """
     found = dict[str, str]()
-    for name, cells in code_of(text).lists.items():
+    for name, cells in Code(text).lists.items():
         used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
         if not used or used & {0, len(cells)}:
             found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
@@ -574,14 +545,11 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    name = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
     pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
-    entries_of = list(re.finditer(pattern, code.text, re.I))
-    mark = next((each[3] for each in entries_of if each[1].lower() == "alpha"), "")
-    for each in entries_of:
-        if each[3] == mark:
-            found.setdefault(each[1].lower(), {})[int(each[2])] = each
+    for each in re.finditer(pattern, code.text, re.I):
+        found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
     if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
