@@ -10,8 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 LONGEST = 200  # characters of an expression
-TWO_VALUES = "two values"
-"""Stands for the value of a name that has several."""
 DEEPEST = 20  # brackets within each other, and names that are given by other names
 
 
@@ -103,8 +101,6 @@ def name_of(text: str) -> str:
 
 def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of an expression; ``depth`` counts names that led here."""
-    if text == TWO_VALUES:
-        raise ValueError("has two values")
     if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
         raise ValueError("is too long or too deep")
     values: dict[str, CellAmount | str] = {}
@@ -202,15 +198,9 @@ def _called(name: str, values: list[CellAmount]) -> CellAmount:
         raise ValueError(f"has no value of {name}(...)") from None
 
 
-def _two_units(a: str, b: str) -> str:
-    if {a, b} == {"deg", "rad"}:
-        return "has fractions of pi in a column of degrees"
-    return f"is in {a} and in {b}" if a and b else ""
-
-
 def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
     if a.unit and b.unit and a.unit != b.unit:
-        raise ValueError(_two_units(a.unit, b.unit))
+        raise ValueError(f"is in {a.unit} and in {b.unit}")
     names = {*a.variables, *b.variables}
     both = {each: a.variables.get(each, 0) + sign * b.variables.get(each, 0) for each in names}
     return CellAmount(a.number + sign * b.number, a.unit or b.unit, both)
@@ -226,8 +216,10 @@ def _power(a: CellAmount, b: CellAmount) -> CellAmount:
 
 
 def _product(a: CellAmount, b: CellAmount) -> CellAmount:
-    if (a.variables and b.variables) or (a.unit and b.unit):
-        raise ValueError(_two_units(a.unit, b.unit) or "multiplies two variables")
+    if a.unit and b.unit:
+        raise ValueError(f"is in {a.unit} and in {b.unit}")
+    if a.variables and b.variables:
+        raise ValueError("multiplies two variables")
     scaled = {name: times * b.number for name, times in a.variables.items()}
     scaled |= {name: times * a.number for name, times in b.variables.items()}
     return CellAmount(a.number * b.number, a.unit or b.unit, scaled)
@@ -237,5 +229,5 @@ def _quotient(a: CellAmount, b: CellAmount) -> CellAmount:
     if b.variables or not b.number:
         raise ValueError("divides by a variable or by zero")
     if b.unit and (b.unit != "rad" or a.unit):  # 180/pi is a number
-        raise ValueError(_two_units(a.unit, b.unit) or f"divides by {b.unit}")
+        raise ValueError(f"divides by {b.unit}")
     return CellAmount(a.number / b.number, a.unit, {name: times / b.number for name, times in a.variables.items()})

@@ -41,6 +41,7 @@ OPTIONAL = columns_of(
 ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "cm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
+WORDS = {"m": "metres", "in": "inches", "cm": "centimetres"}
 PER_RAD = math.degrees(1.0)
 OTHER_UNITS = {unit: ("mm", scale) for unit, scale in PER_MM.items() if unit != "mm"} | {"rad": ("deg", PER_RAD)}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
@@ -298,8 +299,7 @@ def _in_own_units(
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
     unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
     if unit != (length_unit or "mm"):
-        word = {"m": "metres", "in": "inches"}[unit]
-        yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+        yield f"the lengths, {max(lengths):g} at most, were read as {WORDS[unit]}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
         if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
@@ -313,8 +313,7 @@ def _in_own_units(
             yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
             turned = set()
         elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
-            problem = f"alpha, {max(abs(row['alpha_deg']) for row in rows):g} at most, says no unit"
-            raise InputError(path, "column alpha", problem, "Give --angle-unit deg or rad")
+            raise InputError(path, "column alpha", "small angles say no unit", "Give --angle-unit deg or rad")
     elif angle_unit == "deg":
         turned = set()
     for row in rows:
@@ -335,7 +334,7 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
         raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm, m or in")
     if likely == "mm":
         return "mm"
-    word = {"m": "metres", "in": "inches", "cm": "centimetres"}[likely]
+    word = WORDS[likely]
     if not (as_printed or unsaid):
         problem = f"the lengths, {longest:g} mm at most, are those of an arm in {word}"
         remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"

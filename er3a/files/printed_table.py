@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
@@ -577,7 +577,7 @@ class _Table:
 
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else TWO_VALUES
+    found[name] = value if found.get(name, value) == value else "two values"
 
 
 def _in(amount: CellAmount, unit: str) -> float:

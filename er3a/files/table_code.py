@@ -37,7 +37,6 @@ LIBRARIES = {
     "'mdh'": ("a,alpha,d,theta", "modified"),
     '"mdh"': ("a,alpha,d,theta", "modified"),
     "pybotics": ("alpha,a,theta,d", "modified"),
-    "MDHKinematicChain": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
@@ -356,8 +355,8 @@ def _records(code: Code) -> list[Grid]:
             named = [(key.strip(" .\"'\n").lower(), value.strip(" \"'\n")) for key, value in pairs]
             cells = {key: value for key, value in named if not re.match(r"[(\[].*,", value)}  # no colour, no column
             rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
-    if any(_is_row(cells) for _, cells in rows):
-        return [_grid([row for row in rows if _is_row(row[1])])]
+    if full := [row for row in rows if _is_row(row[1])]:
+        return [_grid(full)]
     rows = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
@@ -384,11 +383,9 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
 def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns; [] if it is none, or a pose."""
     rows = _rows(code, group)
-    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0][1]):
+    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
     if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
-        return []
-    if any(re.match(r"-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for _, cells in rows for cell in cells):  # a rotation
         return []
     several = len({line for line, _ in rows}) == len(rows)
     labels = [code.comments.get(line, "") if several else "" for line, _ in rows]
@@ -398,14 +395,11 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
     rows, labels = Grid(), list[str]()
-    stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
         )
-        if label and label[2] and label[2] not in stacked:
-            continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
@@ -435,7 +429,7 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
     near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
-    used = _columns_in([*map(",".join, typed)] or [*_UNPACKED.findall(code.text), *_indexed(code)], width)
+    used = _columns_in([*map(",".join, typed), *_UNPACKED.findall(code.text), *_indexed(code)], width)
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
         problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
         raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
@@ -516,9 +510,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
     header, line = dict[str, str](), 0
     for name, cells, line, mark in lists:
-        bare = re.sub(r"(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name)
-        words = name, "theta" if bare == "t" else bare, *reversed(name.split("_"))
-        heading = next(filter(None, map(heading_of, words)), None)
+        heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
             text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
@@ -550,7 +542,7 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(pattern, code.text, re.I):
         found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
-    if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
+    if not found.keys() >= {"alpha", "a", "d"} or len(found) == 3:
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
         last = entries[max(entries)]
