@@ -120,9 +120,9 @@ def latex_grids(text: str) -> list[Grid]:
         given = 2 if body[1] in ("tabularx", "tabular*") else 1
         inner = re.sub(rf"^\s*(?:\[[^\]]*\]\s*)?(?:\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}\s*){{{given}}}", "\n", body[2])
         for row in re.split(r"\\\\\s*(?:\[[^\]]*\])?|\\tabularnewline", inner):
-            cells = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
-            if row.strip():
-                grid.append((start + row.count("\n"), [without_latex(cell).strip() for cell in cells]))
+            parts = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
+            if any(cells := [without_latex(part).strip() for part in parts]):
+                grid.append((start + row.count("\n"), cells))
             start += row.count("\n")
         found.append(grid)
     return found

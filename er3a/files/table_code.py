@@ -493,7 +493,7 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:%]|;.*[^\s;].*[, ].*;", group.inside):
+        if group.bracket == "(" or name is None or re.search(r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;", group.inside):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))

@@ -306,6 +306,17 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i;a [mm];alpha [gon];d [mm]\n1;0;100;300\n2;270;0;0\n", "alpha_deg"),
         ("j = rigidBodyJoint(['j' n],'prismatic');\n% a alpha d theta\nM = [0 0 0.3 0;\n0.2 0 0 0];", "types"),
         ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
+        ("a,alpha,d\n300,1.05,0\n200,0,0\n", "--angle-unit"),
+        ("a (mm),alpha (grad),d (mm)\n300,100,0\n200,0,0\n", "gons"),
+        (
+            "# a, alpha, d, theta\nM = [[0, 0.3, 0, 1], [0, 0, 0.2, 1]]\nfor theta, d, a, alpha in M:\n",
+            "the program theta",
+        ),
+        (
+            "d = [0, 0]\na = [1, 1]\nalpha = [0, 0]\nr = [PrismaticDH(a=a[i], alpha=alpha[i]) for i in n]",
+            "a row for each",
+        ),
+        ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
             "one of them",
@@ -393,6 +404,53 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+ROWS_OF_TWO = "M = [0 -pi/2 0.29 0;\n     0.27 0 0 -pi/2];\n"
+LISTS_OF_TWO = "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\noffset = [0, -pi/2]\n"
+SUBSTITUTED = "d1, d2 = symbols('d1:3')\nT = row(alpha0, a0, d1, q1).subs(dh) * row(alpha1, a1, d2, q2).subs(dh)\n"
+SUBSTITUTED += "dh = {alpha0: -pi/2, a0: 0, d1: 0.29, q1: q1,\n      alpha1: 0, a1: 0.27, d2: 0, q2: q2 - pi/2}\n"
+SPACED = r"""
+\begin{tabular}{cccc}
+a & $\alpha$ & d & $\theta$ \\ [0.5ex]
+\hline \\
+0 & $-\pi/2$ & $L_1$ & $q_1$ \\ [1ex]
+$L_2$ & 0 & 0 & $q_2 - \pi/2$ \\ [1ex]
+\end{tabular}
+$L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "convention"),
+    [
+        (
+            "setFixedTransform(j1, [0 -pi/2 0.29 0], 'mdh');\nsetFixedTransform(j2, [0.27 0 0 -pi/2], 'mdh');",
+            "modified",
+        ),
+        (ROWS_OF_TWO + "a = M(i,1); alpha = M(i,2); d = M(i,3); theta = M(i,4);", "standard"),
+        ("% each row is [a alpha d theta]\n" + 9 * "x = 1;\n" + ROWS_OF_TWO, "standard"),
+        (f"% Modified DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [cos(theta), a*cos(theta)];", "standard"),
+        (f"% standard DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [-sin(alpha), -sin(alpha)*d];", "modified"),
+        (
+            f"{LISTS_OF_TWO}links = [RevoluteMDH(d=d[i], a=a[i], alpha=alpha[i], offset=offset[i]) for i in n]",
+            "modified",
+        ),
+        (f"{LISTS_OF_TWO}arm = Arm(a=a, alpha=alpha, d=d, theta=offset)\nprint('d: [%g, %g]')", "standard"),
+        (f"{LISTS_OF_TWO}r = [0, 0, 0; 1, 0, 2]", "standard"),
+        (SUBSTITUTED, "modified"),
+        (
+            "rows = [{'a': 0, 'alpha': -pi/2, 'd': 0.29, 'theta': 0, 'color': (1, 0, 0)},\n"
+            " {'a': 0.27, 'alpha': 0, 'd': 0, 'theta': -pi/2, 'color': (0, 1, 0)}]",
+            "standard",
+        ),
+        (SPACED, "standard"),
+    ],
+)
+def test_programs_say_the_order_of_columns_and_the_convention(tmp_path, text, convention):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    assert content.dh.convention == convention
 
 
 def test_links_are_in_the_order_of_their_arm(tmp_path):
