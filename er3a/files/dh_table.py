@@ -137,8 +137,7 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
     if found is None and path.suffix != ".csv":
         problem = "no row of headings with a, alpha and d was found"
         raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
-    if found is None:
-        found = PrintedTable(read_lines(path), ())
+    found = found or PrintedTable(read_lines(path), ())
     check_size(path, found.lines)
     return found
 

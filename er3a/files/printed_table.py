@@ -460,6 +460,8 @@ class _Table:
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
+            if all(cells[k].strip() == "1" for _, cells in self.rows):
+                self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
             return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves

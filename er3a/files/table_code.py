@@ -194,8 +194,7 @@ def _calls(code: Code) -> list[Grid]:
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     plain = "0", "revolute", "standard", "modified"
-    of_lists = all(_INDEXED.search(cell) or cell in plain for cell in texts)  # in a loop
-    if len(rows) == 1 and (of_lists or "convention" not in rows[0].cells):
+    if len(rows) == 1 and all(_INDEXED.search(cell) or cell in plain for cell in texts):  # made of lists in a loop
         return []
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
         problem = "links of another program, or of a loop, are added"
@@ -285,7 +284,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
             cells[key.strip().lower()] = value.strip(" \"'")
         elif pending:
             cells[pending], pending = part, ""
-        elif quoted and quoted[1].lower() in _FLAGS:
+        elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
         elif quoted and toolbox:
             pending = quoted[1].lower()
@@ -306,7 +305,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     return _of_toolbox(low, words, cells)
 
 
-_FLAGS = {"modified", "mod", "mdh", "standard", "std", "stddh", "moddh", "revolute", "prismatic", "flip", "sym"}
+_FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
 
 
 def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
@@ -331,7 +330,7 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
     for found in re.finditer(pattern, code.text) if rows else ():
         cells = next((row.cells for row in rows if row.name == found[1]), None)
         if cells is None or found[2] not in cells:
-            if found[1] in ("self", "cls"):
+            if found[1] == "self":
                 continue
             problem = f"{found[1]}.{found[2]} is set for a link that is not found"
             raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")

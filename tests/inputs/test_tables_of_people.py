@@ -307,6 +307,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("j = rigidBodyJoint(['j' n],'prismatic');\n% a alpha d theta\nM = [0 0 0.3 0;\n0.2 0 0 0];", "types"),
         ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
         ("a,alpha,d\n300,1.05,0\n200,0,0\n", "--angle-unit"),
+        ("a,alpha,d,type\n300,90,0,1\n200,0,0,1\n", "turns"),
         ("a (mm),alpha (grad),d (mm)\n300,100,0\n200,0,0\n", "gons"),
         (
             "# a, alpha, d, theta\nM = [[0, 0.3, 0, 1], [0, 0, 0.2, 1]]\nfor theta, d, a, alpha in M:\n",
