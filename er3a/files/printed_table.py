@@ -52,6 +52,11 @@ _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
+_KIND_ELSEWHERE = re.compile(
+    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b)",
+    re.I,
+)
+"""A joint that slides, said outside the table."""
 SIGNS = {
     "modified": re.compile(
         r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
@@ -326,6 +331,9 @@ class _Table:
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
         self.kinds = self._kinds()
+        if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
+            problem = f"'{kind[0]}' is no column of the table"
+            raise InputError(path, "types of joints", problem, "Add a column of types")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:

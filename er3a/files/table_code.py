@@ -412,9 +412,6 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
-    if header and (kind := re.search(r"Joint\([^;\n]*[\"'](prismatic|fixed)", code.text)):
-        problem = f"a joint is {kind[1]}, and no column says which"
-        raise InputError(None, f"line {code.line(kind.start())}", problem, "Add a column of types")
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
@@ -492,10 +489,14 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;", group.inside):
+        inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
+        rows = re.search(
+            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
+        )
+        if group.bracket == "(" or name is None or rows:
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
-        cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
+        cells = row_cells(inside.replace(";", ",").replace("\n", " "))
         cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
         yield name[1], cells, code.line(group.start), name[2]
 
@@ -508,14 +509,17 @@ def _vectors(code: Code) -> list[Grid]:
 def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
     header, line = dict[str, str](), 0
-    for name, cells, line, mark in lists:
-        heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
+    for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
+        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
+        heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
             text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
             if not re.search(r"[^\W\d]", text):
                 quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
-        if quantity not in _OF_VECTORS or not cells:
+        if quantity == "a" and re.search(r"(?<![a-z])pi(?![a-z])|π|2rad|radians", " ".join(cells), re.I):
+            quantity = "alpha"
+        if quantity not in _OF_VECTORS or not cells or (name in "Ll" and "a" in named):
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
