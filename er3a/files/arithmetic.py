@@ -7,9 +7,11 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 LONGEST = 200  # characters of an expression
+TWO_VALUES = "two values"
+"""Stands for the value of a name that has several."""
 DEEPEST = 20  # brackets within each other, and names that are given by other names
 
 
@@ -101,6 +103,8 @@ def name_of(text: str) -> str:
 
 def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of an expression; ``depth`` counts names that led here."""
+    if text == TWO_VALUES:
+        raise ValueError("has two values")
     if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
         raise ValueError("is too long or too deep")
     values: dict[str, CellAmount | str] = {}
@@ -199,6 +203,8 @@ def _called(name: str, values: list[CellAmount]) -> CellAmount:
 
 
 def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
+    if {a.unit, b.unit} == {"deg", "rad"}:  # each is said with its own unit
+        a, b = (replace(x, number=math.radians(x.number), unit="rad") if x.unit == "deg" else x for x in (a, b))
     if a.unit and b.unit and a.unit != b.unit:
         raise ValueError(f"is in {a.unit} and in {b.unit}")
     names = {*a.variables, *b.variables}

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines, check_widths
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
@@ -41,7 +41,7 @@ _CELL = (
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
     (r"\b[A-Za-z]\w*(?:::|\.(?=[A-Za-z]))", ""),
-    (r"(?<=[\d.])f\b", ""),
+    (r"(?<=[\d.])f\b|^\*(?=[A-Za-z])", ""),
     (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
@@ -380,6 +380,11 @@ class _Table:
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
                 _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
+        # What is assigned last counts, if nothing chooses and the function is the same.
+        if not re.search(r"\b(?:if|else|elif|elseif|case|switch|for|while)\b|(?s:\b(def|function)\b.*\b\1\b)", above):
+            last = {name: value.rstrip(" \t.") for name, value, _ in _GIVEN.findall(above)}
+            found = {name: last.get(name, value) if value == TWO_VALUES else value for name, value in found.items()}
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)
@@ -587,7 +592,7 @@ class _Table:
 
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else "two values"
+    found[name] = value if found.get(name, value) == value else TWO_VALUES
 
 
 def _in(amount: CellAmount, unit: str) -> float:

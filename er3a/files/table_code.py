@@ -63,12 +63,15 @@ class CodeGroup:
 
 
 class Code:
-    """A program: its text without comments, these by their lines, and the fields of its types by their names; its
-    brackets in the order of their beginnings, its lists by their names, and arguments of functions of a row's numbers.
+    """A program: its text without comments, these and docstrings by their lines, and the fields of its types by their
+    names; its brackets in the order of their beginnings, its lists by their names, and arguments of functions of a
+    row's numbers.
     """
 
     def __init__(self, text: str):
-        self.comments: dict[int, str] = {}
+        self.comments, self.docs = dict[int, str](), dict[int, str]()
+        for block in _BLOCK.finditer(text):
+            self.docs |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
         text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
         text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
@@ -138,7 +141,8 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
         texts = [each[1:-1] for each in texts]
     else:
         lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-        lists = ";" not in group.inside and any(each.endswith(",") for each in lines[:-1])
+        flat = re.search(r"dh\w*(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I)  # its rows are its lines
+        lists = ";" not in group.inside and not flat and any(each.endswith(",") for each in lines[:-1])
         matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
         texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
     grid, place = Grid(), group.start
@@ -215,13 +219,15 @@ def _signatures(code: Code) -> dict[str, list[str]]:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
-            orders.setdefault(named[1], names)
+            made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
+            orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
 def _parameters(text: str) -> list[str]:
     """Names of parameters without their types and defaults."""
-    return [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
+    names = [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
+    return names[names[0] == "self" :]
 
 
 def _of_signature(order: list[str], text: str) -> dict[str, str]:
@@ -393,19 +399,23 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
 
 def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, labels = Grid(), list[str]()
+    rows, labels, arms = Grid(), list[str](), set[str]()
+    stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
         )
+        if label and label[2] and label[2] not in stacked:
+            continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
             if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
                 rows.append((code.line(group.start), cells))
-                labels.append(label[1] or "")
-    return _titled(code, rows, labels) if len(rows) > 1 else []
+                labels.append(label[1] or label[2] or "")
+                arms.add((label[2] or "").rstrip("0123456789"))
+    return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
 
 
 def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
@@ -424,7 +434,9 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     width = len(rows[0][1])
     lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
     typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
-    near = next((names for k in lines if (names := _columns_in([code.comments.get(k, "")], width))), [])
+    near = next(
+        (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
+    )
     used = _columns_in([*map(",".join, typed), *_UNPACKED.findall(code.text), *_indexed(code)], width)
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
         problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
@@ -445,7 +457,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     found: dict[str, list[str]] = {}
     for text in texts:
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
-        words = [word for word in re.split(r"[\s,;|\[\]()]+", text) if word]
+        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
         windows = (words[start : start + width] for start in range(len(words) - width + 1))
         if names := next(filter(_names_columns, windows), []):
             found.setdefault(" ".join(map(_place, names)), names)
@@ -453,12 +465,19 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
 
 
 def _indexed(code: Code) -> Iterator[str]:
-    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``dh(a=row[0], ...)``."""
+    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
+    calls = [(re.search(r"(\w+)\s*$", each.before), parts(each.inside)) for each in code.groups if each.bracket == "("]
+    made = [
+        f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
+    ]
     found: dict[str, dict[int, str]] = {}
-    pattern = r"(\w+)\s*=\s*([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
-    for name, row, number in re.findall(pattern, code.text):
+    pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
+    for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
+    for name, number in re.findall(r"(?m)^\s*(?:static |const(?:expr)? |int )*(\w+)\s*=\s*(\d)\s*;?\s*$", code.text):
+        if heading_of(name) and re.search(rf"[\[(,]\s*{name}\s*[\])]", code.text):
+            found.setdefault("", {})[int(number)] = name
     for names in found.values():
         yield ",".join(names[k] for k in sorted(names))
 
@@ -539,13 +558,14 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
-    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
+    or ``DH_0_ALPHA = 90``, whose theta is the table's."""
+    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
     pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(pattern, code.text, re.I):
+    for each in re.finditer(pattern, re.sub(r"\bDH_?(\d+)_([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I):
         found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
-    if not found.keys() >= {"alpha", "a", "d"} or len(found) == 3:
+    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or len(found) == 3:
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
         last = entries[max(entries)]
