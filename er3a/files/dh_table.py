@@ -24,7 +24,15 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.files.csv_file import columns_of, read_csv, read_lines
-from er3a.files.printed_table import FIXED, PER_MM, PrintedTable, check_size, printed_table, table_text
+from er3a.files.printed_table import (
+    FIXED,
+    PER_MM,
+    PrintedTable,
+    check_size,
+    nearest_headings,
+    printed_table,
+    table_text,
+)
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
@@ -133,9 +141,10 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
     InputError
         for a file without one, and for one with more rows than any arm
     """
-    found = printed_table(path, table_text(path) if text is None else text, columns)
+    text = table_text(path) if text is None else text
+    found = printed_table(path, text, columns)
     if found is None and path.suffix != ".csv":
-        problem = "no row of headings with a, alpha and d was found"
+        problem = nearest_headings(text) or "no row of headings with a, alpha and d was found"
         raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
     found = found or PrintedTable(read_lines(path), ())
     check_size(path, found.lines)

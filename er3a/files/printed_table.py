@@ -20,7 +20,7 @@ from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
-from er3a.files.csv_file import Lines, check_widths
+from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
 from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
 from er3a.files.table_headings import Heading, heading_of, quantities_of
@@ -189,6 +189,16 @@ def is_printed_table(header: Iterable[str]) -> bool:
     return {*quantities_of(map(str.strip, header))} >= NEEDED
 
 
+def nearest_headings(text: str) -> str:
+    """The line of a text with most headings of a D-H table, and what is missing among them, in words; "" if no line has
+    two."""
+    rows = [row for _, grid in line_grids(text) for row in grid if len(row[1]) < 9]
+    line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
+    found = quantities_of(cells)
+    missing = ", ".join(sorted(NEEDED.difference(found)))
+    return f"line {line} has headings of {', '.join(found)}, and none of {missing}" if len({*found}) > 1 else ""
+
+
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
@@ -315,7 +325,11 @@ class _Table:
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
         self.path, self.notes, self.unsaid = path, list[str](), set[str]()
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
-        check_widths(path, [(0, self.header), *self.rows])
+        for line, cells in self.rows:
+            if len(cells) != len(self.header):
+                problem = f"{len(cells)} fields where the header has {len(self.header)}: {', '.join(self.header)[:80]}"
+                remedy = "Correct the separators, or say what the fields of a row are: --column joint,theta,d,a,alpha"
+                raise InputError(path, f"row {line}", problem, remedy)
         found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
         if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
             found[self.header.index("theta_deg")] = Heading("theta", "deg", False)

@@ -141,7 +141,9 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
         texts = [each[1:-1] for each in texts]
     else:
         lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-        flat = re.search(r"dh\w*(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I)  # its rows are its lines
+        flat = re.search(
+            r"dh(?:_?(?:param\w*|table|matrix))?(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I
+        )  # its rows are its lines
         lists = ";" not in group.inside and not flat and any(each.endswith(",") for each in lines[:-1])
         matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
         texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
@@ -198,10 +200,12 @@ def _calls(code: Code) -> list[Grid]:
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     plain = "0", "revolute", "standard", "modified"
-    if len(rows) == 1 and all(_INDEXED.search(cell) or cell in plain for cell in texts):  # made of lists in a loop
+    if len(rows) == 1 and all(
+        _INDEXED.search(cell) or cell in (*plain, *code.lists) for cell in texts
+    ):  # made of lists in a loop
         return []
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
-        problem = "links of another program, or of a loop, are added"
+        problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
     chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
@@ -527,7 +531,7 @@ def _vectors(code: Code) -> list[Grid]:
 
 def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
-    header, line = dict[str, str](), 0
+    header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
         heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
@@ -541,12 +545,16 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
         if quantity not in _OF_VECTORS or not cells or (name in "Ll" and "a" in named):
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
+        places.setdefault(quantity, (line, name))
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
+            first, other = places[quantity]
+            problem = f"'{name}' is another list of {quantity} than '{other}' of line {first}"
+            raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     if named.pop("pose", None) and "theta" not in named:
-        problem = "theta may be zeros of the joints, or a pose"
+        line, name = places["pose"]
+        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
         raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
     if len({len(cells) for cells in named.values()}) > 1:
         problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
