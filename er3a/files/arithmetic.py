@@ -103,8 +103,6 @@ def name_of(text: str) -> str:
 
 def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of an expression; ``depth`` counts names that led here."""
-    if text == TWO_VALUES:
-        raise ValueError("has two values")
     if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
         raise ValueError("is too long or too deep")
     values: dict[str, CellAmount | str] = {}
@@ -159,7 +157,14 @@ def _named(word: str, low: str, given: Mapping[str, str], depth: int) -> CellAmo
         return CellAmount(math.pi / int(found[1] or 1), "rad")
     for each in (word, name_of(word)):
         if each in given:
-            return _amount(plain(given[each]), given, depth + 1)
+            if given[each] == TWO_VALUES:
+                raise ValueError(f"holds {each}, which has two values")
+            try:
+                return _amount(plain(given[each]), given, depth + 1)
+            except ValueError as error:
+                if depth:
+                    raise
+                raise ValueError(f"holds {each} = {given[each]}, which {error}") from None
     if low in _RADIANS or UNITS.get(low) == "deg":
         return CellAmount(math.radians(1.0), "rad")
     return CellAmount(0.0, "", {name_of(word): 1.0})

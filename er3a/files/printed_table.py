@@ -208,7 +208,7 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
         if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
             return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
-        problem = "a matrix whose columns have no names"
+        problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
@@ -229,12 +229,17 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     """The tables of a grid: rows of headings, each with the rows below it."""
     tables: list[Grid] = []
     open_one, broken = False, 0
+    width = len(columns)
     for line, cells in grid:
+        if len(cells) == width + 1 and not cells[-1]:  # the mark at the end of a line
+            cells = cells[:-1]
         titled = is_printed_table(cells)
-        if titled and columns and len(cells) != len(columns):
-            problem = f"--column names {len(columns)} columns, and the table has {len(cells)}"
+        if titled and columns and len(cells) != width:
+            if width in (len(other) for _, other in grid):
+                continue
+            problem = f"--column names {width} columns, and the table has {len(cells)}"
             raise InputError(None, f"line {line}", problem, "Name each, - for one that is not read")
-        if titled or (columns and len(cells) == len(columns) and not tables):
+        if titled or (columns and len(cells) == width and not tables and _numeric(cells)):
             tables.append([(line, list(columns) or cells)])
             if not titled:
                 tables[-1].append((line, cells))
@@ -533,7 +538,9 @@ class _Table:
         for joint, (row, number) in enumerate(zip(moving, variables), start):
             if number not in (None, joint):
                 problem = f"the variable is number {number} where that of joint {joint} belongs"
-                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Order the rows, or correct it")
+                raise InputError(
+                    self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"
+                )
         order = [str(joint) for joint in range(1, len(moving) + 1)]
         labels = order
         if (k := self.column.get("joint")) is not None:
