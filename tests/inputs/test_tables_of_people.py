@@ -317,6 +317,20 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "d = [0, 0]\na = [1, 1]\nalpha = [0, 0]\nr = [PrismaticDH(a=a[i], alpha=alpha[i]) for i in n]",
             "a row for each",
         ),
+        ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\njoint_types = ['R', 'P']", "types"),
+        ("a = [0, 1]\nalpha = [0, 0]\nd = [1, 0]\ntheta = [q['a'], 1]", "column theta: 'q"),
+        ("a = [pi, 0]\nl = [0, 1]\nd = [1, 0]\nalpha = [0, 0]", "another list of alpha than 'a' of line 1"),
+        ("% a alpha d theta\nL1 = [0 0 1 0];\nL2 = [1 0 0 0];\nR1 = [0 0 1 0];\nx = [L1; L2; R1];", "--column"),
+        (
+            "if x:\n  d1 = 0.1\nelse:\n  d1 = 0.29\n# a alpha d theta\nM = [[0, 0, d1, 0], [0.27, 0, 0, 0]]\n",
+            "two values",
+        ),
+        (
+            "def f():\n  d1 = 1\ndef g():\n  d1 = 2\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n",
+            "two values",
+        ),
+        ("i,a,alpha,d\n1,L,0,0\n2,0,0,1\n\nL = f * g\n", "holds L = f"),
+        ("i,length a,offset d,theta\n1,0,0,q1\n", "none of alpha"),
         ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
@@ -327,6 +341,12 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
     with pytest.raises(InputError, match=names):
         read(tmp_path, text)
+
+
+def test_columns_that_are_said_take_rows_below_other_headings(tmp_path):
+    text = "link i, a alpha i d theta i\n1 0 -90 290 0\n2 270 0 0 -90\n"
+    content, _ = read(tmp_path, text, columns=["joint", "a", "alpha", "d", "theta"])
+    np.testing.assert_allclose(numbers(content), IRB120[:2])
 
 
 def test_columns_without_names_are_read_as_they_are_said_to_be(tmp_path):
@@ -446,6 +466,46 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
             "standard",
         ),
         (SPACED, "standard"),
+        ("a = [-pi/2 0];\nl = [0 0.27];\nd = [0.29 0];\noffset = [0 -pi/2];", "standard"),  # a is an angle
+        ("aList=[0 0.27];\nalphaList=[-pi/2 0];\ndList=[0.29 0];\ntList=[q1 q2-pi/2];", "standard"),
+        ("L = [1, 2, 3]\n" + LISTS_OF_TWO.replace("offset = [0, ", "theta = [q[0], q[1]"), "standard"),
+        (
+            "a = array([[0], [0.27]])\nalpha = array([[-pi/2], [0]])\nd = array([[0.29], [0]])\n"
+            "theta = array([[q[0]], [q[1]-pi/2]])",
+            "standard",
+        ),
+        (
+            "% each row is [a alpha d theta]\ndh_1 = [0, -pi/2, d1, q1];\ndh_2 = [0.27, 0, 0, q2-pi/2];\n"
+            "dh = [dh_1; dh_2];\nhome_1 = [1, 2, 3, 4];\nd1 = 0.29;",
+            "standard",
+        ),
+        (
+            "ALPHA = 1\nA = 0\nD = 2\nTHETA = 3\ndh = [[0, -pi/2, 0.29, q1], [0.27, 0, 0, q2 - pi/2]]\n"
+            "T = row(dh[i][ALPHA], dh[i][A], dh[i][D], dh[i][THETA])",
+            "standard",
+        ),
+        (
+            "def row(alpha, d, a, theta):\n  pass\nP = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\n"
+            "T = row(P[i][1], P[i][2], P[i][0], q[i] + P[i][3])",
+            "standard",
+        ),
+        (
+            "class Row:\n  def __init__(self, d, a, theta, alpha):\n    pass\n"
+            "arm = [Row(0.29, 0, 0, -pi/2), Row(0, 0.27, -pi/2, 0)]",
+            "standard",
+        ),
+        ("# a -> alpha -> d -> theta\nDH: [0, *NEG, 0.29, 0,\n     0.27, 0, 0, *NEG]\nNEG = -pi/2\n", "standard"),
+        (
+            '"""Rows of an arm.\n\nColumns: a alpha d theta\n"""\nM = [[0, -pi/2, 0.29, 0], [0.27, 0, 0, -pi/2]]',
+            "standard",
+        ),
+        (
+            "#define DH_0_THETA 0\n#define DH_0_ALPHA -90\n#define DH_0_D 0.29\n#define DH_0_R 0\n"
+            "#define DH_1_THETA -90\n#define DH_1_ALPHA 0\n#define DH_1_D 0\n#define DH_1_R 0.27\n",
+            "standard",
+        ),
+        ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [0.27, 0, 0, -pi/2]]\nd1 = 3", "standard"),
+        ("i,a (m),alpha,d (m),theta\n1,0,-90°,0.29,q1\n2,0.27,0,0,q2 + 90° - pi\n", "standard"),
     ],
 )
 def test_programs_say_the_order_of_columns_and_the_convention(tmp_path, text, convention):
