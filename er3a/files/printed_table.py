@@ -53,7 +53,8 @@ _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 _KIND_ELSEWHERE = re.compile(
-    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b)",
+    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
+    r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
     re.I,
 )
 """A joint that slides, said outside the table."""
@@ -398,12 +399,15 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+                _keep(found, name.strip(), _in_unit(value, unit))
         above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
         # What is assigned last counts, if nothing chooses and the function is the same.
         if not re.search(r"\b(?:if|else|elif|elseif|case|switch|for|while)\b|(?s:\b(def|function)\b.*\b\1\b)", above):
-            last = {name: value.rstrip(" \t.") for name, value, _ in _GIVEN.findall(above)}
-            found = {name: last.get(name, value) if value == TWO_VALUES else value for name, value in found.items()}
+            last = {name: _in_unit(value, unit) for name, value, unit in _GIVEN.findall(above)}
+            used = " ".join(last.values())  # with the value that a name had there
+            again = (name for name, value in found.items() if value == TWO_VALUES and name not in used)
+            found |= {name: last[name] for name in again if name in last}
+        found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)
@@ -614,6 +618,11 @@ class _Table:
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
     found[name] = value if found.get(name, value) == value else TWO_VALUES
+
+
+def _in_unit(value: str, unit: str) -> str:
+    """A symbol's value with the unit that a comment says; "" if none does."""
+    return f"({value}) {unit}" if unit else value.rstrip(" \t.")
 
 
 def _in(amount: CellAmount, unit: str) -> float:

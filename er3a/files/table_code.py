@@ -475,7 +475,7 @@ def _indexed(code: Code) -> Iterator[str]:
         f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
     ]
     found: dict[str, dict[int, str]] = {}
-    pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])]"
+    pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
     for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name

@@ -330,6 +330,13 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "two values",
         ),
         ("i,a,alpha,d\n1,L,0,0\n2,0,0,1\n\nL = f * g\n", "holds L = f"),
+        ("d1 = 1\nd1 += 1\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("d1 = 3\nd1 = d1 / 9\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nsigma = [0, 1]", "types"),
+        (
+            "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nT = row(a=M[0][0], alpha=M[0][1], d=M[0][2], theta=M[0][3] - q)",
+            "--column",
+        ),
         ("i,length a,offset d,theta\n1,0,0,q1\n", "none of alpha"),
         ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
