@@ -53,7 +53,7 @@ _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
 _KIND_ELSEWHERE = re.compile(
-    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
+    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
     r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
     re.I,
 )

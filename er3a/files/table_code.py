@@ -46,6 +46,7 @@ _UNPACKED = re.compile(
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
+_ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
 _INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
@@ -407,10 +408,10 @@ def _listed(code: Code) -> Grid:
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(\w+\d)|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
         )
-        if label and label[2] and label[2] not in stacked:
+        if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
             continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
@@ -441,7 +442,9 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     near = next(
         (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
     )
-    used = _columns_in([*map(",".join, typed), *_UNPACKED.findall(code.text), *_indexed(code)], width)
+    used = _columns_in(
+        [*map(",".join, typed), *_UNPACKED.findall(code.text), *_ENUM.findall(code.text), *_indexed(code)], width
+    )
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
         problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
         raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
@@ -480,8 +483,9 @@ def _indexed(code: Code) -> Iterator[str]:
         if heading_of(name):
             found.setdefault(row, {})[int(number)] = name
     for name, number in re.findall(r"(?m)^\s*(?:static |const(?:expr)? |int )*(\w+)\s*=\s*(\d)\s*;?\s*$", code.text):
-        if heading_of(name) and re.search(rf"[\[(,]\s*{name}\s*[\])]", code.text):
-            found.setdefault("", {})[int(number)] = name
+        short = name if heading_of(name) else name.rpartition("_")[2]
+        if heading_of(short) and re.search(rf"[\[(,]\s*{name}\s*[\])]", code.text):
+            found.setdefault("", {})[int(number)] = short
     for names in found.values():
         yield ",".join(names[k] for k in sorted(names))
 
@@ -573,7 +577,7 @@ def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     found: dict[str, dict[int, re.Match[str]]] = {}
     for each in re.finditer(pattern, re.sub(r"\bDH_?(\d+)_([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I):
         found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
-    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or len(found) == 3:
+    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
         last = entries[max(entries)]

@@ -332,6 +332,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i,a,alpha,d\n1,L,0,0\n2,0,0,1\n\nL = f * g\n", "holds L = f"),
         ("d1 = 1\nd1 += 1\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
         ("d1 = 3\nd1 = d1 / 9\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("# a alpha d theta\nDH: [0, 0, 0.3, 0,\n 0.2, 0, 0, 0]\ntype_joints: 'RP'\n", "types"),
         ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nsigma = [0, 1]", "types"),
         (
             "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nT = row(a=M[0][0], alpha=M[0][1], d=M[0][2], theta=M[0][3] - q)",
@@ -509,6 +510,15 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
         (
             "#define DH_0_THETA 0\n#define DH_0_ALPHA -90\n#define DH_0_D 0.29\n#define DH_0_R 0\n"
             "#define DH_1_THETA -90\n#define DH_1_ALPHA 0\n#define DH_1_D 0\n#define DH_1_R 0.27\n",
+            "standard",
+        ),
+        (
+            "// a alpha d theta\nconst double dh1[4] = {0, -M_PI/2, 0.29, 0};\n"
+            "const double dh2[4] = {0.27, 0, 0, -M_PI/2};\nconst double home1[4] = {1, 2, 3, 4};\n",
+            "standard",
+        ),
+        (
+            "enum { A, ALPHA, D, THETA };\ndouble M[2][4] = {{0, -M_PI/2, 0.29, 0}, {0.27, 0, 0, -M_PI/2}};\n",
             "standard",
         ),
         ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [0.27, 0, 0, -pi/2]]\nd1 = 3", "standard"),
