@@ -546,7 +546,8 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
                 quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
         if quantity == "a" and re.search(r"(?<![a-z])pi(?![a-z])|π|2rad|radians", " ".join(cells), re.I):
             quantity = "alpha"
-        if quantity not in _OF_VECTORS or not cells or (name in "Ll" and "a" in named):
+        of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
+        if quantity not in _OF_VECTORS or not cells or of_others:
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
         places.setdefault(quantity, (line, name))

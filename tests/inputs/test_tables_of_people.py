@@ -319,6 +319,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ),
         ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\njoint_types = ['R', 'P']", "types"),
         ("a = [0, 1]\nalpha = [0, 0]\nd = [1, 0]\ntheta = [q['a'], 1]", "column theta: 'q"),
+        ("r = [0, 1]\nl = [1, 2]\nd = [1, 0]\nalpha = [0, 0]", "'l' is another list of a"),
         ("a = [pi, 0]\nl = [0, 1]\nd = [1, 0]\nalpha = [0, 0]", "another list of alpha than 'a' of line 1"),
         ("% a alpha d theta\nL1 = [0 0 1 0];\nL2 = [1 0 0 0];\nR1 = [0 0 1 0];\nx = [L1; L2; R1];", "--column"),
         (
