@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 LONGEST = 200  # characters of an expression
 TWO_VALUES = "two values"
-"""Stands for the value of a name that has several."""
+"""In place of the value of a name that has several."""
 DEEPEST = 20  # brackets within each other, and names that are given by other names
 
 
