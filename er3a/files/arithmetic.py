@@ -7,9 +7,11 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 LONGEST = 200  # characters of an expression
+TWO_VALUES = "two values"
+"""In place of the value of a name that has several."""
 DEEPEST = 20  # brackets within each other, and names that are given by other names
 
 
@@ -155,7 +157,14 @@ def _named(word: str, low: str, given: Mapping[str, str], depth: int) -> CellAmo
         return CellAmount(math.pi / int(found[1] or 1), "rad")
     for each in (word, name_of(word)):
         if each in given:
-            return _amount(plain(given[each]), given, depth + 1)
+            if given[each] == TWO_VALUES:
+                raise ValueError(f"holds {each}, which has two values")
+            try:
+                return _amount(plain(given[each]), given, depth + 1)
+            except ValueError as error:
+                if depth:
+                    raise
+                raise ValueError(f"holds {each} = {given[each]}, which {error}") from None
     if low in _RADIANS or UNITS.get(low) == "deg":
         return CellAmount(math.radians(1.0), "rad")
     return CellAmount(0.0, "", {name_of(word): 1.0})
@@ -198,15 +207,11 @@ def _called(name: str, values: list[CellAmount]) -> CellAmount:
         raise ValueError(f"has no value of {name}(...)") from None
 
 
-def _two_units(a: str, b: str) -> str:
-    if {a, b} == {"deg", "rad"}:
-        return "has fractions of pi in a column of degrees"
-    return f"is in {a} and in {b}" if a and b else ""
-
-
 def _sum(a: CellAmount, b: CellAmount, sign: int) -> CellAmount:
+    if {a.unit, b.unit} == {"deg", "rad"}:  # each is said with its own unit
+        a, b = (replace(x, number=math.radians(x.number), unit="rad") if x.unit == "deg" else x for x in (a, b))
     if a.unit and b.unit and a.unit != b.unit:
-        raise ValueError(_two_units(a.unit, b.unit))
+        raise ValueError(f"is in {a.unit} and in {b.unit}")
     names = {*a.variables, *b.variables}
     both = {each: a.variables.get(each, 0) + sign * b.variables.get(each, 0) for each in names}
     return CellAmount(a.number + sign * b.number, a.unit or b.unit, both)
@@ -222,8 +227,10 @@ def _power(a: CellAmount, b: CellAmount) -> CellAmount:
 
 
 def _product(a: CellAmount, b: CellAmount) -> CellAmount:
-    if (a.variables and b.variables) or (a.unit and b.unit):
-        raise ValueError(_two_units(a.unit, b.unit) or "multiplies two variables")
+    if a.unit and b.unit:
+        raise ValueError(f"is in {a.unit} and in {b.unit}")
+    if a.variables and b.variables:
+        raise ValueError("multiplies two variables")
     scaled = {name: times * b.number for name, times in a.variables.items()}
     scaled |= {name: times * a.number for name, times in b.variables.items()}
     return CellAmount(a.number * b.number, a.unit or b.unit, scaled)
@@ -233,5 +240,5 @@ def _quotient(a: CellAmount, b: CellAmount) -> CellAmount:
     if b.variables or not b.number:
         raise ValueError("divides by a variable or by zero")
     if b.unit and (b.unit != "rad" or a.unit):  # 180/pi is a number
-        raise ValueError(_two_units(a.unit, b.unit) or f"divides by {b.unit}")
+        raise ValueError(f"divides by {b.unit}")
     return CellAmount(a.number / b.number, a.unit, {name: times / b.number for name, times in a.variables.items()})

@@ -24,7 +24,15 @@ import numpy as np
 
 from er3a.errors import InputError
 from er3a.files.csv_file import columns_of, read_csv, read_lines
-from er3a.files.printed_table import FIXED, MAX_BYTES, PER_MM, PrintedTable, check_size, printed_table, table_text
+from er3a.files.printed_table import (
+    FIXED,
+    PER_MM,
+    PrintedTable,
+    check_size,
+    nearest_headings,
+    printed_table,
+    table_text,
+)
 from er3a.files.robot_file import AS_PRINTED, SHORTEST_PLAIN_LENGTH_MM, RobotFile, far_normals
 from er3a.files.units import MAX_DEG, doubt, look_like_radians
 from er3a.files.yaml_file import parse
@@ -41,6 +49,7 @@ OPTIONAL = columns_of(
 ASSUMED_LIMIT_DEG = 180.0
 LengthUnit = Literal["mm", "cm", "m", "in"]
 AngleUnit = Literal["deg", "rad"]
+WORDS = {"m": "metres", "in": "inches", "cm": "centimetres"}
 PER_RAD = math.degrees(1.0)
 OTHER_UNITS = {unit: ("mm", scale) for unit, scale in PER_MM.items() if unit != "mm"} | {"rad": ("deg", PER_RAD)}
 SHORTEST_ARM_MM = 10.0  # a table whose lengths are all below is in metres or inches
@@ -132,14 +141,12 @@ def _printed(path: Path, columns: Sequence[str] = (), text: str | None = None) -
     InputError
         for a file without one, and for one with more rows than any arm
     """
-    if text is None and (path.suffix != ".csv" or (path.is_file() and path.stat().st_size < MAX_BYTES)):
-        text = table_text(path)
-    found = None if text is None else printed_table(path, text, columns)
+    text = table_text(path) if text is None else text
+    found = printed_table(path, text, columns)
     if found is None and path.suffix != ".csv":
-        problem = "no row of headings with a, alpha and d was found"
+        problem = nearest_headings(text) or "no row of headings with a, alpha and d was found"
         raise InputError(path, None, problem, "Name the columns, or say what they are: --column theta,d,a,alpha")
-    if found is None:
-        found = PrintedTable(read_lines(path), ())
+    found = found or PrintedTable(read_lines(path), ())
     check_size(path, found.lines)
     return found
 
@@ -300,8 +307,7 @@ def _in_own_units(
     slides = any(_unit(row) == "mm" for row in rows) and not unsaid
     unit = length_unit or _length_unit(path, [] if slides else lengths, as_printed, unsaid)
     if unit != (length_unit or "mm"):
-        word = {"m": "metres", "in": "inches"}[unit]
-        yield f"the lengths, {max(lengths):g} at most, were read as {word}; --length-unit mm if they are mm"
+        yield f"the lengths, {max(lengths):g} at most, were read as {WORDS[unit]}; --length-unit mm if they are mm"
     turned = {column for column in rows[0] if _unit_of(column) == "deg"} - own if rows else set()
     if angle_unit is None:
         if as_printed and (wide := [row[c] for row in rows for c in turned if row[c] and abs(row[c]) > MAX_DEG]):
@@ -314,6 +320,8 @@ def _in_own_units(
         elif turned:
             yield f"{', '.join(sorted(turned))} look like radians: give --angle-unit rad if they are"
             turned = set()
+        elif "alpha_deg" in without_unit and _in_radians(rows, "alpha_deg"):
+            raise InputError(path, "column alpha", "small angles say no unit", "Give --angle-unit deg or rad")
     elif angle_unit == "deg":
         turned = set()
     for row in rows:
@@ -334,7 +342,7 @@ def _length_unit(path: Path, lengths: list[float], as_printed: bool, unsaid: boo
         raise InputError(path, "columns a, d", problem, "Give --length-unit mm, cm, m or in")
     if likely == "mm":
         return "mm"
-    word = {"m": "metres", "in": "inches", "cm": "centimetres"}[likely]
+    word = WORDS[likely]
     if not (as_printed or unsaid):
         problem = f"the lengths, {longest:g} mm at most, are those of an arm in {word}"
         remedy = f"Name the columns a_{likely} and d_{likely}, or give --length-unit {likely}"

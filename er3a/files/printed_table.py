@@ -7,7 +7,6 @@ ways is refused, with both.
 
 from __future__ import annotations
 
-import difflib
 import html
 import itertools
 import math
@@ -20,10 +19,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from er3a.errors import InputError, given_bytes
-from er3a.files.arithmetic import UNITS, CellAmount, amount_of, name_of, plain
-from er3a.files.csv_file import Lines, check_widths
+from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
+from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, code_grids, elements
+from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -42,7 +41,7 @@ _CELL = (
     (r"""^(?:\w+\.)?symbols?\(["']([^"',]+)["'].*\)$""", r"\1"),
     (r"^(?:\*+|None|null|var(?:iable|\.)?|变量)(?=[-+]|$)", "q"),
     (r"\b[A-Za-z]\w*(?:::|\.(?=[A-Za-z]))", ""),
-    (r"(?<=[\d.])f\b", ""),
+    (r"(?<=[\d.])f\b|^\*(?=[A-Za-z])", ""),
     (r"\^?\*+(?=$|\s*[-+])", ""),
     (r"^([^\W\d]\w*\d)\s*\((.+)\)$", r"\1+(\2)"),
 )
@@ -53,16 +52,32 @@ _NAMED = re.compile(r"(?:[^\W\d]+\.?\s*)?\d+\s*:?")
 _BY_NAME = re.compile(r"(?:^|\()([PR])\*?(?:\)|$)", re.IGNORECASE)
 _KINDS = {"r": "revolute", "0": "revolute", "rot": "revolute", "rotational": "revolute", "rotary": "revolute"}
 _KINDS |= {"p": "prismatic", "1": "prismatic", "linear": "prismatic", "旋转": "revolute", "移动": "prismatic"}
+_KIND_ELSEWHERE = re.compile(
+    r"(?:Joint\([^;\n]*[\"'](?:prismatic|fixed)|types?\w*[\"']?\s*[:=][^\n\w]*(?:r(?:evolute)?\W*)*(?:prismatic|p[pr]*)\b|"
+    r"(?:types?|sigma)\s*=\s*[\[{(][^\n]*(?:prismatic|\b1\b))",
+    re.I,
+)
+"""A joint that slides, said outside the table."""
 SIGNS = {
     "modified": re.compile(
-        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b", re.I
+        r"modified[\s-]*(?:d-?h\b|denavit)|(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
+        r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
+        re.I,
     ),
-    "standard": re.compile(r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准", re.I),
+    "standard": re.compile(
+        r"(?:standard|classic\w*)[\s-]*(?:d-?h\b|denavit)|stddh|标准|"
+        r"[\"'](?:standard|classic|normal)[\"']|"
+        r"\b[ar](?:_?i)?\s*\*\s*(?:\w+\.)*(?:cos\([^\n,;*]{0,30}(?:th|θ|q)|ct\b)|"
+        r"(?:cos\([^\n,;*]{0,30}(?:th|θ|q)[^\n,;*]{0,9}\)|\bct)\s*\*\s*(?:[\w\]]+\.)*[ar](?:_?i)?\b",
+        re.I,
+    ),
 }
-"""What a text around a table says of its convention."""
+"""What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
+``d sin(alpha)`` and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
-    r"(?=[),;，；。%#≈`\n]|\s+and\b|\s+[^\W\d][\w{}]*[ \t]*=|$)"
+    r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
     r"(?:[;,]?[ \t]*[%#]+[ \t]*[\[(]?(mm|cm|m|in)\b(?!\W*to\b))?"
 )
 
@@ -146,7 +161,6 @@ def printed_table(path: Path, text: str, columns: Sequence[str] = ()) -> Printed
     if len(tables) > 1:
         lines = " and ".join(str(table[0][0] or table[1][0]) for table in tables[:2])
         raise InputError(path, None, f"{len(tables)} D-H tables, at lines {lines}", "Give a file with one of them")
-    check_size(path, tables[0])
     return _Table(path, text, tables[0], from_code).converted()
 
 
@@ -176,6 +190,16 @@ def is_printed_table(header: Iterable[str]) -> bool:
     return {*quantities_of(map(str.strip, header))} >= NEEDED
 
 
+def nearest_headings(text: str) -> str:
+    """The line of a text with most headings of a D-H table, and what is missing among them, in words; "" if no line has
+    two."""
+    rows = [row for _, grid in line_grids(text) for row in grid if len(row[1]) < 9]
+    line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
+    found = quantities_of(cells)
+    missing = ", ".join(sorted(NEEDED.difference(found)))
+    return f"line {line} has headings of {', '.join(found)}, and none of {missing}" if len({*found}) > 1 else ""
+
+
 # Where the table is ---------------------------------------------------------------------------------------------------
 
 
@@ -185,7 +209,7 @@ def _tables(text: str, columns: Sequence[str]) -> tuple[list[Grid], bool]:
         if tables := [_with_names(table) for grid in grids for table in _headed(grid, columns)]:
             return [_trimmed(table) for table in tables] if kind == "blanks" else tables, kind == "program"
     if bare := code_grids(text, headed=False):
-        problem = "a matrix whose columns have no names"
+        problem = f"a matrix whose columns have no names: {', '.join(bare[0][0][1])[:60]}"
         remedy = "Say what they are: --column theta,d,a,alpha, or --column alpha,a,theta,d, or as they are meant"
         raise InputError(None, f"line {bare[0][0][0]}", problem, remedy)
     return [], False
@@ -206,12 +230,17 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
     """The tables of a grid: rows of headings, each with the rows below it."""
     tables: list[Grid] = []
     open_one, broken = False, 0
+    width = len(columns)
     for line, cells in grid:
+        if len(cells) == width + 1 and not cells[-1]:  # the mark at the end of a line
+            cells = cells[:-1]
         titled = is_printed_table(cells)
-        if titled and columns and len(cells) != len(columns):
-            problem = f"--column names {len(columns)} columns, and the table has {len(cells)}"
+        if titled and columns and len(cells) != width:
+            if width in (len(other) for _, other in grid):
+                continue
+            problem = f"--column names {width} columns, and the table has {len(cells)}"
             raise InputError(None, f"line {line}", problem, "Name each, - for one that is not read")
-        if titled or (columns and len(cells) == len(columns) and not tables):
+        if titled or (columns and len(cells) == width and not tables and _numeric(cells)):
             tables.append([(line, list(columns) or cells)])
             if not titled:
                 tables[-1].append((line, cells))
@@ -302,7 +331,11 @@ class _Table:
     def __init__(self, path: Path, text: str, grid: Grid, from_code: bool):
         self.path, self.notes, self.unsaid = path, list[str](), set[str]()
         self.header, self.rows = [name.strip() for name in grid[0][1]], grid[1:]
-        check_widths(path, [(0, self.header), *self.rows])
+        for line, cells in self.rows:
+            if len(cells) != len(self.header):
+                problem = f"{len(cells)} fields where the header has {len(self.header)}: {', '.join(self.header)[:80]}"
+                remedy = "Correct the separators, or say what the fields of a row are: --column joint,theta,d,a,alpha"
+                raise InputError(path, f"row {line}", problem, remedy)
         found = {k: own for k, name in enumerate(self.header) if (own := heading_of(name))}
         if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
             found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
@@ -310,14 +343,17 @@ class _Table:
         self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
         self.column = {own.quantity: k for k, own in self.headings.items()}
         self._check_headings()
-        self.convention = self._stated(text)
+        self.convention = self._stated(Code(text).text if from_code else "", text)
         if from_code and re.search(r"\b(?:base|tool)[\"']?\s*[,=](?!\s*None)", text):
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
-        self.text = re.sub(r"(?m)^\s*[%#].*$", "", text) if from_code else without_latex(plain(text))
+        self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = (elements(self.text) if from_code else {}) | self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
         self.kinds = self._kinds()
+        if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
+            problem = f"'{kind[0]}' is no column of the table"
+            raise InputError(path, "types of joints", problem, "Add a column of types")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
@@ -336,8 +372,8 @@ class _Table:
             remedy = "Say which by --column: a for d and d for r (Khalil), or d for d and a for r"
             self._refuse(None, self.column["a"], "columns d and r: either can be the link's length", remedy)
 
-    def _stated(self, text: str) -> Convention | None:
-        """The convention that headings, the library, or the text around the table says."""
+    def _stated(self, program: str, text: str) -> Convention | None:
+        """The convention that headings, the program, or the text around the table says, a program before words."""
         if "convention" in self.header:
             return None
         if {own.before for own in self.headings.values() if own.quantity in ("a", "alpha")} == {True}:
@@ -345,7 +381,7 @@ class _Table:
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
         library = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
-        for part in (near, text):
+        for part in (program, near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
             for one in CONVENTIONS if len(said) == 1 else ():
                 if one in said:
@@ -363,7 +399,15 @@ class _Table:
         found: dict[str, str] = {}
         for name, value, unit in given:
             if not re.search(r"[\[\"']|\(\)$", value):
-                _keep(found, name.strip(), f"({value}) {unit}" if unit else value.rstrip(" \t."))
+                _keep(found, name.strip(), _in_unit(value, unit))
+        above = "\n".join(self.text.split("\n")[: self.rows[0][0]])
+        # What is assigned last counts, if nothing chooses and the function is the same.
+        if not re.search(r"\b(?:if|else|elif|elseif|case|switch|for|while)\b|(?s:\b(def|function)\b.*\b\1\b)", above):
+            last = {name: _in_unit(value, unit) for name, value, unit in _GIVEN.findall(above)}
+            used = " ".join(last.values())  # with the value that a name had there
+            again = (name for name, value in found.items() if value == TWO_VALUES and name not in used)
+            found |= {name: last[name] for name in again if name in last}
+        found |= dict.fromkeys(re.findall(r"(\w+)[ \t]*[-+*/]=(?!=)", self.text), TWO_VALUES)
         plainly: dict[str, str] = {}
         for name, value in found.items():
             _keep(plainly, name_of(name), value)
@@ -385,7 +429,7 @@ class _Table:
                 self._theta(k)
             elif own and own.quantity not in ("joint", "type"):
                 self._constants(k, own.quantity)
-            elif own is None and (stem in OWN or difflib.get_close_matches(stem.lower(), OWN, n=1, cutoff=0.8)):
+            elif own is None and (stem in OWN):
                 self.columns[name] = [cells[k] for _, cells in self.rows]
             elif own is None and name:
                 unused.append(name)
@@ -430,7 +474,7 @@ class _Table:
             return None
         given = self.given
         if self.headings[k].quantity == "theta":  # a value of a joint there is a pose
-            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)\d*", name)}
+            given = {name: value for name, value in given.items() if not re.fullmatch(r"(q|θ|th|theta|t)_?\d*", name)}
         try:
             found = amount_of(text, given)
         except ValueError as error:
@@ -452,6 +496,8 @@ class _Table:
         variable although others have one, or at an end if it alone has no number in its name."""
         k = self.column.get("type", self.header.index("type") if "type" in self.header else None)
         if k is not None:
+            if all(cells[k].strip() == "1" for _, cells in self.rows):
+                self._refuse(None, k, "1 may be a joint that turns or one that slides", "Write revolute or prismatic")
             return [_KINDS.get(cells[k].strip().lower(), cells[k].strip().lower()) for _, cells in self.rows]
         turns, slides = ([bool(each and each.variables) for each in self._of(name)] for name in ("theta", "d"))
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
@@ -496,7 +542,9 @@ class _Table:
         for joint, (row, number) in enumerate(zip(moving, variables), start):
             if number not in (None, joint):
                 problem = f"the variable is number {number} where that of joint {joint} belongs"
-                raise InputError(self.path, f"row {self.rows[row][0]}", problem, "Order the rows, or correct it")
+                raise InputError(
+                    self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"
+                )
         order = [str(joint) for joint in range(1, len(moving) + 1)]
         labels = order
         if (k := self.column.get("joint")) is not None:
@@ -546,6 +594,10 @@ class _Table:
         units = sorted({each.unit for each in found if each and each.unit and each.number})
         bare = max((abs(each.number) for each in found if each and not each.unit), default=0.0)
         unit = self.headings[k].unit or (units[0] if len(units) == 1 else "")
+        if unit == "grad":
+            if any(each and each.number % 90 for each in found):
+                self._refuse(None, k, "grad may be degrees or gons", "Name the column's unit deg, or convert it")
+            unit = "deg"
         if not unit and not units and not length and bare < RADIANS_BELOW_DEG and self._has_radians():
             unit = "rad"
         if bare and ((len(units) > 1 and not unit) or (unit == "rad" and units and bare > 2 * math.pi)):
@@ -565,7 +617,12 @@ class _Table:
 
 def _keep(found: dict[str, str], name: str, value: str) -> None:
     """A symbol's value; one with two values has none."""
-    found[name] = value if found.get(name, value) == value else "two values"
+    found[name] = value if found.get(name, value) == value else TWO_VALUES
+
+
+def _in_unit(value: str, unit: str) -> str:
+    """A symbol's value with the unit that a comment says; "" if none does."""
+    return f"({value}) {unit}" if unit else value.rstrip(" \t.")
 
 
 def _in(amount: CellAmount, unit: str) -> float:

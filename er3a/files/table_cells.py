@@ -35,6 +35,7 @@ _LATEX = (
     (r"\\(?:var)?theta", "θ"),
     (r"\\alpha", "α"),
     (r"\\beta", "β"),
+    (r"\\approx", "≈"),
     (r"\\pi(?![a-z])", "π"),
     (r"\\(?:cdot|times|ast)\b", "*"),
     (r"\\[()\[\],;!: ]|\$|~|\\q?quad", " "),
@@ -118,9 +119,10 @@ def latex_grids(text: str) -> list[Grid]:
         grid: Grid = []
         given = 2 if body[1] in ("tabularx", "tabular*") else 1
         inner = re.sub(rf"^\s*(?:\[[^\]]*\]\s*)?(?:\{{(?:[^{{}}]|\{{[^{{}}]*\}})*\}}\s*){{{given}}}", "\n", body[2])
-        for row in re.split(r"\\\\(?:\[[^\]]*\])?|\\tabularnewline", inner):
-            cells = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
-            grid.append((start + row.count("\n"), [without_latex(cell).strip() for cell in cells]))
+        for row in re.split(r"\\\\\s*(?:\[[^\]]*\])?|\\tabularnewline", inner):
+            parts = re.split(r"(?<!\\)&", re.sub(r"(?<!\\)%.*", "", row))
+            if any(cells := [without_latex(part).strip() for part in parts]):
+                grid.append((start + row.count("\n"), cells))
             start += row.count("\n")
         found.append(grid)
     return found

@@ -32,34 +32,24 @@ _ORDERS = {
 """The order of arguments without names, by the function."""
 LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
-    "setFixedTransform": ("a,alpha,d,theta", ""),
+    "'dh'": ("a,alpha,d,theta", "standard"),
+    '"dh"': ("a,alpha,d,theta", "standard"),
+    "'mdh'": ("a,alpha,d,theta", "modified"),
+    '"mdh"': ("a,alpha,d,theta", "modified"),
     "pybotics": ("alpha,a,theta,d", "modified"),
-    "MDHKinematicChain": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
-"""Columns of a matrix, and the convention, by a name of the library that takes it."""
+"""Columns of a matrix, and the convention, by a name of the library, or its option, that takes it."""
 _UNPACKED = re.compile(
     r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*"
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
+_ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
 _INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
 LONGEST_GROUP = 30_000  # characters between two brackets
 _CLOSING = {"(": ")", "[": "]", "{": "}"}
-
-
-@dataclass(frozen=True)
-class Code:
-    """A program: its text without comments, these by their lines, and the fields of its types by their names."""
-
-    text: str
-    comments: dict[int, str]
-    fields: dict[str, list[str]]
-
-    def line(self, place: int) -> int:
-        """The number of the line of a place in the text."""
-        return self.text.count("\n", 0, place) + 1
 
 
 @dataclass(frozen=True)
@@ -73,20 +63,33 @@ class CodeGroup:
     before: str
 
 
-def code_of(text: str) -> Code:
-    """A program's text without its comments; the numbers of its lines stay."""
-    comments: dict[int, str] = {}
-    text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
-    text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
+class Code:
+    """A program: its text without comments, these and docstrings by their lines, and the fields of its types by their
+    names; its brackets in the order of their beginnings, its lists by their names, and arguments of functions of a
+    row's numbers.
+    """
 
-    def kept(found: re.Match[str]) -> str:
-        if found[1] is None and found[2]:
-            comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
-        return found[1] or ""
+    def __init__(self, text: str):
+        self.comments, self.docs = dict[int, str](), dict[int, str]()
+        for block in _BLOCK.finditer(text):
+            self.docs |= enumerate(block[0].split("\n"), 1 + text.count("\n", 0, block.start()))
+        text = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), text)
+        text = _STREAMED.sub(lambda found: "= [" + re.sub(r",[ \t]*\n", "\n", found[1]) + "];", text)
 
-    text = _COMMENT.sub(kept, text)
-    fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(text)}
-    return Code(text, comments, fields)
+        def kept(found: re.Match[str]) -> str:
+            if found[1] is None and found[2]:
+                self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
+            return found[1] or ""
+
+        self.text = _COMMENT.sub(kept, text)
+        self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
+        self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
+        self.lists = {name: cells for name, cells, _, _ in _named_lists(self)}
+        self.orders = _signatures(self)
+
+    def line(self, place: int) -> int:
+        """The number of the line of a place in the text."""
+        return self.text.count("\n", 0, place) + 1
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -139,7 +142,10 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
         texts = [each[1:-1] for each in texts]
     else:
         lines = [each.strip() for part in parts(group.inside, ";") for each in part.split("\n") if each.strip(" ,\n")]
-        lists = ";" not in group.inside and any(each.endswith(",") for each in lines[:-1])
+        flat = re.search(
+            r"dh(?:_?(?:param\w*|table|matrix))?(?:\[\d*\])?[\"']?\s*[:=]\s*$", group.before, re.I
+        )  # its rows are its lines
+        lists = ";" not in group.inside and not flat and any(each.endswith(",") for each in lines[:-1])
         matrix = group.bracket == "[" or re.search(r"=\s*\{$", group.before + group.bracket)  # or MATLAB's cells
         texts = [] if lists or not matrix else [each.strip("[],") for each in lines]
     grid, place = Grid(), group.start
@@ -160,28 +166,30 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     -------
     grids : of each its headings and rows, with their lines
     """
-    code = code_of(text)
-    groups = groups_of(code.text)
-    matrices = [grid for each in groups if (grid := _matrix(code, each))]
+    code = Code(text)
+    matrices = [grid for each in code.groups if (grid := _matrix(code, each))]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, _listed(code, groups)) if grid and grid[0][1]]
-    return _calls(code, groups) or _records(code, groups) or named or _vectors(code)
+    named = [grid for grid in (*matrices, _listed(code)) if grid and grid[0][1]]
+    return _calls(code) or _records(code) or named or _vectors(code)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _calls(code: Code) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread, orders = list[_Link](), list[int](), _signatures(code, groups)
-    for each in sorted(groups, key=lambda group: group.start):
+    rows, unread = list[_Link](), list[int]()
+    for each in code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        cells = _arguments(named[2], each.inside) or _of_signature(orders.get(named[2], []), each.inside)
+        cells = _arguments(named[2], each.inside) or _of_signature(code.orders.get(named[2], []), each.inside)
+        toolbox = _TOOLBOX.fullmatch(named[2])
+        if cells and not (toolbox or _says_numbers(code, cells)):
+            continue
         index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if not cells and _TOOLBOX.fullmatch(named[2]) and not (index or named[2] in orders):
+        if not cells and toolbox and not (index or named[2] in code.orders):
             unread.append(code.line(each.start))
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
@@ -191,44 +199,58 @@ def _calls(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
-    texts, lists = [cell for row in rows for cell in _constants(row.cells)], _lists(code)
-    if any((own := re.fullmatch(r"(\w+)\[\d\]", text)) and own[1] not in lists for text in texts):  # a matrix, by rows
+    texts = [cell for row in rows for cell in _constants(row.cells)]
+    plain = "0", "revolute", "standard", "modified"
+    if len(rows) == 1 and all(
+        _INDEXED.search(cell) or cell in (*plain, *code.lists) for cell in texts
+    ):  # made of lists in a loop
         return []
-    if any(map(_INDEXED.search, (*texts, *(row.name for row in rows)))):
-        return [_looped(code, rows)]
     if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
-        problem = "links of another program, or of a loop, are added"
+        problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
-    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in groups if each.bracket == "["]
+    chosen = [[names.get(cell) for cell in row_cells(each.inside)] for each in code.groups if each.bracket == "["]
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
-    held = [[row for row in rows if each.start < row.place < each.end] for each in groups if each.bracket in "[{"]
+    held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
     return [_grid([(row.line, row.cells) for row in each]) for each in arms or held or _begun_again(rows)]
 
 
-def _signatures(code: Code, groups: list[CodeGroup]) -> dict[str, list[str]]:
+def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
     orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
-    for each in groups:
+    for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
         if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
-            orders.setdefault(named[1], names)
+            made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
+            orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
 
 
 def _parameters(text: str) -> list[str]:
     """Names of parameters without their types and defaults."""
-    return [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
+    names = [re.sub(r"\s*[:=].*", "", part).rpartition(" ")[2].strip("&*\"'") for part in parts(text)]
+    return names[names[0] == "self" :]
 
 
 def _of_signature(order: list[str], text: str) -> dict[str, str]:
-    """A row of a function's arguments; none of its definition, nor of a call with elements of lists."""
+    """A row of a function's arguments; none of its definition."""
     cells = {name: part.strip("\"'") for name, part in zip(order, parts(text))}
-    listed = any("[" in cell for cell in _constants(cells))
-    return {} if len(cells) < len(order) or _parameters(text) == order or listed else cells
+    return {} if len(cells) < len(order) or _parameters(text) == order else cells
+
+
+def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
+    """Whether a row holds numbers or names of numbers, and no elements of lists."""
+    texts = _constants(cells)
+    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in texts):
+        return False
+    given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
+    return any(
+        not re.fullmatch(r"[^\W\d][\w.]*", cell) or re.search(given.format(re.escape(cell)), code.text)
+        for cell in texts
+    )
 
 
 def _constants(cells: dict[str, str]) -> list[str]:
@@ -273,7 +295,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
             cells[key.strip().lower()] = value.strip(" \"'")
         elif pending:
             cells[pending], pending = part, ""
-        elif quoted and quoted[1].lower() in _FLAGS:
+        elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
         elif quoted and toolbox:
             pending = quoted[1].lower()
@@ -294,7 +316,7 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     return _of_toolbox(low, words, cells)
 
 
-_FLAGS = {"modified", "mod", "mdh", "standard", "std", "stddh", "moddh", "revolute", "prismatic", "flip", "sym"}
+_FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
 
 
 def _of_toolbox(function: str, words: list[str], cells: dict[str, str]) -> dict[str, str]:
@@ -319,25 +341,11 @@ def _assigned(code: Code, rows: list[_Link]) -> None:
     for found in re.finditer(pattern, code.text) if rows else ():
         cells = next((row.cells for row in rows if row.name == found[1]), None)
         if cells is None or found[2] not in cells:
-            if found[1] in ("self", "cls"):
+            if found[1] == "self":
                 continue
             problem = f"{found[1]}.{found[2]} is set for a link that is not found"
             raise InputError(None, f"line {code.line(found.start())}", problem, "Write it into the link's call")
         cells[found[2]] = found[3].strip()
-
-
-def _looped(code: Code, rows: list[_Link]) -> Grid:
-    """A link made in a loop, of lists with a number for each joint."""
-    line, cells = rows[0].line, rows[0].cells
-    lists = _lists(code)
-    found = {key: _INDEXED.fullmatch(cell) for key, cell in cells.items()}
-    columns = {key: lists[each[1]] for key, each in found.items() if each and each[1] in lists}
-    lengths = {len(values) for values in columns.values()}
-    counts = {int(each) for each in re.findall(r"(?:range\(|(?:=|in)\s*1\s*:\s*)(\d+)", code.text)}
-    if len(rows) > 1 or len(lengths) != 1 or (counts and not counts & lengths):
-        problem = f"links are made in a loop, of lists with {', '.join(map(str, sorted(lengths)))} numbers"
-        raise InputError(None, f"line {line}", f"{problem}, and otherwise", "Write a row for each joint")
-    return _grid([(line, cells | dict(zip(columns, values))) for values in zip(*columns.values())])
 
 
 def _is_row(cells: Iterable[str]) -> bool:
@@ -346,18 +354,19 @@ def _is_row(cells: Iterable[str]) -> bool:
     return "alpha" in quantities and bool(quantities & {"a", "d"})
 
 
-def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
+def _records(code: Code) -> list[Grid]:
     """Rows as ``{"a": 0, "alpha": 90, ...}``, or as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a
     name or a key that is repeated; if such keys hold lists, these are columns (:func:`_vectors`)."""
     rows = list[tuple[int, dict[str, str]]]()
-    for each in sorted(groups, key=lambda group: group.start):
+    for each in code.groups:
         if each.bracket == "{":
             pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
             label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
-            cells = {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+            named = [(key.strip(" .\"'\n").lower(), value.strip(" \"'\n")) for key, value in pairs]
+            cells = {key: value for key, value in named if not re.match(r"[(\[].*,", value)}  # no colour, no column
             rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
-    if any(_is_full(cells) for _, cells in rows):
-        return [_grid([row for row in rows if _is_full(row[1])])]
+    if full := [row for row in rows if _is_row(row[1])]:
+        return [_grid(full)]
     rows = [(0, {})]
     for number, line in enumerate(code.text.split("\n"), 1):
         found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
@@ -368,13 +377,8 @@ def _records(code: Code, groups: list[CodeGroup]) -> list[Grid]:
             rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
         if found[3]:
             rows[-1][1][key] = found[3].strip(" \"'")
-    full = [row for row in rows if _is_full(row[1])]
+    full = [row for row in rows if _is_row(row[1])]
     return [_grid(full)] if len(full) > 1 else []
-
-
-def _is_full(cells: dict[str, str]) -> bool:
-    """Whether cells are those of a D-H row, not lists."""
-    return _is_row(key for key, value in cells.items() if value[:1] != "[")
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
@@ -389,7 +393,7 @@ def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
 def _matrix(code: Code, group: CodeGroup) -> Grid:
     """A matrix with the names of its columns; [] if it is none, or a pose."""
     rows = _rows(code, group)
-    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:", cell) for cell in rows[0][1]):
+    if len(rows) < 2 or any(re.match(r"[\[{(]|.*:|-?\s*(?:\w+\.)*(?:cos|sin)\(", cell) for cell in rows[0][1]):
         return []
     if len({len(cells) for _, cells in rows}) > 1 or re.fullmatch(r"(0[.0]* ){3}1[.0]*", " ".join(rows[-1][1])):
         return []
@@ -398,27 +402,31 @@ def _matrix(code: Code, group: CodeGroup) -> Grid:
     return _titled(code, rows, labels, group.before) if 3 <= len(rows[0][1]) <= 8 else []
 
 
-def _listed(code: Code, groups: list[CodeGroup]) -> Grid:
+def _listed(code: Code) -> Grid:
     """A matrix with a line for each row: ``joint1: [0, 270, 0, 0]`` of YAML, ``dh(1,:) = [0 270 0 0];``."""
-    rows, labels = Grid(), list[str]()
-    for group in sorted(groups, key=lambda each: each.start):
-        label = re.search(r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|\w+[\[(]\d+(?:,\s*:)?[\])]\s*=)\s*$", group.before)
+    rows, labels, arms = Grid(), list[str](), set[str]()
+    stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
+    for group in code.groups:
+        label = re.search(
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            group.before,
+        )
+        if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
+            continue
         if group.bracket != "(" and label and not re.search(r"[\[{:]", group.inside):
             cells = row_cells(group.inside)
             numbers = 4 <= len(cells) <= 8 and all(re.search(r"\d|pi|π", cell) for cell in cells)
             if numbers and len(cells) == len((rows or [(0, cells)])[0][1]):
                 rows.append((code.line(group.start), cells))
-                labels.append(label[1] or "")
-    return _titled(code, rows, labels) if len(rows) > 1 else []
+                labels.append(label[1] or label[2] or "")
+                arms.add((label[2] or "").rstrip("0123456789"))
+    return _titled(code, rows, labels) if len(rows) > 1 and len(arms) == 1 else []
 
 
 def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid:
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
-    if header and (kind := re.search(r"Joint\([^;\n]*[\"'](prismatic|fixed)", code.text)):
-        problem = f"a joint is {kind[1]}, and no column says which"
-        raise InputError(None, f"line {code.line(kind.start())}", problem, "Add a column of types")
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
@@ -429,22 +437,57 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
     """The names of a matrix's columns: of a comment, of what its rows are unpacked into, of the type of its rows, or
     of a library."""
     width = len(rows[0][1])
-    near = [code.comments[k] for k in range(max(rows[0][0] - 5, 0), rows[-1][0] + 2) if k in code.comments]
-    unpacked = {re.sub(r"\s", "", names) for names in _UNPACKED.findall(code.text)}
-    orders = _signatures(code, groups_of(code.text))
-    typed = [",".join(orders[name]) for name in code.fields.keys() & orders if re.search(rf"\b{name}\b", before)]
-    for comment in (*reversed(near), *typed, *(unpacked if len(unpacked) == 1 else ())):
-        comment = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", comment)
-        words = [word for word in re.split(r"[\s,;|\[\]()]+", comment) if word]
-        for start in range(len(words) - width + 1):
-            window = words[start : start + width]
-            if _names_columns(window):
-                return window
-    for library, (order, _convention) in LIBRARIES.items():
-        names = order.split(",")
-        if library in code.text and len(names) >= width and width >= 4:
-            return names[:width]
-    return []
+    lines = range(rows[-1][0] + 1, max(rows[0][0] - 6, 0), -1)
+    typed = [code.orders[name] for name in code.fields.keys() & code.orders if re.search(rf"\b{name}\b", before)]
+    near = next(
+        (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
+    )
+    used = _columns_in(
+        [*map(",".join, typed), *_UNPACKED.findall(code.text), *_ENUM.findall(code.text), *_indexed(code)], width
+    )
+    if near and used and [*map(_place, near)] != [*map(_place, used)]:
+        problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
+        raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
+    if said := near or used or _columns_in(code.comments.values(), width):
+        return said
+    taken = (order.split(",") for library, (order, _) in LIBRARIES.items() if library in code.text and width >= 4)
+    return next((names[:width] for names in taken if len(names) >= width), [])
+
+
+def _place(name: str) -> str:
+    """What a column is, whether theta or its offset."""
+    return quantities_of([name])[0].replace("offset", "theta")
+
+
+def _columns_in(texts: Iterable[str], width: int) -> list[str]:
+    """The names of columns that texts hold one after the other; [] if they hold several orders."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
+        words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
+        windows = (words[start : start + width] for start in range(len(words) - width + 1))
+        if names := next(filter(_names_columns, windows), []):
+            found.setdefault(" ".join(map(_place, names)), names)
+    return next(iter(found.values())) if len(found) == 1 else []
+
+
+def _indexed(code: Code) -> Iterator[str]:
+    """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
+    calls = [(re.search(r"(\w+)\s*$", each.before), parts(each.inside)) for each in code.groups if each.bracket == "("]
+    made = [
+        f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
+    ]
+    found: dict[str, dict[int, str]] = {}
+    pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
+    for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
+        if heading_of(name):
+            found.setdefault(row, {})[int(number)] = name
+    for name, number in re.findall(r"(?m)^\s*(?:static |const(?:expr)? |int )*(\w+)\s*=\s*(\d)\s*;?\s*$", code.text):
+        short = name if heading_of(name) else name.rpartition("_")[2]
+        if heading_of(short) and re.search(rf"[\[(,]\s*{name}\s*[\])]", code.text):
+            found.setdefault("", {})[int(number)] = short
+    for names in found.values():
+        yield ",".join(names[k] for k in sorted(names))
 
 
 def _names_columns(names: list[str]) -> bool:
@@ -460,28 +503,27 @@ def elements(text: str) -> dict[str, str]:
     value.
     """
     found = dict[str, str]()
-    for name, cells in _lists(code_of(text)).items():
+    for name, cells in Code(text).lists.items():
         used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
         if not used or used & {0, len(cells)}:
             found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
     return found
 
 
-def _lists(code: Code) -> dict[str, list[str]]:
-    """The lists of a program by their names; the last of a name that has several."""
-    return {name: cells for name, cells, _, _ in _named_lists(code)}
-
-
 def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
-    for group in groups_of(code.text):
+    for group in code.groups:
         name = re.search(
             r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
         )
-        if group.bracket == "(" or name is None or re.search(r"[\[{:]", group.inside):
+        inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
+        rows = re.search(
+            r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
+        )
+        if group.bracket == "(" or name is None or rows:
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
-        cells = row_cells(group.inside.replace(";", ",").replace("\n", " "))
+        cells = row_cells(inside.replace(";", ",").replace("\n", " "))
         cells = [f"({cell}){after[1]}" if after and after[1] else cell for cell in cells]
         yield name[1], cells, code.line(group.start), name[2]
 
@@ -493,23 +535,31 @@ def _vectors(code: Code) -> list[Grid]:
 
 def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     named: dict[str, list[str]] = {}
-    header, line = dict[str, str](), 0
-    for name, cells, line, mark in lists:
-        heading = heading_of(name) or next(filter(None, map(heading_of, reversed(name.split("_")))), None)
+    header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
+    for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
+        bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
+        heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
-            text = re.sub(r"\b(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
+            text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
             if not re.search(r"[^\W\d]", text):
                 quantity = "pose" if name != "q" and re.search("[1-9]", text) else ""
-        if quantity not in _OF_VECTORS or not cells:
+        if quantity == "a" and re.search(r"(?<![a-z])pi(?![a-z])|π|2rad|radians", " ".join(cells), re.I):
+            quantity = "alpha"
+        of_others = name in "Ll" and "a" in named and places["a"][1] not in "rR"
+        if quantity not in _OF_VECTORS or not cells or of_others:
             continue
         header[quantity] = f"{quantity}(i-1)" if heading and heading.before else quantity
+        places.setdefault(quantity, (line, name))
         if named.setdefault(quantity, cells) != cells and quantity not in ("theta", "pose"):
-            raise InputError(None, f"line {line}", f"another list of {quantity}", "Give the lists of one arm")
+            first, other = places[quantity]
+            problem = f"'{name}' is another list of {quantity} than '{other}' of line {first}"
+            raise InputError(None, f"line {line}", problem, "Give the lists of one arm, each with its own name")
     if not {"a", "alpha", "d"} <= {*named}:
         return []
     if named.pop("pose", None) and "theta" not in named:
-        problem = "theta may be zeros of the joints, or a pose"
+        line, name = places["pose"]
+        problem = f"'{name}' may be offsets of the joints' angles, or a pose"
         raise InputError(None, f"line {line}", problem, "Name it offset if theta = q + offset, or remove it")
     if len({len(cells) for cells in named.values()}) > 1:
         problem = f"different numbers of entries: {', '.join(f'{name} {len(cells)}' for name, cells in named.items())}"
@@ -521,12 +571,14 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 
 
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
-    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions."""
-    pattern = r"\b(?:DH_)?(alpha|theta|th|a|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])(?!=)\s*([^,}\n;:=]+)"
+    """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
+    or ``DH_0_ALPHA = 90``, whose theta is the table's."""
+    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(pattern, code.text, re.I):
-        found.setdefault(each[1].lower(), {})[int(each[2])] = each
-    if not found.keys() >= {"alpha", "a", "d"} or not (len(found) > 3 or re.search("DH_ALPHA", code.text, re.I)):
+    for each in re.finditer(pattern, re.sub(r"\bDH_?(\d+)_([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I):
+        found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
+    if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
         return  # they may be in a matrix of these symbols
     for name, entries in found.items():
         last = entries[max(entries)]

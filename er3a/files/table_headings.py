@@ -15,8 +15,8 @@ _JOINT = words_of(
     "关节 关节i 关节序号 关节号 连杆 连杆i 连杆序号 轴 序号 杆件"
 )
 _NAMES = words_of(
-    "a=a r=a l=a d=d q=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha alph=alpha al=alpha "
-    "offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
+    "a=a r=a l=a d=d q=theta v=theta th=theta teta=theta tetha=theta alf=alpha alfa=alpha alp=alpha alph=alpha "
+    "al=alpha offset=offset offsets=offset relativeoffset=offset theta0=offset θ0=offset θoff=offset thetaoff=offset "
     "type=type jointtype=type sigma=type σ=type 类型=type"
 )
 _WORDS = words_of(
@@ -64,7 +64,7 @@ def heading_of(text: str) -> Heading | None:
     short = re.sub(r"<[^>]*>|[\s{}\\\"'`$^]", "", plain(text).lower())
     said = [each for each in re.findall(r"[(\[/,]([^()\[\]/,]+)", short) if each in UNITS]
     said += [found[1] for found in [re.search(r"[a-zα-ω]_(mm|cm|m|in|deg|rad)$", short)] if found]
-    unit = UNITS[said[0]] if said else ""
+    unit = said[0] if said == ["grad"] else UNITS[said[0]] if said else ""
     name = re.sub(r"_(mm|cm|m|in|deg|rad)$", "", short)
     # Without the index, which says only whether the entry belongs to the joint or to the link before it.
     name = re.sub(r"[(\[](?!offset|\d)[^()\[\]]*[)\]]|/.*|,(?!offset).*", "", name)

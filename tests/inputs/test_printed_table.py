@@ -92,7 +92,7 @@ def test_its_arm_stands_where_plain_matrices_put_it(tmp_path):
     ("row", "told"),
     [
         ("1,70,90,352,θ1+θ2", "two variables"),
-        ("1,70,-π/2°,352,θ1", "fractions of pi in a column of degrees"),
+        ("1,70,-π/2°,352,θ1", "is in rad and in deg"),
         ("1,70,90°00',352,θ1", "is not a number"),
         ('1,"1,070",90,352,θ1', "nothing between thousands"),
         ("1,70,90,352,2θ1", "is not a number"),

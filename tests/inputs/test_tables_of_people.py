@@ -306,6 +306,41 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
         ("i;a [mm];alpha [gon];d [mm]\n1;0;100;300\n2;270;0;0\n", "alpha_deg"),
         ("j = rigidBodyJoint(['j' n],'prismatic');\n% a alpha d theta\nM = [0 0 0.3 0;\n0.2 0 0 0];", "types"),
         ("a,alpha,d\n0.1,90,0.06\n2.61,0,0.1\n", "say no unit"),  # metres, or inches
+        ("a,alpha,d\n300,1.05,0\n200,0,0\n", "--angle-unit"),
+        ("a,alpha,d,type\n300,90,0,1\n200,0,0,1\n", "turns"),
+        ("a (mm),alpha (grad),d (mm)\n300,100,0\n200,0,0\n", "gons"),
+        (
+            "# a, alpha, d, theta\nM = [[0, 0.3, 0, 1], [0, 0, 0.2, 1]]\nfor theta, d, a, alpha in M:\n",
+            "the program theta",
+        ),
+        (
+            "d = [0, 0]\na = [1, 1]\nalpha = [0, 0]\nr = [PrismaticDH(a=a[i], alpha=alpha[i]) for i in n]",
+            "a row for each",
+        ),
+        ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\njoint_types = ['R', 'P']", "types"),
+        ("a = [0, 1]\nalpha = [0, 0]\nd = [1, 0]\ntheta = [q['a'], 1]", "column theta: 'q"),
+        ("r = [0, 1]\nl = [1, 2]\nd = [1, 0]\nalpha = [0, 0]", "'l' is another list of a"),
+        ("a = [pi, 0]\nl = [0, 1]\nd = [1, 0]\nalpha = [0, 0]", "another list of alpha than 'a' of line 1"),
+        ("% a alpha d theta\nL1 = [0 0 1 0];\nL2 = [1 0 0 0];\nR1 = [0 0 1 0];\nx = [L1; L2; R1];", "--column"),
+        (
+            "if x:\n  d1 = 0.1\nelse:\n  d1 = 0.29\n# a alpha d theta\nM = [[0, 0, d1, 0], [0.27, 0, 0, 0]]\n",
+            "two values",
+        ),
+        (
+            "def f():\n  d1 = 1\ndef g():\n  d1 = 2\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n",
+            "two values",
+        ),
+        ("i,a,alpha,d\n1,L,0,0\n2,0,0,1\n\nL = f * g\n", "holds L = f"),
+        ("d1 = 1\nd1 += 1\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("d1 = 3\nd1 = d1 / 9\n# a alpha d theta\nM = [[0, 0, d1, 0], [1, 0, 0, 0]]\n", "two values"),
+        ("# a alpha d theta\nDH: [0, 0, 0.3, 0,\n 0.2, 0, 0, 0]\ntype_joints: 'RP'\n", "types"),
+        ("# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nsigma = [0, 1]", "types"),
+        (
+            "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]\nT = row(a=M[0][0], alpha=M[0][1], d=M[0][2], theta=M[0][3] - q)",
+            "--column",
+        ),
+        ("i,length a,offset d,theta\n1,0,0,q1\n", "none of alpha"),
+        ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
             "one of them",
@@ -315,6 +350,12 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
     with pytest.raises(InputError, match=names):
         read(tmp_path, text)
+
+
+def test_columns_that_are_said_take_rows_below_other_headings(tmp_path):
+    text = "link i, a alpha i d theta i\n1 0 -90 290 0\n2 270 0 0 -90\n"
+    content, _ = read(tmp_path, text, columns=["joint", "a", "alpha", "d", "theta"])
+    np.testing.assert_allclose(numbers(content), IRB120[:2])
 
 
 def test_columns_without_names_are_read_as_they_are_said_to_be(tmp_path):
@@ -393,6 +434,102 @@ def test_a_matrix_of_symbols_keeps_its_offsets(tmp_path):
 def test_offsets_are_kept_in_the_programs_and_tables_of_people(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+ROWS_OF_TWO = "M = [0 -pi/2 0.29 0;\n     0.27 0 0 -pi/2];\n"
+LISTS_OF_TWO = "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\noffset = [0, -pi/2]\n"
+SUBSTITUTED = "d1, d2 = symbols('d1:3')\nT = row(alpha0, a0, d1, q1).subs(dh) * row(alpha1, a1, d2, q2).subs(dh)\n"
+SUBSTITUTED += "dh = {alpha0: -pi/2, a0: 0, d1: 0.29, q1: q1,\n      alpha1: 0, a1: 0.27, d2: 0, q2: q2 - pi/2}\n"
+SPACED = r"""
+\begin{tabular}{cccc}
+a & $\alpha$ & d & $\theta$ \\ [0.5ex]
+\hline \\
+0 & $-\pi/2$ & $L_1$ & $q_1$ \\ [1ex]
+$L_2$ & 0 & 0 & $q_2 - \pi/2$ \\ [1ex]
+\end{tabular}
+$L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "convention"),
+    [
+        (
+            "setFixedTransform(j1, [0 -pi/2 0.29 0], 'mdh');\nsetFixedTransform(j2, [0.27 0 0 -pi/2], 'mdh');",
+            "modified",
+        ),
+        (ROWS_OF_TWO + "a = M(i,1); alpha = M(i,2); d = M(i,3); theta = M(i,4);", "standard"),
+        ("% each row is [a alpha d theta]\n" + 9 * "x = 1;\n" + ROWS_OF_TWO, "standard"),
+        (f"% Modified DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [cos(theta), a*cos(theta)];", "standard"),
+        (f"% standard DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [-sin(alpha), -sin(alpha)*d];", "modified"),
+        (
+            f"{LISTS_OF_TWO}links = [RevoluteMDH(d=d[i], a=a[i], alpha=alpha[i], offset=offset[i]) for i in n]",
+            "modified",
+        ),
+        (f"{LISTS_OF_TWO}arm = Arm(a=a, alpha=alpha, d=d, theta=offset)\nprint('d: [%g, %g]')", "standard"),
+        (f"{LISTS_OF_TWO}r = [0, 0, 0; 1, 0, 2]", "standard"),
+        (SUBSTITUTED, "modified"),
+        (
+            "rows = [{'a': 0, 'alpha': -pi/2, 'd': 0.29, 'theta': 0, 'color': (1, 0, 0)},\n"
+            " {'a': 0.27, 'alpha': 0, 'd': 0, 'theta': -pi/2, 'color': (0, 1, 0)}]",
+            "standard",
+        ),
+        (SPACED, "standard"),
+        ("a = [-pi/2 0];\nl = [0 0.27];\nd = [0.29 0];\noffset = [0 -pi/2];", "standard"),  # a is an angle
+        ("aList=[0 0.27];\nalphaList=[-pi/2 0];\ndList=[0.29 0];\ntList=[q1 q2-pi/2];", "standard"),
+        ("L = [1, 2, 3]\n" + LISTS_OF_TWO.replace("offset = [0, ", "theta = [q[0], q[1]"), "standard"),
+        (
+            "a = array([[0], [0.27]])\nalpha = array([[-pi/2], [0]])\nd = array([[0.29], [0]])\n"
+            "theta = array([[q[0]], [q[1]-pi/2]])",
+            "standard",
+        ),
+        (
+            "% each row is [a alpha d theta]\ndh_1 = [0, -pi/2, d1, q1];\ndh_2 = [0.27, 0, 0, q2-pi/2];\n"
+            "dh = [dh_1; dh_2];\nhome_1 = [1, 2, 3, 4];\nd1 = 0.29;",
+            "standard",
+        ),
+        (
+            "ALPHA = 1\nA = 0\nD = 2\nTHETA = 3\ndh = [[0, -pi/2, 0.29, q1], [0.27, 0, 0, q2 - pi/2]]\n"
+            "T = row(dh[i][ALPHA], dh[i][A], dh[i][D], dh[i][THETA])",
+            "standard",
+        ),
+        (
+            "def row(alpha, d, a, theta):\n  pass\nP = [(0, -pi/2, 0.29, 0), (0.27, 0, 0, -pi/2)]\n"
+            "T = row(P[i][1], P[i][2], P[i][0], q[i] + P[i][3])",
+            "standard",
+        ),
+        (
+            "class Row:\n  def __init__(self, d, a, theta, alpha):\n    pass\n"
+            "arm = [Row(0.29, 0, 0, -pi/2), Row(0, 0.27, -pi/2, 0)]",
+            "standard",
+        ),
+        ("# a -> alpha -> d -> theta\nDH: [0, *NEG, 0.29, 0,\n     0.27, 0, 0, *NEG]\nNEG = -pi/2\n", "standard"),
+        (
+            '"""Rows of an arm.\n\nColumns: a alpha d theta\n"""\nM = [[0, -pi/2, 0.29, 0], [0.27, 0, 0, -pi/2]]',
+            "standard",
+        ),
+        (
+            "#define DH_0_THETA 0\n#define DH_0_ALPHA -90\n#define DH_0_D 0.29\n#define DH_0_R 0\n"
+            "#define DH_1_THETA -90\n#define DH_1_ALPHA 0\n#define DH_1_D 0\n#define DH_1_R 0.27\n",
+            "standard",
+        ),
+        (
+            "// a alpha d theta\nconst double dh1[4] = {0, -M_PI/2, 0.29, 0};\n"
+            "const double dh2[4] = {0.27, 0, 0, -M_PI/2};\nconst double home1[4] = {1, 2, 3, 4};\n",
+            "standard",
+        ),
+        (
+            "enum { A, ALPHA, D, THETA };\ndouble M[2][4] = {{0, -M_PI/2, 0.29, 0}, {0.27, 0, 0, -M_PI/2}};\n",
+            "standard",
+        ),
+        ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [0.27, 0, 0, -pi/2]]\nd1 = 3", "standard"),
+        ("i,a (m),alpha,d (m),theta\n1,0,-90°,0.29,q1\n2,0.27,0,0,q2 + 90° - pi\n", "standard"),
+    ],
+)
+def test_programs_say_the_order_of_columns_and_the_convention(tmp_path, text, convention):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    assert content.dh.convention == convention
 
 
 def test_links_are_in_the_order_of_their_arm(tmp_path):
