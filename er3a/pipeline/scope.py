@@ -28,6 +28,7 @@ Check = Literal[
     "units",
 ]
 GAPS: Mapping[str, Check] = {
+    "unsettled": "table",
     "not_run": "reach",
     "limits_assumed": "limits",
     "not_followed": "reach",

@@ -29,6 +29,7 @@ CHECKS: Mapping[Check, str] = words(
 )
 GAP_WORDS: Mapping[str, str] = words(
     {
+        "unsettled": "entries that documents settle only up to signs, or not at all",
         "not_run": "the check was not made",
         "limits_assumed": "the robot's file assumes the limits",
         "not_followed": "paths not followed",
@@ -129,7 +130,7 @@ TEXTS = texts(
         "link": "[base{base:?}][{base:!}link {number}]",
         "not_checked": "Not checked: {checks:missed; }.",
         "not_checked.one": "{check}: {gaps}",
-        "coverage": "[all{all:?}][none{none:?}][{part:?}{covered} of {of}]",
+        "coverage": "[all {of}{all:?}][none{none:?}][{part:?}{covered} of {of}]",
     }
 )
 

@@ -224,8 +224,10 @@ def _covered(trips: model.RoundTripErrors | None, evidence: model.TableEvidence 
     """Of the table's entries how many documents settle, of poses solved back how many were found."""
     parts = [part for part in evidence.parts if part.part in OF_THE_TOOL] if evidence else []
     settled = sum(part.entries if part.status == "settled" else part.settled for part in parts)
-    asked: dict[Check, tuple[int, int]] = {"table": (settled, sum(part.entries for part in parts))}
-    return coverages(asked | ({"round_trips": (trips.poses, trips.poses)} if trips else {}), ())
+    entries = sum(part.entries for part in parts)
+    asked: dict[Check, tuple[int, int]] = {"table": (settled, entries)}
+    gaps = [Open("unsettled")] if settled < entries else []
+    return coverages(asked | ({"round_trips": (trips.poses, trips.poses)} if trips else {}), gaps)
 
 
 def _assumed(checks: list[model.Check], placed: Robot, robot: Robot) -> Iterator[Open]:
