@@ -11,6 +11,7 @@ from typing import Any
 from er3a.files.kept_files import write_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
+from er3a.identifiability.evidence import LIMITS
 from er3a.pipeline.code_digest import code_digest
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
@@ -94,7 +95,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, drawn, stored),
         keys=_keys(drawn),
-        steps=_steps(chosen, stored[chosen.name], study.robot(chosen.name).joints),
+        steps=_steps(chosen, stored[chosen.name]),
         outdated=_by_text(entries),
         tiles=_tiles(study, ranked, drawn[-1].name, stored),
         article=study.article is not None,
@@ -221,28 +222,25 @@ def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
     return [(name, own[stage], wrong.get(stage, "")) for stage, name in named.items() if stage in own]
 
 
-def _steps(chosen: RobotRow, stored: Results, joints: int) -> list[tuple[str, str]]:
-    """What to confirm before the real arm moves, each with the page that says how; jogging starts with joints at 0."""
+def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
+    """What to confirm before the real arm moves, each with the row of the validation's page that says how."""
     results = stored["validation"].results if "validation" in stored else None
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
         return [(tr("Validate the table."), address)]
     evidence = results.summary.evidence
     unsettled = evidence.unconfirmed if evidence else []
-    steps = []
-    if not evidence or any(column_of(entry) == "direction" for entry in unsettled):
-        panel = f"{chosen.name}/teach.html#q={','.join(['0'] * joints)}"
-        steps.append((tr("Jog each joint: does it turn as drawn?"), panel))
+    directions = [entry for entry in unsettled if column_of(entry) == "direction"]
     left = [entry for entry in unsettled if column_of(entry) in (*CONTINUOUS, "beta")]
-    if left or not evidence:
-        named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
-        steps.append(
-            (tr("Read five poses: they settle {names}.", names=named), f"{address}#table-entries" if left else address)
-        )
-    limits = [part for part in (evidence.parts if evidence else ()) if part.part == "limits"]
-    if not evidence or any(part.settled + part.up_to_signs < part.entries for part in limits):
-        steps.append((tr("Enter limits and speeds from the controller."), address))
-    return steps
+    limits = [entry for entry in unsettled if column_of(entry) in LIMITS]
+    named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
+    asked = (
+        (tr("Jog each joint: does it turn as drawn?"), directions),
+        (tr("Read five poses: they settle {names}.", names=named), left),
+        (tr("Enter limits and speeds from the controller."), limits),
+    )
+    rows = ((text, f"{address}#entry-{entries[0]}" if entries else address) for text, entries in asked)
+    return [row for row, (_, entries) in zip(rows, asked) if entries or not evidence]
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:
