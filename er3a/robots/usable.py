@@ -48,8 +48,13 @@ def check_robot(robot: Any, crossed_limits: bool = False) -> None:
     """
     if not isinstance(robot, Robot):
         raise ArgumentError("robot", robot, "an er3a.Robot, such as er3a.load_robot('er3_600') returns")
-    if problem := no_arm(robot) or ("" if crossed_limits else limits_crossed(robot)):
+    if problem := no_arm(robot) if crossed_limits else _unusable(robot):
         raise RobotError(robot.name, problem)
+
+
+@derived
+def _unusable(robot: Robot) -> str:
+    return no_arm(robot) or limits_crossed(robot)
 
 
 @derived
@@ -88,7 +93,6 @@ def no_arm(robot: Robot) -> str:
     return ""
 
 
-@derived
 def limits_crossed(robot: Robot) -> str:
     """Which joint has its lower limit above its upper one.
 
