@@ -92,9 +92,9 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
-    """How far forward (mm) there is room for words: beyond the arms, and what those reach that are not wrong."""
-    right = [ring for arm in arms if arm.kind != "wrong" for ring in arm.reach_mm]
-    corners = np.concatenate([*(arm.points_mm for arm in arms), *right])
+    """How far forward (mm) there is room for words: beyond the arms and what they reach, so that no outline crosses
+    a word."""
+    corners = np.concatenate([outline for arm in arms for outline in (arm.points_mm, *arm.reach_mm)])
     return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
 
 
