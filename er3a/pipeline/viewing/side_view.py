@@ -21,7 +21,7 @@ Kind = Literal["right", "wrong"]
 LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
-LABEL, SCALE = 0.34, 0.05  # of the height: room for labels at the right, for the scale below
+LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 GAP = 0.045  # of the height, between two labels
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
@@ -105,6 +105,7 @@ def side_view(
     labels: Sequence[Label] = (),
     outlines: Sequence[tuple[str, Reals]] = (),
     column_mm: float | None = None,
+    over: Sequence[tuple[str, Reals]] = (),
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
@@ -116,13 +117,17 @@ def side_view(
     labels : moved up or down where they would be on each other
     outlines : of what is drawn behind the arms: kind, and corners (k, 2), mm
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
+    over : lines over the arms: kind, and points (k, 2), mm
 
     Returns
     -------
     drawing : colours come from the page's style sheet
     """
     right = [arm for arm in arms if arm.kind != "wrong"] or arms
-    corners = np.concatenate([*(arm.points_mm for arm in arms), *(ring for arm in right for ring in arm.reach_mm)])
+    lines = [points for _, points in over]
+    corners = np.concatenate(
+        [*lines, *(each for arm in right for each in (arm.points_mm, *arm.reach_mm)), arms[-1].points_mm]
+    )
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
@@ -146,6 +151,7 @@ def side_view(
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
     parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
+    parts += [Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points)) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
