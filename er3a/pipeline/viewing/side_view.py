@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong"]
-LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
+LabelKind = Literal["wrong", "open", "hole", "tray", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
@@ -124,9 +124,12 @@ def side_view(
     drawing : colours come from the page's style sheet
     """
     right = [arm for arm in arms if arm.kind != "wrong"] or arms
-    lines = [points for _, points in over]
     corners = np.concatenate(
-        [*lines, *(each for arm in right for each in (arm.points_mm, *arm.reach_mm)), arms[-1].points_mm]
+        [
+            *(arm.points_mm for arm in arms),
+            *(line for _, line in over),
+            *(ring for arm in right for ring in arm.reach_mm),
+        ]
     )
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
@@ -136,7 +139,7 @@ def side_view(
     starts = [label.at[0] if column_mm is None else column_mm for label in labels]
     high[0] = max([high[0], *(start + LABEL * tall for start in starts)])
     wide, tall = high - low
-    spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
+    spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
     wide, tall = high - low
     parts = [_reach(arm) for arm in arms]
@@ -149,7 +152,7 @@ def side_view(
     outline = Markup('<polygon class="{}" points="{}"/>')
     parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
     placed = _placed(labels, low, high, column_mm)
-    parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
+    parts += [_lead(label, place) for label, place in placed]
     parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
     parts += [Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points)) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
@@ -160,7 +163,7 @@ def side_view(
     scale = Markup('<span class="scale" style="width: {:.2f}%">{}</span>').format(
         100 * length / wide, tr("{length} mm", length=length)
     )
-    words = [_word(label, (place - low) / [wide, tall], column_mm is None) for label, place in placed]
+    words = [_word(label, (place - low) / [wide, tall]) for label, place in placed]
     return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
         wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
@@ -185,17 +188,16 @@ def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float |
 
 def _lead(label: Label, place: Reals) -> Markup:
     """The line of a label: to its place, or where it has a start from there."""
-    line = _line(np.stack([*([] if label.start is None else [label.start]), label.at, place]))
-    return Markup('<polyline class="lead {} {}" points="{}"/>').format(
-        label.kind, "dashed" if label.start is not None else "", line
-    )
+    start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")
+    line = _line(np.stack([start, label.at, place]))
+    return Markup('<polyline class="lead {} {}" points="{}"/>').format(label.kind, dashed, line)
 
 
-def _word(label: Label, share: Reals, pointing: bool) -> Markup:
+def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
     name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {} {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
-        label.kind, "pointing" if pointing else "led", name, *(100 * share), label.text
+    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, name, *(100 * share), label.text
     )
 
 
