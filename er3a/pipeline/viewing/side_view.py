@@ -136,8 +136,8 @@ def side_view(
     low, high = low - margin, high + margin
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
-    starts = [label.at[0] if column_mm is None else column_mm for label in labels]
-    high[0] = max([high[0], *(start + LABEL * tall for start in starts)])
+    for label in labels:
+        high[0] = max(high[0], (label.at[0] if column_mm is None else column_mm) + LABEL * tall)
     wide, tall = high - low
     spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
