@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -194,5 +195,8 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
     for fault in faults:
         if fault.to_do:
             place = fault.instead[1] if fault.instead else fault.address
-            return Fix(joined((fault.name, first_sentence(fault.to_do)[0]), ": "), place)
+            text = re.sub(
+                r"(?<=\d) (?=(mm|s|deg|%))", "\u00a0", first_sentence(fault.to_do)[0]
+            )  # units stay with values
+            return Fix(joined((fault.name, text), ": "), place)
     return None

@@ -18,10 +18,10 @@ from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong"]
-LabelKind = Literal["wrong", "open", "hole", "tray", "tray other", "right", "sound"]
+LabelKind = Literal["wrong", "open", "hole", "tray", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
-LABEL, SCALE = 0.34, 0.05  # of the height: room for labels at the right, for the scale below
+LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 GAP = 0.045  # of the height, between two labels
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
@@ -92,9 +92,9 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
-    """How far forward (mm) there is room for words: beyond the arms, and what those reach that are not wrong."""
-    right = [ring for arm in arms if arm.kind != "wrong" for ring in arm.reach_mm]
-    corners = np.concatenate([*(arm.points_mm for arm in arms), *right])
+    """How far forward (mm) there is room for words: beyond the arms and what they reach, so that no outline crosses
+    a word."""
+    corners = np.concatenate([outline for arm in arms for outline in (arm.points_mm, *arm.reach_mm)])
     return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
 
 
@@ -105,6 +105,7 @@ def side_view(
     labels: Sequence[Label] = (),
     outlines: Sequence[tuple[str, Reals]] = (),
     column_mm: float | None = None,
+    over: Sequence[tuple[str, Reals]] = (),
 ) -> Markup:
     """The drawing as HTML: an SVG, and over it words that are as large as the page's.
 
@@ -116,22 +117,29 @@ def side_view(
     labels : moved up or down where they would be on each other
     outlines : of what is drawn behind the arms: kind, and corners (k, 2), mm
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
+    over : lines over the arms: kind, and points (k, 2), mm
 
     Returns
     -------
     drawing : colours come from the page's style sheet
     """
     right = [arm for arm in arms if arm.kind != "wrong"] or arms
-    corners = np.concatenate([*(arm.points_mm for arm in arms), *(ring for arm in right for ring in arm.reach_mm)])
+    corners = np.concatenate(
+        [
+            *(arm.points_mm for arm in arms),
+            *(line for _, line in over),
+            *(ring for arm in right for ring in arm.reach_mm),
+        ]
+    )
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
-    starts = [label.at[0] if column_mm is None else column_mm for label in labels]
-    high[0] = max([high[0], *(start + LABEL * tall for start in starts)])
+    for label in labels:
+        high[0] = max(high[0], (label.at[0] if column_mm is None else column_mm) + LABEL * tall)
     wide, tall = high - low
-    spare = np.array([max(0.0, ratio * tall - wide), max(0.0, wide / ratio - tall)]) / 2
+    spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
     wide, tall = high - low
     parts = [_reach(arm) for arm in arms]
@@ -144,8 +152,9 @@ def side_view(
     outline = Markup('<polygon class="{}" points="{}"/>')
     parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
     placed = _placed(labels, low, high, column_mm)
-    parts += [_lead(label, place) for label, place in placed if column_mm is not None or label.start is not None]
+    parts += [_lead(label, place) for label, place in placed]
     parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
+    parts += [Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points)) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
@@ -154,7 +163,7 @@ def side_view(
     scale = Markup('<span class="scale" style="width: {:.2f}%">{}</span>').format(
         100 * length / wide, tr("{length} mm", length=length)
     )
-    words = [_word(label, (place - low) / [wide, tall], column_mm is None) for label, place in placed]
+    words = [_word(label, (place - low) / [wide, tall]) for label, place in placed]
     return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
         wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
@@ -179,17 +188,16 @@ def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float |
 
 def _lead(label: Label, place: Reals) -> Markup:
     """The line of a label: to its place, or where it has a start from there."""
-    line = _line(np.stack([*([] if label.start is None else [label.start]), label.at, place]))
-    return Markup('<polyline class="lead {} {}" points="{}"/>').format(
-        label.kind, "dashed" if label.start is not None else "", line
-    )
+    start, dashed = (label.at, "") if label.start is None else (label.start, "dashed")
+    line = _line(np.stack([start, label.at, place]))
+    return Markup('<polyline class="lead {} {}" points="{}"/>').format(label.kind, dashed, line)
 
 
-def _word(label: Label, share: Reals, pointing: bool) -> Markup:
+def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
     name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {} {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
-        label.kind, "pointing" if pointing else "led", name, *(100 * share), label.text
+    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, name, *(100 * share), label.text
     )
 
 

@@ -14,7 +14,7 @@ from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.expectations import as_expected, outcome_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.planning import rate_needed, times_needed
-from er3a.pipeline.messages.programs import remedies, remedy
+from er3a.pipeline.messages.programs import remedies
 from er3a.pipeline.messages.say import joined, say, sentence
 from er3a.pipeline.messages.trajectory import (
     FaultText,
@@ -176,7 +176,7 @@ def _to_do(
         return text, (name, address_of("trajectory", name, 0.0, path.name))
     if path.verdict == "safe":
         near = near_assumed(path, summary)
-        return joined([*remedies(path.of_program), remedy(near) if near else ""], " "), None
+        return joined([*remedies(path.of_program), tr("Confirm the assumed shapes first.") if near else ""], " "), None
     last = path.sound_end
     if last is None:
         todo = advised(path, rows)

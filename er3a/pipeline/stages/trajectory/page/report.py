@@ -95,7 +95,7 @@ def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
 
 
 def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
-    """What is wrong with paths, by their names, what collides first."""
+    """What is wrong with paths, by their names: what is not as expected first, of the others what collides."""
     return {fault.name: fault for fault in sorted(faults(results), key=lambda fault: _plainest(results, fault))}
 
 
@@ -133,29 +133,33 @@ def answer_of(
         Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
+    unsure = sum(not fault.meant and fault.status != "fail" for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(faulty, len(mended)), keys, groups, fix)
+    return Answer(headline, rest, _in_short(faulty, unsure, len(mended)), keys, groups, fix)
 
 
-def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, int]:
-    """By which faults are sorted: what collides first, of these what has no other fault."""
+def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, bool, int]:
+    """By which faults are sorted: what is not as expected first, then what collides, of these what has no other
+    fault."""
     path = next(path for path in results.summary.paths if path.name == fault.name)
-    return not path.collisions, len(path.outcomes)
+    return fault.meant, not path.collisions, len(path.outcomes)
 
 
-def _in_short(wrong: Sequence[model.PathSummary], mended: int) -> str:
-    """What becomes of the paths that may not be run as they are, ``mended`` of which are repaired."""
+def _in_short(wrong: Sequence[model.PathSummary], unsure: int, mended: int) -> str:
+    """What becomes of the paths that may not be run as they are, ``unsure`` of which have no fault that is certain, and
+    ``mended`` of which are repaired."""
     early = sum(not path.chosen and path.sound_end is not None for path in wrong)
     if not wrong:
         return ""
     return tr(
-        "The other {count}: {mended} can be repaired, {early} can end early, {rest} neither.",
-        count=len(wrong),
+        "{unsure} unsure, {faulty} faulty: {mended} can be repaired, {early} can end early, {rest} neither.",
+        unsure=unsure,
+        faulty=len(wrong) - unsure,
         mended=mended,
         early=early,
         rest=len(wrong) - mended - early,

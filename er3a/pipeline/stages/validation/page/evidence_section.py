@@ -60,8 +60,9 @@ IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta",
 
 def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
-    legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Of
-    those not settled the open ones come first, then by how far the tool may be off; ``first``: the first."""
+    legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
+    not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
+    ``first``: the first of all ``left``."""
     if evidence is None:
         return None
     by_name = {each.entry: each for each in evidence.entries}
@@ -70,7 +71,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
-    left.sort(key=lambda each: (each.status != "open", -each.off.mm))
+    left.sort(key=lambda each: (not each.off.moves, each.status == "consistent", -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
     return dict(
@@ -85,6 +86,7 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         first=[ListRow("caution", each.entry, _tool_off(each), f"#entry-{each.entry}") for each in left[:FIRST]],
+        left=len(evidence.unconfirmed) + evidence.contradicted,
         unmet=not evidence.table_meets and evidence.other is None,
         allowed=evidence.other is not None and evidence.other.code == "allowed",
         tolerance=tr(
@@ -211,6 +213,8 @@ def _interval(each: EntryEvidence) -> str:
 
 
 def _off(mm: float, deg: float) -> str:
+    if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
+        return tr("turned by {deg} deg", deg=fixed(deg, 0 if deg >= 10 else 1))
     return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 

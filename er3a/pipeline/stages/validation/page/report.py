@@ -15,6 +15,8 @@ from er3a.files.robot_library import robot_of
 from er3a.files.robot_writer import robot_file, robot_text
 from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
+from er3a.kinematics.forward import frames
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
@@ -52,6 +54,11 @@ from er3a.pipeline.viewing.side_view import (
 from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
+AROUND = np.radians(np.linspace(-125.0, 125.0, 31))  # of an arrow around an axis: open at the back
+HEAD = 0.4  # of its radius, the length of its head
+TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
+RADIUS = 0.065  # of such an arrow, of the size of the arm
+BELOW = 0.07  # of a reach: how far below the base its dimension is drawn
 SEEN = "seen"  # address in the picture of what is to be done next
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -175,19 +182,46 @@ def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any], d
     arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
     labels = [*_entries_seen(robot, evidence), *off, *disputed]
     column = max([beyond(arms), *((1 + COLUMN) * label.at[0] for label in disputed)])
-    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column)
+    places, over = entry_places(robot), []
+    radius = RADIUS * float(np.ptp(arms[-1].points_mm, axis=0).max())
+    for joint, cells in evidence.get("rows", ()):
+        if any(cell and column_of(cell["entry"]) == "direction" and _kind(cell["status"]) == "open" for cell in cells):
+            over.append(_turn_arrow(robot, joint, places[f"d{joint}"], radius))
+    for label in disputed:
+        over += _dimension(label, float(places["1"][1]))
+    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column, over=over)
+
+
+def _turn_arrow(robot: Robot, joint: int, at: Reals, radius: float) -> tuple[str, Reals]:
+    """An arrow about a place (2,), mm, as an axis turns with its joint's value: before an axis in the drawing's
+    plane, over one across it."""
+    axis = robot.direction[joint - 1] * frames(robot, np.zeros(robot.joints))[joint - 1, :3, 2]
+    first = np.array([0.0, 0.0, 1.0] if abs(axis[1]) > np.sqrt(0.5) else [0.0, -1.0, 0.0])
+    ring = np.outer(np.cos(AROUND), first) + np.outer(np.sin(AROUND), np.cross(axis, first))
+    seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
+    tip, back = seen[-1], seen[-3] - seen[-1]
+    back *= HEAD / np.linalg.norm(back)
+    across = back[::-1] * [-0.7, 0.7]
+    return "turn", at + radius * np.stack([*seen, tip + back + across, tip, tip + back - across])
+
+
+def _dimension(label: Label, height: float) -> list[tuple[str, Reals]]:
+    """A dimension below the base, from axis 1 to where the flange is farthest from it, at the ``height`` (mm) of axis
+    2: its line with a tick at both ends, and what is measured above it."""
+    far, low = label.at
+    tick = BELOW * far / 3
+    ends = [(x, low + side * tick) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
+    return [("dimension", np.array(ends)), ("dimension far", np.array([(far, low), (far, height)]))]
 
 
 def _disputed(robot: Robot, conflicts: Iterable[model.Conflict]) -> list[Label]:
-    """What documents contradict each other about: a reach, from axis 1 at the height of axis 2."""
-    height = entry_places(robot)["1"][1]
+    """What documents contradict each other about: a reach, from axis 1, at the end of its dimension."""
     return [
         Label(
             with_unit(tr(" or ").join(fixed(found.expected, 1) for found in each.statements), each.unit),
-            np.array([each.measured, height]),
+            np.array([each.measured, -BELOW * each.measured]),
             "open",
             SEEN,
-            start=np.array([0.0, height]),
         )
         for each in conflicts
         if is_one(each.subject, "reach") and each.subject.axis == 1

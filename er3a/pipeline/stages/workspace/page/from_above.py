@@ -46,13 +46,13 @@ def from_above(
             around = np.concatenate(seen)
             at = np.array([around[:, 0].mean(), around[:, 1].max() + BASE * reach])
             words.append(_word(at, height, own_title(solid.name), ""))
-    for number, tray in enumerate(trays):
+    for number, tray in enumerate(trays, 1):
         (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
-        kind = "tray other" if number else "tray"
+        kind = "tray other" if number > 1 else "tray"
         corners = np.array([[left, below], [right, below], [right, above], [left, above]])
-        parts.append(Markup('<polygon class="{}" points="{}"/>').format(kind, _line(corners)))
+        parts.append(Markup('<polygon class="{}" id="tray-{}" points="{}"/>').format(kind, number, _line(corners)))
         name = tray.name if len(trays) > 1 else tr("tray")
-        at = np.array([(left + right) / 2, above + BASE * reach if number else below - height])
+        at = np.array([(left + right) / 2, above + BASE * reach if number > 1 else below - height])
         words.append(_word(at, height, name, kind))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
@@ -27,7 +28,7 @@ from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.side_view import Kind, Label, LabelKind, SeenArm, border_lines, side_view
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -41,6 +42,7 @@ PROOF = {
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 RATIO = 1.2  # of the labelled drawing, width over height
+ASIDE = 0.7  # of the reach, from there to the name of a void at the right
 STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
@@ -212,7 +214,7 @@ def labelled(
     Parameters
     ----------
     floor_mm : height of the floor in the base's frame; None where there is none
-    trays : where they are placed, turned into view
+    trays : where they are placed; the first, which is proposed, is drawn, turned into view
     kind : of the arm: in red where its table is wrong
 
     Returns
@@ -224,12 +226,16 @@ def labelled(
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
     far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
-    labels = [void_label(number_, void) for number_, void in enumerate(summary.voids, 1)]
+    outer = np.concatenate(lines)
+    low, high = outer.min(axis=0), outer.max(axis=0)
+    labels = []  # in corners that are not reached: their own colour would hide them
+    for number_, void in enumerate(summary.voids, 1):
+        label = void_label(number_, void)
+        labels.append(replace(label, at=high * [ASIDE, 1.0] if label.at[0] > 0 else low, start=label.at))
     outlines = [("pocket", _pocket(results, k)) for k, void in enumerate(summary.voids, 1) if void.kind == "open"]
-    for k, tray in enumerate(trays, 1):
-        kind_: LabelKind = "tray" if k == 1 else "tray other"
-        outlines.append((kind_, _tray_corners(tray)))
-        labels.append(Label(tray.name, outlines[-1][1][1], kind_, f"tray-{k}"))
+    for tray in trays[:1]:
+        outlines.append(("tray", _tray_corners(tray)))
+        labels.append(Label(tray.name, outlines[-1][1][1], "tray"))
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
     return side_view([seen], floor_mm, RATIO, labels, outlines)
 
