@@ -117,8 +117,8 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", true) : ghost.hide()));
-  for (const own of others) space.line(own.map((T) => column(T, 3)), page.accent, 4);
+  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", others.length > 1 ? FAINT / 2 : true) : ghost.hide()));
+  for (const own of others) space.line(own.map((T) => column(T, 3)), others.length > 1 ? page.grid : page.accent, 2);
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
