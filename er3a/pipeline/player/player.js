@@ -320,7 +320,7 @@ chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser
 bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {
   link.addEventListener("click", (event) => {
-    if ((event.target.closest("a") ?? link) !== link) return; // a link of its own within a row, as to the teach panel
+    if ((event.target.closest("a, summary") ?? link) !== link) return; // a link of its own within a row, as to the teach panel, or a fold
     play(false);
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end
