@@ -164,7 +164,8 @@ function tellLoads(poses) {
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
     if (Number.isNaN(load)) return;
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > 0.01 * most, Math.abs(load) / most);
+    const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
   });
 }
 
