@@ -52,7 +52,7 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
     caption = tr(
-        "Residuals; samples left out are magenta. Worst used: {name}, {mm} mm.",
+        "Worst residual used: {name}, {mm} mm.",
         name=rows.sample[worst],
         mm=fixed(sizes[0][worst], 2),
     )
