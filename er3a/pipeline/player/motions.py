@@ -111,7 +111,7 @@ class PlayedMotion:
 
     Attributes
     ----------
-    name, text : what it is called, and what is said of it where no event is near; label : for people, if not the name
+    name, text : what it is called, and what is said of it where no event is near
     t : (N,), s, rising; q : (N, n), joint coordinates, finite
     beside : (N, n) each, joint coordinates of the arms that stand beside the first
     ghosts : (n,) each, joint coordinates of poses in which the first arm is drawn pale all the while
@@ -125,7 +125,6 @@ class PlayedMotion:
     events: Sequence[PlayedEvent] = ()
     marks: Sequence[Mark] = ()
     beside: Sequence[Reals] = ()
-    label: str = ""
     ghosts: Sequence[Reals] = ()
     loads: Reals | None = None
     whole_s: float = 0.0

@@ -117,8 +117,8 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", true) : ghost.hide()));
-  for (const own of others) space.line(own.map((T) => column(T, 3)), page.accent, 4);
+  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", others.length > 1 ? FAINT / 2 : true) : ghost.hide()));
+  for (const own of others) space.line(own.map((T) => column(T, 3)), others.length > 1 ? page.grid : page.accent, 2);
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -164,7 +164,8 @@ function tellLoads(poses) {
   const digits = Math.max(0, 2 - Math.floor(Math.log10(most)));
   valuesAt(motion.times, motion.loads, t).forEach((load, j) => {
     if (Number.isNaN(load)) return;
-    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), space.page.ink, Math.abs(load) > 0.01 * most, Math.abs(load) / most);
+    const felt = Math.abs(load) > 0.01 * most; // what is not is told in grey, without a bar
+    space.word(`J${j + 1} ${fixed(load, digits)} ${table.slides[j] ? "N" : "N m"}`, moved(poses[j + 1], data.rows[j].middle), felt ? space.page.ink : space.page.muted, felt, felt ? Math.abs(load) / most : null);
   });
 }
 
@@ -320,7 +321,7 @@ chooser.addEventListener("change", () => goTo(chooser.value, motions.get(chooser
 bar.addEventListener("input", () => goTo(null, Number(bar.value)));
 for (const link of document.querySelectorAll("[data-t]")) {
   link.addEventListener("click", (event) => {
-    if ((event.target.closest("a") ?? link) !== link) return; // a link of its own within a row, as to the teach panel
+    if ((event.target.closest("a, summary") ?? link) !== link) return; // a link of its own within a row, as to the teach panel, or a fold
     play(false);
     event.preventDefault();
     event.stopPropagation(); // a link to a moment within a row that leads to its end

@@ -113,14 +113,13 @@ def may_run(sound: int, due: int, caught: int, what: str) -> tuple[str, str]:
     -------
     headline, rest : of an :class:`Answer`
     """
-    headline = tr("{sound} of {due} {what} may run.", sound=sound, due=due, what=what)
-    return headline, all_caught(caught)
+    return tr("{sound} of {due} {what} may run.", sound=sound, due=due, what=what), all_caught(caught)
 
 
 def all_caught(count: int) -> str:
     """That all that is meant to fail does; empty where nothing is meant to."""
-    if count < 2:
-        return tr("The faulty one is caught.") if count else ""
+    if count < 3:
+        return ("", tr("The faulty one is caught."), tr("Both faulty ones are caught."))[count]
     return tr("All {count} faulty ones are caught.", count=count)
 
 

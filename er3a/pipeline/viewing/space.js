@@ -230,7 +230,7 @@ export class Space extends Orbit {
     const edge = [Math.min(u + width / 2, Math.max(u - width / 2, x)), Math.min(v + height / 2, Math.max(v - height / 2, y))];
     if (Math.hypot(edge[0] - x, edge[1] - y) > height) this.#svg("line", { x1: x, y1: y, x2: edge[0], y2: edge[1], stroke: css });
     const bar = { x: u - width / 2, y: v + 0.3 * size, height: 0.6 * size, rx: 0.2 * size };
-    for (const [part, fill] of share === null ? [] : [[1, this.page.grid], [share, this.page.accent]]) this.#svg("rect", { ...bar, width: part * width, fill });
+    for (const [part, fill] of share === null ? [] : [[1, this.page.grid], [share, this.page.muted]]) this.#svg("rect", { ...bar, width: part * width, fill });
     this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
   }
 

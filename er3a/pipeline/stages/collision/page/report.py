@@ -14,16 +14,16 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined, say, word
+from er3a.pipeline.messages.say import say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import bar_of
+from er3a.pipeline.player.motions import address_of, bar_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -88,7 +88,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, closest, unreached, bars),
+        _answer(summary, closest, unreached, bars, "trajectory" in study.pages(name)),
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
@@ -107,34 +107,59 @@ def _answer(
     closest: Sequence[model.Closest],
     unreached: set[str],
     bars: Mapping[str, Sequence[Part]],
+    advised: bool,
 ) -> Answer:
-    """How much of the joint space is free, and how near each path and chosen solution comes to anything.
+    """How many paths and chosen solutions are clear of everything, and how near each comes.
 
-    ``unreached``: of some paths only a part was measured; ``bars``: of paths, by their names.
+    What collides as its file expects is counted apart, and so is a path of which only a part was measured: that is
+    clear of nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
+    page that says how to mend a path.
     """
     found = {figure.name: figure.value for figure in summary.figures}
-    free, places = found.get("free_of_collisions"), summary.places
-    share = with_unit(fixed(float(free), 0), "%") if free is not None else ""
-    headline = tr("{share} of joint space is free.", share=share) if share else tr("Collisions checked.")
-    touch = sum(each.clearance_mm < 0 for each in closest)
-    rest = tr("{count} of {all} cases collide.", count=touch, all=len(closest)) if closest else ""
-    keys = [(with_unit(fixed(1000 * places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
+    free, params = found.get("free_of_collisions"), summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    rows = [(each.kind, _row(each, unreached, near, bars)) for each in closest[:MAX_ROWS]]
-    titles = ("path", tr("Paths")), ("target", tr("Targets"))
-    groups = [Group(title, [row for own, row in rows if own == kind]) for kind, title in titles]
-    return Answer(headline, rest, "", keys, groups)
+    hit: list[ListRow] = []
+    clear: list[ListRow] = []
+    partly: list[ListRow] = []
+    for each in closest:
+        measured = each.kind == "target" or each.name not in unreached
+        own = hit if each.clearance_mm < 0 else clear if measured else partly
+        own.append(_row(each, measured, near, bars, advised))
+    caught = len(params.get("demonstrations", ()))
+    due = len(clear) + len(hit) + len(params.get("blocked", ())) - caught
+    keys = [(with_unit(fixed(1000 * summary.places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
+    if free is not None:
+        keys.insert(0, (with_unit(fixed(float(free), 0), "%"), tr("of joint space is free")))
+    return Answer(
+        tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
+        all_caught(caught),
+        tr("Reached in part, clear as far as measured: {count}.", count=len(partly)) if partly else "",
+        keys,
+        (
+            Group(tr("Collide"), hit[:MAX_ROWS]),
+            Group(tr("Clear"), clear[:MAX_ROWS]),
+            Group(tr("Not all of it is reached"), partly[:MAX_ROWS]),
+        ),
+        next((row.fix for row in hit if row.fix), None),
+    )
 
 
-def _row(found: model.Closest, unreached: set[str], near: Sequence[str], bars: Mapping[str, Sequence[Part]]) -> ListRow:
-    """A path with its bar, or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes."""
+def _row(
+    found: model.Closest, measured: bool, near: Sequence[str], bars: Mapping[str, Sequence[Part]], advised: bool
+) -> ListRow:
+    """A path with its bar, or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes;
+    ``measured``: all of it."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     of_path = found.kind == "path"
-    if mark == "pass" and of_path and found.name in unreached:
-        mark, note = "none", joined([note, tr("not all of it is reached")], ", ")
+    if mark == "pass" and not measured:
+        mark = "none"
     bar = bars[found.name] if of_path else ()
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), float(of_path), bar)
+    fix = None
+    if mark == "fail" and of_path and advised:
+        asked = address_of("trajectory", found.name, found.t_s or 0.0, found.name)
+        fix = Fix(tr("{name}: see what the page Paths advises.", name=found.name), asked, instead=False)
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), float(of_path), bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -25,6 +26,12 @@ from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
 from er3a.robots.robot import Robot
 
 DRAWN = 161
+KEY: dict[str, Any] = {
+    "fontsize": 10,
+    "handlelength": 1.2,
+    "columnspacing": 1.0,
+    "borderaxespad": 0.1,
+}  # above its axes
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
@@ -45,7 +52,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
         power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
-    torque.legend(ncols=3, fontsize=8)
+    torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
         zip(
@@ -57,7 +64,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         if part == "tool" and not rows.tool.any():
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
-    parts.legend(fontsize=8)
+    parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
@@ -99,13 +106,18 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         player=player(
             robot,
             [*motions(robot, results), *held(robot, results)] or [at_rest(robot, own_title(robot.title))],
-            opened=_moment_of(results, _worst(summary.motors)) if summary.motors else None,
+            opened=_opened(results, _worst(summary.motors)) if summary.motors else None,
         ),
         drawing_head=drawing_head(),
         wrist=_wrist(summary),
         units=_units(summary),
         held=_held(summary.holding),
     )
+
+
+def _opened(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:
+    """Where a joint needs most: the pose that it holds, if that asks for more than any path."""
+    return (holding_name(motor.joint), 0.0) if motor.holding > motor.peak else _moment_of(results, motor)
 
 
 def _moment_of(results: model.DynamicsResults, motor: model.MotorNeed) -> tuple[str, float]:

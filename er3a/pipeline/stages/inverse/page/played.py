@@ -10,11 +10,11 @@ from er3a.kinematics.inverse import inverse
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import limits_in_short
-from er3a.pipeline.messages.kinematics import branch_word
+from er3a.pipeline.messages.kinematics import branch_word, singularity_word
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say
-from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion
-from er3a.pipeline.stages.inverse.model import SolutionRows, TargetResult
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, Weight
+from er3a.pipeline.stages.inverse.model import SINGULAR_PARTS, SolutionRows, TargetResult
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
@@ -50,7 +50,18 @@ def _solution_event(rows: SolutionRows, k: int) -> PlayedEvent:
     """What came of a branch, as long as the player shows it."""
     refusal, name = rows.refusal[k], branch_word(rows.label[k], int(rows.branch[k]))
     said = tr("chosen") if rows.rank[k] == 1 else refusal_in_short(refusal)
-    return PlayedEvent(k, k + SHOWN_S, joined([name, said], ": "), "plain" if refusal is None else "fail")
+    weight: Weight = "fail" if refusal is not None else "caution" if rows.singular[k].any() else "plain"
+    return PlayedEvent(k, k + SHOWN_S, with_singularity(joined([name, said], ": "), rows, k), weight)
+
+
+def with_singularity(said: str, rows: SolutionRows, k: int) -> str:
+    """What is said of a solution, and the singularities that it is on."""
+    kinds = [kind for kind, on in zip(SINGULAR_PARTS, rows.singular[k]) if on]
+    if not kinds:
+        return said
+    if kinds == ["rank"]:
+        return tr("{taken}; rank singularity", taken=said)
+    return tr("{taken}; {kinds} singularity", taken=said, kinds=tr(", ").join(map(singularity_word, kinds)))
 
 
 def _line(start_mm: Position, end_mm: Position, name: str, count: int) -> Mark:

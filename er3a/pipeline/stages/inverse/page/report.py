@@ -10,19 +10,21 @@ import numpy as np
 from markupsafe import Markup
 
 from er3a.finding import is_one
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
 from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
-from er3a.pipeline.messages.kinematics import branch_word, singularity_word
+from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import joined, listed, say, word
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
-from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played
+from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, solutions_played, with_singularity
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
@@ -131,22 +133,44 @@ def _section(
         families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
-        listed=_solutions_listed(target.name, branches, cells),
+        listed=_solutions_listed(robot, target.name, branches, cells),
+        turned=rows.within_limits.sum() > branches.within_limits.sum(),
     )
 
 
 def _solutions_listed(
-    target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
-) -> list[tuple[str, Markup, Markup, str]]:
-    """The branches as they are listed by the player: mark, where it shows each, its name, and what came of it."""
+    robot: Robot, target: str, branches: model.SolutionRows, cells: Sequence[Sequence[str]]
+) -> list[tuple[str, Markup, Markup, str, list[tuple[Any, ...]]]]:
+    """The branches as they are listed by the player: mark, where it shows each, its name, what came of it, and its
+    joint values."""
     return [
         (
-            "fail" if branches.refusal[k] else "",
+            "fail" if branches.refusal[k] else "caution" if branches.singular[k].any() else "",
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             cells[k][-1],
+            _against_limits(robot, branches.q_deg[k]),
         )
         for k in range(len(branches))
+    ]
+
+
+def _against_limits(robot: Robot, q_deg: Reals) -> list[tuple[Any, ...]]:
+    """Each joint that has limits: its number, its value and limits with their unit, then where the limits and the value
+    are, in percent of a scale that holds them all, and whether the value is between the limits."""
+    low, high = shown(robot, np.stack([robot.lower, robot.upper]))
+    start = np.minimum(low, q_deg)
+    percent = 100 / np.maximum(np.maximum(high, q_deg) - start, SAME)
+    places = np.stack([low - start, high - start, q_deg - start], axis=1) * percent[:, None]
+    inside = (low - SAME <= q_deg) & (q_deg <= high + SAME)
+    return [
+        (
+            j + 1,
+            *(fixed(value, 0) + (" mm" if robot.slides[j] else "°") for value in (q_deg[j], low[j], high[j])),
+            *places[j].tolist(),
+            bool(inside[j]),
+        )
+        for j in np.flatnonzero(~robot.continuous)
     ]
 
 
@@ -209,12 +233,7 @@ def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> st
         taken = tr("{taken}; {turns} ways, ±360°", taken=taken, turns=turns)
     if (freed := float(branches.freed_turn_deg[k])) > SAME:
         taken = tr("{taken}; tool turned by {angle}", taken=taken, angle=with_unit(fixed(freed, 1), "deg"))
-    kinds = [kind for kind, on in zip(model.SINGULAR_PARTS, branches.singular[k]) if on]
-    if not kinds:
-        return taken
-    if kinds == ["rank"]:
-        return tr("{taken}; rank singularity", taken=taken)
-    return tr("{taken}; {kinds} singularity", taken=taken, kinds=tr(", ").join(map(singularity_word, kinds)))
+    return with_singularity(taken, branches, k)
 
 
 def _short(label: str, branch: int) -> str:

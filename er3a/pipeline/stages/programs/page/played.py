@@ -42,12 +42,11 @@ def motions(robot: Robot, results: ProgramsResults) -> list[PlayedMotion]:
         for each in sorted(program.findings, key=cause_first):
             if each.program_s is not None:
                 events += _found_event(program, each, rows)
-        label = own_title(program.title)
         if len(rows):
-            motions.append(PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events, label=label))
+            motions.append(PlayedMotion(program.name, "", rows.t_s, meant(robot, rows.q_deg), events))
         else:  # nothing of it was carried out: the arm rests
             said = joined([in_few_words(say(each.finding)) for each in program.findings])
-            motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome], label=label))
+            motions.append(at_rest(robot, program.name, said, WEIGHTS[program.outcome]))
     return motions
 
 
@@ -67,8 +66,7 @@ def _found_event(program: ProgramSummary, found: FindingAt, rows: ProgramMotion)
             for t, pair in touches
         ]
     if not is_one(finding, "too_fast"):
-        joint = getattr(finding, "joint", None)
-        joints = ((joint, ""),) if joint and is_one(finding, "above_limit", "below_limit") else ()
+        joints = ((finding.joint, ""),) if is_one(finding, "above_limit", "below_limit") else ()
         return [PlayedEvent(start, end, in_few_words(say(finding)), weight, joints=joints)]
     paces = _paces(program, found)
     if (start, finding) != min(paces, key=itemgetter(0)):
@@ -137,23 +135,23 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 moments,
                 " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
-                cause=cause or "",
+                cause=cause,
             )
         )
     return found
 
 
-def _cause(program: ProgramSummary, found: FindingAt) -> str | None:
-    """The singular pose that a line with joints that are too fast comes to; None where it comes to none."""
+def _cause(program: ProgramSummary, found: FindingAt) -> str:
+    """The singular pose that a line with joints that are too fast comes to; empty where it comes to none."""
     here = _same_line(program, found)
     if not any(is_one(each.finding, "too_fast") for each in here):
-        return None
+        return ""
     said = [
         tr("{where}: {text}", where=_where(program, each), text=singular_cause(each.finding))
         for each in here
         if is_one(each.finding, "meets_singularity", "passes_singularity")
     ]
-    return next(iter(said), None)
+    return next(iter(said), "")
 
 
 def _moment(program: ProgramSummary, found: FindingAt) -> FaultMoment:

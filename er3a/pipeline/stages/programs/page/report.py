@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -172,8 +173,11 @@ def _listing(
                 id=line_id(name, number),
                 text=words,
                 level=level,
-                word="" if level is None else level_word(level),
-                remarks=[_remark(name, each) for each in sorted(here, key=cause_first)],
+                word=level and level_word(level),
+                remarks=[
+                    (re.split("[;；]", say(each.finding))[0], _remark(name, each))
+                    for each in sorted(here, key=cause_first)
+                ],
                 remedies=remedies(here),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
@@ -187,8 +191,7 @@ def _listing(
 
 def _facts(rows: model.Instructions, here: list[int]) -> str:
     """Duration and clearance of the motions of a line."""
-    times = rows.duration_s[here] if here else np.empty(0)
-    clear = rows.clearance_mm[here] if here else np.empty(0)
+    times, clear = rows.duration_s[here], rows.clearance_mm[here]
     parts = []
     if np.isfinite(times).any():
         parts.append(tr("{time} s", time=fixed(float(np.nanmax(times)), 2)))

@@ -14,7 +14,7 @@ from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
-from er3a.pipeline.messages.say import bracketed, listed, say, word
+from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
@@ -49,10 +49,10 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
         ax.set_ylabel(label)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[1].set_xlabel(tr("sample"))
-    axes[0].legend(ncols=3, loc="upper right")
+    axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
     caption = tr(
-        "Residuals; outliers are above the line. Worst used: {name}, {mm} mm.",
+        "Worst residual used: {name}, {mm} mm.",
         name=rows.sample[worst],
         mm=fixed(sizes[0][worst], 2),
     )
@@ -157,16 +157,21 @@ def _answer(results: model.VisionResults) -> Answer:
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} objects are graspable.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} graspable.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
+    if summary.verdict.status == "caution":  # what was not checked comes before both
+        headline, rest = joined([headline, rest], " "), ""
     keys = []
     if found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
-    groups = [Group(tr("Objects"), shown)]
+    groups = [
+        Group(tr("Not graspable"), [row for row in shown if row.mark == "fail"]),
+        Group(tr("Graspable"), [row for row in shown if row.mark == "pass"]),
+    ]
     if found and (found.suspects or found.warnings):
         rows = [ListRow("caution", each.sample, tr("left out"), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
