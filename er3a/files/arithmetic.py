@@ -227,7 +227,7 @@ def _power(a: CellAmount, b: CellAmount) -> CellAmount:
 
 
 def _product(a: CellAmount, b: CellAmount) -> CellAmount:
-    if a.unit and b.unit:
+    if a.unit and b.unit and not (a.unit == "rad" and b == CellAmount(1.0, "rad")):  # pi/2 rad
         raise ValueError(f"is in {a.unit} and in {b.unit}")
     if a.variables and b.variables:
         raise ValueError("multiplies two variables")

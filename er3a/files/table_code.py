@@ -103,7 +103,7 @@ def groups_of(text: str) -> list[CodeGroup]:
             start = open_ones.pop()
             if place - start > LONGEST_GROUP:
                 continue
-            before = text[max(0, start - 80) : start]
+            before = text[max(0, start - 120) : start]
             found.append(CodeGroup(start, place, text[start], text[start + 1 : place], before))
     return found
 
@@ -193,6 +193,11 @@ def _calls(code: Code) -> list[Grid]:
             unread.append(code.line(each.start))
         elif cells:
             target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
+            added = re.search(
+                r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
+            )
+            if added and named[1] is None:
+                target = f"{added[1]}[{each.start}"
             rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
     if unread and (rows or "Link([" in code.text):
         raise InputError(
@@ -205,7 +210,8 @@ def _calls(code: Code) -> list[Grid]:
         _INDEXED.search(cell) or cell in (*plain, *code.lists) for cell in texts
     ):  # made of lists in a loop
         return []
-    if rows and (".extend(" in code.text or (len(rows) == 1 and re.search(r"\bfor\b", code.text))):
+    looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))
+    if rows and (".extend(" in code.text or looped):
         problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
@@ -213,7 +219,8 @@ def _calls(code: Code) -> list[Grid]:
     arms = [[link for link in links if link] for links in chosen if len(links) > 1 and None not in links]
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
-    return [_grid([(row.line, row.cells) for row in each]) for each in arms or held or _begun_again(rows)]
+    held = arms or [each for one in held or [rows] for each in _begun_again(one)]
+    return [_grid([(row.line, row.cells) for row in each]) for each in held]
 
 
 def _signatures(code: Code) -> dict[str, list[str]]:

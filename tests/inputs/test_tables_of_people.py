@@ -345,6 +345,11 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
             "one of them",
         ),
+        (
+            "".join(f"{arm}.append(RevoluteDH(a=0.1, d={d}))\n" for d, arm in enumerate(["one"] * 2 + ["two"] * 2)),
+            "one of them",
+        ),
+        ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
     ],
 )
 def test_what_has_two_readings_is_asked_back(tmp_path, text, names):
@@ -374,6 +379,7 @@ def test_columns_without_names_are_read_as_they_are_said_to_be(tmp_path):
         ("-3pi/2", -1.5 * np.pi, "rad"),
         ("deg2rad(30)", np.pi / 6, "rad"),
         ("90*pi/180", np.pi / 2, "rad"),
+        ("pi/2 rad", np.pi / 2, "rad"),
         ("0 - np.pi/2", -np.pi / 2, "rad"),
         ("（１＋２）／４", 0.75, ""),
         ("−90°", -90, "deg"),
@@ -523,6 +529,16 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
             "standard",
         ),
         ("d1 = 0.1\nd1 = 0.29\n# a alpha d theta\nM = [[0, -pi/2, d1, 0], [0.27, 0, 0, -pi/2]]\nd1 = 3", "standard"),
+        (
+            'convention: "modified_dh"  # or "standard_dh"\nrows:\n - {a: 0, alpha: -pi/2, d: 0.29, offset: 0}\n'
+            " - {a: 0.27, alpha: 0, d: 0, offset: -pi/2}\n",
+            "modified",
+        ),
+        (
+            "alpha(i-1) is the twist, a(i-1) the length.\n\n| twist angle | link length | link offset | joint angle |\n"
+            "|---|---|---|---|\n| -pi/2 | 0 | 0.29 | q1 |\n| 0 | 0.27 | 0 | q2 - pi/2 |\n",
+            "modified",
+        ),
         ("i,a (m),alpha,d (m),theta\n1,0,-90°,0.29,q1\n2,0.27,0,0,q2 + 90° - pi\n", "standard"),
     ],
 )
