@@ -84,9 +84,10 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
     """Write the dynamics page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary = results.summary
+    hardest = _moment_of(results, _worst(summary.motors))[0] if summary.motors else ""
     figures = [
         (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
-        for path in summary.paths
+        for path in sorted(summary.paths, key=lambda path: path.name != hardest)  # it is shown with a held pose
         if path.complete
     ]
     render_stage(
