@@ -198,5 +198,5 @@ def test_limits_and_speeds_in_radians_are_doubted_although_a_joint_turns_more_th
 def test_a_table_of_very_many_rows_is_refused_as_no_arm(tmp_path):
     rows = "".join(f"{i},1,90,1,q{i}\n" for i in range(1, 100_001))
     (tmp_path / "arm.csv").write_text(f"joint,a_mm,alpha_deg,d_mm,theta\n{rows}", encoding="utf-8")
-    with pytest.raises(InputError, match="100,000 rows"):
+    with pytest.raises(InputError, match="larger than 200000 bytes"):
         read_dh_table(tmp_path / "arm.csv", "arm")

@@ -15,10 +15,10 @@ pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
 CALL = """
 import numpy as np
-from er3a.geometry.vectors import dot
+from er3a.geometry.vectors import unsigned_angle
 
-assert dot(np.ones(3), np.ones(3)) == 3.0
-print(sum(dot.stats.cache_hits.values()), sum(dot.stats.cache_misses.values()))
+assert unsigned_angle(np.eye(3)[0], np.eye(3)[1]) == np.pi / 2
+print(sum(unsigned_angle.stats.cache_hits.values()), sum(unsigned_angle.stats.cache_misses.values()))
 """
 
 

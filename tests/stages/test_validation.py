@@ -170,7 +170,7 @@ def test_the_article_table_is_told_apart_with_numbers(summaries):
     farthest = checks["er3a_c60", reach("greatest", "wrist_centre", 1)]
     assert (round(farthest.measured, 1), farthest.expected) == (1301.6, 627.1)
     found = summary.verdict.finding
-    assert (found.check, found.measured, found.expected) == (reach.subject, reach.measured, reach.expected)
+    assert (found.check, found.measured, found.expected) == (farthest.subject, farthest.measured, farthest.expected)
     assert {"1301.6 mm", "627.1 mm"} <= set(re.findall(r"[0-9.]+ mm", say(found)))
     assert {subject for owner, subject in checks if owner == "er3a_c60_article"} == {
         segment_inclination("forearm"),
