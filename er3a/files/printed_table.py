@@ -381,7 +381,7 @@ class _Table:
             self.notes.append("a and alpha of the link before the joint (i-1): read as modified D-H (Craig)")
             return "modified"
         near = "\n".join(text.split("\n")[max(self.rows[0][0] - 10, 0) : self.rows[-1][0] + 3])
-        library = {each for library, (_, each) in LIBRARIES.items() if each and library in text}
+        library = {each for library, (_, each) in LIBRARIES.items() if each and re.search(library, text)}
         for part in (program, near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
             for one in CONVENTIONS if len(said) == 1 else ():

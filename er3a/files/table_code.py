@@ -32,15 +32,13 @@ _ORDERS = {
 """The order of arguments without names, by the function."""
 LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
-    "'dh'": ("a,alpha,d,theta", "standard"),
-    '"dh"': ("a,alpha,d,theta", "standard"),
-    "'mdh'": ("a,alpha,d,theta", "modified"),
-    '"mdh"': ("a,alpha,d,theta", "modified"),
+    r"setFixedTransform\([^\n]*[\"']dh[\"']": ("a,alpha,d,theta", "standard"),
+    r"setFixedTransform\([^\n]*[\"']mdh[\"']": ("a,alpha,d,theta", "modified"),
     "pybotics": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
-"""Columns of a matrix, and the convention, by a name of the library, or its option, that takes it."""
+"""Columns of a matrix, and the convention, by what a program has that calls the library that takes it."""
 _UNPACKED = re.compile(
     r"((?<![\w.])\w+(?:\s*,\s*\w+){2,7})\s*\)?\s*"
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
@@ -415,7 +413,9 @@ def _listed(code: Code) -> Grid:
     stacked = {name for each in code.groups for name in re.findall(r"\w+", each.inside)}
     for group in code.groups:
         label = re.search(
-            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)\s*$|setFixedTransform\([^\n]*,\s*$",
+            r"(?:^|\n)\s*(?:-|[\"']?(\w+)[\"']?\s*:|"
+            r"(?:(?:(?:static|const|constexpr|double|float)\s+)*(\w+\d)(?:\[[4-8]\])?|\w+[\[(]\d+(?:,\s*:)?[\])])\s*=)"
+            r"\s*$|setFixedTransform\([^\n]*,\s*$",
             group.before,
         )
         if label and label[2] and label[2] not in stacked and "dh" not in label[2].lower():
@@ -457,7 +457,9 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         raise InputError(None, f"line {rows[0][0]}", problem, "Say the columns' order by --column")
     if said := near or used or _columns_in(code.comments.values(), width):
         return said
-    taken = (order.split(",") for library, (order, _) in LIBRARIES.items() if library in code.text and width >= 4)
+    taken = (
+        order.split(",") for library, (order, _) in LIBRARIES.items() if re.search(library, code.text) and width >= 4
+    )
     return next((names[:width] for names in taken if len(names) >= width), [])
 
 
