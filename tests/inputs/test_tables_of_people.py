@@ -340,6 +340,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "--column",
         ),
         ("i,length a,offset d,theta\n1,0,0,q1\n", "none of alpha"),
+        ('{"dh": [[0, 321.5, 50, -90], [-90, 0, 270, 0]]}', "--column"),
         ("M = [0 0 0.3 0;\n 0.2 0 0 0];\nsetFixedTransform(j, trvec2tform(M(1,1:3)));", "--column"),
         (
             "L(1) = Link([0 1 0 0]);\nL(2) = Link([0 0 1 0]);\nR(1) = Link([0 1 1 0]);\nR(2) = Link([0 0 1 0]);",
