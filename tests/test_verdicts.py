@@ -199,7 +199,7 @@ def test_part_of_a_study_has_verdicts_an_index_and_a_report_until_er3a_is_anothe
     assert re.findall(r'<ol><li><a href="([^"]*)">', page) == ["er3_600/validation.html"]
     assert '<span class="never">' not in page
 
-    # As after an upgrade, which may have mended what passed wrongly: verdicts count until the study is run again.
+    # As after an upgrade, which may have corrected what passed wrongly: verdicts count until the study is run again.
     monkeypatch.setattr("er3a.pipeline.results.numbers_digest", lambda: "another")
     after = read_verdicts(study, results)[-1]
     assert (after.outdated, after.counts("fail")) == (("er3a itself",), True)

@@ -1,7 +1,7 @@
 """Maximum-likelihood refinement of hand-eye and board pose, with intervals that hold whatever the samples' noise is.
 
 A sample predicts T_camera_board = X^-1 F^-1 Y. Its six residuals are the position seen less the one predicted, and the
-rotation vector from predicted to seen, both by the camera's axes, by whose covariance they scatter. Hand-eye X and
+rotation vector from predicted to seen, both by the camera's axes, as the camera's covariance is. Hand-eye X and
 board Y change by twelve numbers: positions (m) and small rotations (rad) about the axes of their parent frames;
 derivatives with respect to these are in closed form. Steps are those of Levenberg and Marquardt [1]_.
 

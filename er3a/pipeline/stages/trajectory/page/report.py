@@ -119,7 +119,7 @@ def answer_of(
     for path in faulty:
         row = row_of(wrong[path.name], motions.get(path.name), path.duration_s, shares[path.name])
         fault_rows[path.name] = replace(row, fix=None) if path.name in hindered else row
-    mended = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
+    repairable = [fault_rows[path.name] for path in faulty if path.chosen and path.name not in hindered]
     limits = summary.joint_limits
     sound = [path for path in others if is_met(path) or not path.expect]
     unlike = [
@@ -128,8 +128,8 @@ def answer_of(
         if path.expect and not is_met(path)
     ]
     groups = (
-        Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in mended)]),
-        Group(tr("Can be repaired"), mended),
+        Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in repairable)]),
+        Group(tr("Can be repaired"), repairable),
         Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
@@ -140,7 +140,7 @@ def answer_of(
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(faulty, unsure, len(mended)), keys, groups, fix)
+    return Answer(headline, rest, _in_short(faulty, unsure, len(repairable)), keys, groups, fix)
 
 
 def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, bool, int]:
@@ -150,20 +150,19 @@ def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, boo
     return fault.meant, not path.collisions, len(path.outcomes)
 
 
-def _in_short(wrong: Sequence[model.PathSummary], unsure: int, mended: int) -> str:
-    """What becomes of the paths that may not be run as they are, ``unsure`` of which have no fault that is certain, and
-    ``mended`` of which are repaired."""
-    early = sum(not path.chosen and path.sound_end is not None for path in wrong)
+def _in_short(wrong: Sequence[model.PathSummary], unsure: int, repairable: int) -> str:
+    """What becomes of the paths that may not be run as they are, ``unsure`` of which have no fault that is certain."""
     if not wrong:
         return ""
-    return tr(
-        "{unsure} unsure, {faulty} faulty: {mended} can be repaired, {early} can end early, {rest} neither.",
-        unsure=unsure,
+    early = sum(not path.chosen and path.sound_end is not None for path in wrong)
+    text = tr(
+        "{faulty} faulty: {repairable} can be repaired, {early} can end early, {rest} neither.",
         faulty=len(wrong) - unsure,
-        mended=mended,
+        repairable=repairable,
         early=early,
-        rest=len(wrong) - mended - early,
+        rest=len(wrong) - repairable - early,
     )
+    return tr("{count} unsure", count=unsure) + ", " + text if unsure else text
 
 
 def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
