@@ -101,6 +101,7 @@ def beyond(arms: Sequence[SeenArm]) -> float:
 def side_view(
     arms: Sequence[SeenArm],
     floor_mm: float | None = None,
+    *,
     ratio: float = 1.7,
     labels: Sequence[Label] = (),
     outlines: Sequence[tuple[str, Reals]] = (),

@@ -237,7 +237,7 @@ def labelled(
         outlines.append(("tray", _tray_corners(tray)))
         labels.append(Label(tray.name, outlines[-1][1][1], "tray"))
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
-    return side_view([seen], floor_mm, RATIO, labels, outlines)
+    return side_view([seen], floor_mm, ratio=RATIO, labels=labels, outlines=outlines)
 
 
 def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
