@@ -487,6 +487,7 @@ def _placement(T: Reals) -> str:
 
 Rest = ParamSpec("Rest")
 Value = TypeVar("Value")
+_NOT_YET: Any = object()
 
 
 def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Concatenate[Robot, Rest], Value]:
@@ -508,9 +509,9 @@ def derived(function: Callable[Concatenate[Robot, Rest], Value]) -> Callable[Con
     def once(robot: Robot, /, *rest: Rest.args, **named: Rest.kwargs) -> Value:
         key = (function, *rest, *named.items()) if rest or named else function
         kept = robot.derived
-        if key not in kept:
-            kept[key] = function(robot, *rest, **named)
-        value: Value = kept[key]
+        value: Value = kept.get(key, _NOT_YET)  # one look-up: a pose's forward kinematics asks four times
+        if value is _NOT_YET:
+            value = kept[key] = function(robot, *rest, **named)
         return value
 
     update_wrapper(once, function)
