@@ -233,7 +233,7 @@ class Robot(ByValue, Displayed):
             self._keep(key, array, (4, 4) if key in _PLACED else ((rows if key in _OF_ROWS else joints),))
         for key, count in (("sliding", rows), ("continuous", joints)):
             given = getattr(self, key)
-            self._keep(key, np.array(given, dtype=bool) if np.size(given) else np.zeros(count, dtype=bool), (count,))
+            self._keep(key, np.array(given, bool) if np.size(given) else np.zeros(count, bool), (count,))
         if self.coupling is not None:
             self._keep("coupling", np.array(as_floats(self.coupling, "coupling")), (rows, joints))
         if self.home is not None:
@@ -311,7 +311,7 @@ class Robot(ByValue, Displayed):
             as for the class
         """
         count = np.size(a)
-        slides = np.zeros(count, dtype=bool) if sliding is None else np.asarray(sliding, dtype=bool)
+        slides = np.zeros(count, bool) if sliding is None else np.asarray(sliding, bool)
         robot = cls(
             **{"name": name, "title": name, "direction": np.ones(count)} | more,
             convention=convention,

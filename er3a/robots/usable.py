@@ -145,7 +145,7 @@ def check_joint_values(robot: Robot, values: Any, argument: str) -> None:
     if q.ndim == 0 or q.shape[-1] != robot.joints or not q.size:
         return
     highest, lowest = float(q.max()), float(q.min())
-    if not (np.isfinite(highest) and np.isfinite(lowest)):
+    if not np.isfinite(highest - lowest):
         row = np.argwhere(~np.isfinite(q))[0][:-1].tolist()
         raise PoseError(f"{argument}{row if row else ''} holds NaN or infinity")
     if max(highest, -lowest) > far and _holds_degrees(robot, q.reshape(-1, robot.joints)):

@@ -102,7 +102,7 @@ def side_view(
     arms: Sequence[SeenArm],
     floor_mm: float | None = None,
     *,
-    ratio: float = 1.7,
+    ratio: float,
     labels: Sequence[Label] = (),
     outlines: Sequence[tuple[str, Reals]] = (),
     column_mm: float | None = None,

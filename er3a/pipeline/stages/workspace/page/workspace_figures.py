@@ -41,7 +41,6 @@ PROOF = {
     N_("unreachable"): "#ffffff",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-RATIO = 1.2  # of the labelled drawing, width over height
 ASIDE = 0.7  # of the reach, from there to the name of a void at the right
 STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
@@ -234,10 +233,11 @@ def labelled(
         labels.append(replace(label, at=high * [ASIDE, 1.0] if label.at[0] > 0 else low, start=label.at))
     outlines = [("pocket", _pocket(results, k)) for k, void in enumerate(summary.voids, 1) if void.kind == "open"]
     for tray in trays[:1]:
-        outlines.append(("tray", _tray_corners(tray)))
-        labels.append(Label(tray.name, outlines[-1][1][1], "tray"))
+        corners = _tray_corners(tray)
+        outlines.append(("tray", corners))
+        labels.append(Label(tray.name, corners[1], "tray"))
     seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
-    return side_view([seen], floor_mm, ratio=RATIO, labels=labels, outlines=outlines)
+    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines)
 
 
 def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
