@@ -27,8 +27,8 @@ from er3a.kinematics.singularity import NearSingular
 from er3a.kinematics.wrist_partitioned import has_branches
 from er3a.numerics.arrays import Reals
 from er3a.planning import motion_faults
-from er3a.planning.piecewise import PiecewiseMotion, polynomial_motion
-from er3a.planning.profiles import Rates, trapezoid
+from er3a.planning.piecewise import SAME_TIME, PiecewiseMotion, chebyshev_times, motion_through
+from er3a.planning.profiles import trapezoid
 from er3a.planning.timing import SPLINE_DEGREE, JointLimits, standing
 from er3a.program_check.program_check_findings import gravity, which
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
@@ -358,17 +358,14 @@ def _curve(path: MotionPath) -> PiecewiseMotion:
     law, share = path.law, path.share
     if len(share) == 1:
         return standing(path.q[0], 0.0).curve
-    spline = scipy.interpolate.CubicSpline(share, path.q)
-
-    def rates(t: Reals) -> Rates:
-        progress, speed, pull = (each[..., None] for each in trapezoid(t, law.duration, law.ramp))
-        place = progress[..., 0]
-        slope = spline(place, 1)
-        return spline(place), slope * speed, spline(place, 2) * speed**2 + slope * pull
-
     times = law.times(share)
     ramps = law.duration * np.array([law.ramp, 1 - law.ramp])
-    return polynomial_motion(rates, np.union1d(times, ramps[ramps < times[-1]]), SPLINE_DEGREE)
+    times = np.union1d(times, ramps[ramps < times[-1]])
+    times = times[np.diff(times, prepend=-1.0) > SAME_TIME * times[-1]]
+    nodes = chebyshev_times(times[:-1], times[1:], SPLINE_DEGREE)[0]
+    progress = trapezoid(nodes, law.duration, law.ramp)[0]
+    spline = scipy.interpolate.make_interp_spline(share, path.q, k=min(3, len(share) - 1))
+    return motion_through(spline(progress), times)
 
 
 def begun(faults: Iterable[motion_faults.Interval[Finding]]) -> Moments:
