@@ -181,11 +181,12 @@ def test_a_line_keeps_the_tool_on_its_way(tmp_path):
 
 def test_rates_of_a_line_are_those_of_its_way(tmp_path):
     """Against differences of joints that are solved on the line at the times of its trapezoid, by its own formula."""
-    T = forward(ROBOT, HOME)
+    start = np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0])
+    T = forward(ROBOT, start)
     way = np.array([0.05, 0.25, -0.1])
     limits = JointLimits(np.full(6, 1e-3), np.full(6, 1e-3), acceleration_assumed=False)
     words = ", ".join(f"{key} {1000 * value:.6f}" for key, value in zip("XYZ", T[:3, 3] + way))
-    check = checked(f"$VEL.CP=0.2\n$ACC.CP=1.0\nLIN {{{words}}}", tmp_path, joint_limits=limits)
+    check = checked(f"$VEL.CP=0.2\n$ACC.CP=1.0\nLIN {{{words}}}", tmp_path, joint_limits=limits, start=start)
     speed, length = 0.2, np.linalg.norm(way)
     ramp, step = 0.2, 1e-3
     duration = length / speed + ramp
@@ -195,7 +196,7 @@ def test_rates_of_a_line_are_those_of_its_way(tmp_path):
     share = np.where(t < duration / 2, done, length - done) / length
     poses = np.tile(T, (len(t), 1, 1))
     poses[:, :3, 3] += share[:, None] * way
-    q = [HOME]
+    q = [start]
     for pose in poses:
         rows = inverse(ROBOT, pose, q[-1]).q
         q.append(rows[np.abs(rows - q[-1]).max(axis=1).argmin()])
