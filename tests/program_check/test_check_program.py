@@ -183,16 +183,16 @@ def test_rates_of_a_line_are_those_of_its_way(tmp_path):
     """Against differences of joints that are solved on the line at the times of its trapezoid, by its own formula."""
     start = np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0])
     T = forward(ROBOT, start)
-    way = np.array([0.05, 0.25, -0.1])
+    way = np.array([0.05, 0.3, -0.15])
     limits = JointLimits(np.full(6, 1e-3), np.full(6, 1e-3), acceleration_assumed=False)
     words = ", ".join(f"{key} {1000 * value:.6f}" for key, value in zip("XYZ", T[:3, 3] + way))
-    check = checked(f"$VEL.CP=0.2\n$ACC.CP=1.0\nLIN {{{words}}}", tmp_path, joint_limits=limits, start=start)
-    speed, length = 0.2, np.linalg.norm(way)
-    ramp, step = 0.2, 1e-3
+    check = checked(f"$VEL.CP=1.0\n$ACC.CP=4.0\nLIN {{{words}}}", tmp_path, joint_limits=limits, start=start)
+    speed, acceleration, length = 1.0, 4.0, np.linalg.norm(way)
+    ramp, step = speed / acceleration, 2e-4
     duration = length / speed + ramp
     t = np.arange(0, duration, step)
     ahead = np.minimum(t, duration - t)
-    done = np.where(ahead < ramp, ahead**2 / 2, speed * (ahead - ramp / 2))
+    done = np.where(ahead < ramp, acceleration * ahead**2 / 2, speed * (ahead - ramp / 2))
     share = np.where(t < duration / 2, done, length - done) / length
     poses = np.tile(T, (len(t), 1, 1))
     poses[:, :3, 3] += share[:, None] * way
