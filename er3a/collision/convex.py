@@ -273,7 +273,7 @@ def cores_distance(  # noqa: C901, PLR0912
 
 
 @inner_kernel
-def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: Reals) -> float:
+def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, room: Reals, near: Reals) -> float:
     """How far a core stays above a half-space.
 
     Parameters
@@ -282,32 +282,22 @@ def above_plane(w: Reals, first: int, last: int, disc: float, plane: int, near: 
     first, last : rows of the core in ``w``, ``last`` excluded
     disc : m, radius of a cylinder's discs; 0 for a hull of points
     plane : row of ``w`` with the unit normal; the next row begins with the offset along it, m
+    room : (ROOM, 3), scratch memory
     near : (2, 3), gets the lowest point of the core and its foot on the plane, m
 
     Returns
     -------
     height : m, negative by the depth
     """
-    x, y, z = w[plane, 0], w[plane, 1], w[plane, 2]
-    smallest, at = np.inf, first
-    for p in range(first, last):
-        height = w[p, 0] * x + w[p, 1] * y + w[p, 2] * z
-        if height < smallest:
-            smallest, at = height, p
-    near[0, 0], near[0, 1], near[0, 2] = w[at, 0], w[at, 1], w[at, 2]
-    if disc > 0:
-        i, j, k = w[first + 1, 0] - w[first, 0], w[first + 1, 1] - w[first, 1], w[first + 1, 2] - w[first, 2]
-        along = (i * x + j * y + k * z) / (i * i + j * j + k * k)
-        i, j, k = x - along * i, y - along * j, z - along * k
-        size = np.sqrt(i * i + j * j + k * k)
-        if size > 1e-12:
-            near[0, 0] -= disc / size * i
-            near[0, 1] -= disc / size * j
-            near[0, 2] -= disc / size * k
-            smallest -= disc * size
-    smallest -= w[plane + 1, 0]
-    near[1, 0], near[1, 1], near[1, 2] = near[0, 0] - smallest * x, near[0, 1] - smallest * y, near[0, 2] - smallest * z
-    return float(smallest)
+    height = -w[plane + 1, 0]
+    for r in range(3):
+        room[AXIS, r] = w[plane, r]
+    support(w, first, last, disc, room, -1.0, int(0))  # noqa: RUF046, UP018  (see inner_kernel)
+    for r in range(3):
+        height += room[0, r] * w[plane, r]
+    for r in range(3):
+        near[0, r], near[1, r] = room[0, r], room[0, r] - height * w[plane, r]
+    return float(height)
 
 
 @kernel

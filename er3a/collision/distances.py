@@ -105,7 +105,7 @@ def pair_distance(
     i, i_end, j, j_end = start[a], start[a + 1], start[b], start[b + 1]
     if kind[b] == HALF_SPACE:
         if convex:
-            return above_plane(w, i, i_end, disc[a], j, near) - sizes, False
+            return above_plane(w, i, i_end, disc[a], j, room, near) - sizes, False
         normal = (w[j, 0], w[j, 1], w[j, 2])
         return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
     if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:

@@ -28,6 +28,7 @@ from er3a.geometry.vectors import TURN, signed_angle, wrap_to_pi
 from er3a.kinematics.chain import arm_length
 from er3a.kinematics.closed_form import BOUNDARY_M, SLOTS
 from er3a.kinematics.forward import forward, frames, jacobian
+from er3a.kinematics.self_motions import last_within, place_of_least
 from er3a.kinematics.singularity import SingularityType, determinant_factors
 from er3a.kinematics.wrist_partitioned import solve_slots, wrist_partitioned_arm
 from er3a.numerics.arrays import Reals
@@ -188,7 +189,6 @@ def _in_line(robot: Robot, T: Reals, q: Reals) -> Reals | None:
 
 
 GRID = np.radians(2.0)  # of the free joint, on which its limits are first looked at
-SPLIT, ROUNDS = 16, 10  # an interval is cut into so many parts, so often
 SAME_FAMILY = 1e-6  # rad; next to two singularities families that solve a pose to 1e-9 differ by no more
 SAME_CURVE = SAME_FAMILY * np.array([1, 1, 0.2, 1, 1, 1])  # rounding makes the roots of one elbow differ by no more
 FREE_MOTION = 1e-7  # singular value below which joints move with the tool at rest
@@ -434,13 +434,8 @@ def _curve_families(
         parts = [part for part in parts if inside[part[0]]]
     found: list[Family] = []
     for part in parts:
-        values, best = grid, int(part[costs(q[part]).argmin()])
-        for _ in range(ROUNDS):
-            between = np.linspace(values[max(best - 1, 0)], values[min(best + 1, len(values) - 1)], SPLIT + 1)
-            values = np.unique(np.append(between, values[best]))
-            nearer = members(values)
-            best = int(costs(nearer).argmin())
-        q0 = nearer[best]
+        best = int(part[costs(q[part]).argmin()])
+        q0 = members(np.array([place_of_least(lambda values: costs(members(values)), grid, best)]))[0]
         family = Family(kind, q0, _tangent(robot, q0, joint), np.zeros(2), any_inside, branches, robot, T)
         found.append(replace(family, range=_range(family, grid) if any_inside else np.array([-np.pi, np.pi])))
     return sorted(found, key=lambda family: float(np.linalg.norm(family.q0 - q_ref)))
@@ -490,11 +485,5 @@ def _range(family: Family, grid: Reals) -> Reals:
         if ok.all():
             ends.append(outward[-1] if len(outward) else 0.0)
             continue
-        first = int(ok.argmin())
-        good, bad = (outward[first - 1] if first else 0.0), outward[first]
-        for _ in range(ROUNDS):
-            parts = np.linspace(good, bad, SPLIT + 1)
-            last = int(np.append(within(family.robot, family.members(parts[1:-1])), False).argmin())
-            good, bad = parts[last], parts[last + 1]
-        ends.append(good)
+        ends.append(last_within(family.robot, family.members, outward, ok))
     return np.array(ends)

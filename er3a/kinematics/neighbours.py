@@ -9,17 +9,14 @@ import numpy as np
 import scipy
 
 from er3a.geometry.transforms import rpy_of, transform
-from er3a.geometry.vectors import fibonacci_sphere
 from er3a.kinematics.batch import inverse_batch
 from er3a.numerics.arrays import Flags, Reals
 from er3a.robots.joint_limits import size_of
 from er3a.robots.robot import Robot
 
-DIRECTIONS = 400  # axes about which the tool is turned: one for each 10 deg
-TURN_STEPS = 90  # of half a turn: 2 deg
-HALVINGS = 12  # of such a step: to 0.0005 deg
 RANDOM_ORIENTATIONS = 4000  # a ratio of these is known to 1 %
-COARSE_GRID, FINE_GRID, REFINEMENTS = 25, 9, 5  # points across, at first and when refined, and how often
+TURN_GRID, SHIFT_GRID = 41, 25  # changes across at first: 9 deg, and a twelfth of the arm's reach
+FINE_GRID, REFINEMENTS = 9, 5  # changes across when refined, each time to a quarter, and how often
 
 
 SPARE_TURNS, SPARE_SHIFTS = np.radians([1.0, 2.0, 5.0, 10.0]), np.array([5.0, 10.0, 20.0, 50.0]) / 1000
@@ -36,8 +33,8 @@ Usable = Callable[[Reals], Flags]
 class Neighbours:
     """Poses near a refused one that have a solution within the limits.
 
-    The smallest turn is searched about ``DIRECTIONS`` evenly spread axes, the smallest shift over a grid that spans the
-    arm and is refined around its best point, so both are upper bounds.
+    The smallest turn is searched over a grid of all turns, the smallest shift over one that spans the arm; both grids
+    are refined around their best point, so both are upper bounds.
 
     Attributes
     ----------
@@ -89,106 +86,63 @@ def neighbours(robot: Robot, T: Reals, random: np.random.Generator, usable: Usab
     -------
     found : rad and m; the turn and the shift are upper bounds of the smallest ones
     """
-    turned = np.tile(T, (RANDOM_ORIENTATIONS, 1, 1))
-    turned[:, :3, :3] = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_matrix()
-    turned_to, shifted_to = _least_turn(robot, T, usable), _nearest_position(robot, T, usable)
-    if usable is not None:
-        turned_to = None if turned_to is None else _turned_on(robot, T, turned_to, usable)
-        shifted_to = None if shifted_to is None else _shifted_on(robot, T, shifted_to, usable)
+    random_turns = scipy.spatial.transform.Rotation.random(RANDOM_ORIENTATIONS, rng=random).as_rotvec()
+
+    def turned(turns: Reals) -> Reals:
+        """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
+        poses = np.tile(T, (len(turns), 1, 1))
+        poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix() @ T[:3, :3]
+        return poses
+
+    def shifted(shifts: Reals) -> Reals:
+        """Poses (N, 4, 4) shifted by vectors (N, 3), m."""
+        poses = np.tile(T, (len(shifts), 1, 1))
+        poses[:, :3, 3] += shifts
+        return poses
+
+    half = size_of(robot) + float(np.linalg.norm(robot.last_to_tool[:3, 3]))
+    turn = _least(robot, turned, (np.zeros(3), np.pi, TURN_GRID), usable, SPARE_TURNS)
+    shift = _least(robot, shifted, (robot.base[:3, 3] - T[:3, 3], half, SHIFT_GRID), usable, SPARE_SHIFTS)
+    back = None if turn is None else scipy.spatial.transform.Rotation.from_matrix(turn[:3, :3] @ T[:3, :3].T)
     return Neighbours(
-        orientation_ratio=float(solvable(robot, turned).mean()),
-        least_turn=None if turned_to is None else float(np.linalg.norm(_turn(T, turned_to))),
-        turned_to=None if turned_to is None else rpy_of(turned_to),
-        least_shift=None if shifted_to is None else float(np.linalg.norm(shifted_to - T[:3, 3])),
-        shifted_to=shifted_to,
+        orientation_ratio=float(solvable(robot, turned(random_turns)).mean()),
+        least_turn=None if back is None else float(back.magnitude()),
+        turned_to=None if turn is None else rpy_of(turn),
+        least_shift=None if shift is None else float(np.linalg.norm(shift[:3, 3] - T[:3, 3])),
+        shifted_to=None if shift is None else shift[:3, 3],
     )
 
 
-def _turn(T: Reals, turned_to: Reals) -> Reals:
-    """The rotation vector (3,) from a pose's orientation to another's."""
-    R: Reals = turned_to[:3, :3] @ T[:3, :3].T
-    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(R).as_rotvec(), float)
+def _least(
+    robot: Robot,
+    made: Callable[[Reals], Reals],
+    grid: tuple[Reals, float, int],
+    usable: Usable | None,
+    spare: Reals,
+) -> Reals | None:
+    """The pose (4, 4) made by the smallest change with a usable solution; None if none is found.
 
-
-def _rotated(T: Reals, turns: Reals) -> Reals:
-    """Poses (N, 4, 4) turned by rotation vectors (N, 3)."""
-    poses = np.tile(T, (len(turns), 1, 1))
-    poses[:, :3, :3] = scipy.spatial.transform.Rotation.from_rotvec(turns).as_matrix() @ T[:3, :3]
-    return poses
-
-
-def _shifted(T: Reals, points: Reals) -> Reals:
-    """Poses (N, 4, 4) at other points (N, 3)."""
-    poses = np.tile(T, (len(points), 1, 1))
-    poses[:, :3, 3] = points
-    return poses
-
-
-def _turned_on(robot: Robot, T: Reals, turned_to: Reals, usable: Usable) -> Reals | None:
-    """The pose turned a little further and rounded; None where that is not usable."""
-    turn = _turn(T, turned_to)
-    angle = float(np.linalg.norm(turn))
-    poses = _rotated(T, turn / angle * (angle + SPARE_TURNS)[:, None])
-    poses = transform(poses[:, :3, 3], np.round(rpy_of(poses) / SHOWN_ANGLE) * SHOWN_ANGLE)
-    kept = np.flatnonzero(solvable(robot, poses, usable))
-    return np.asarray(poses[kept[0]]) if len(kept) else None
-
-
-def _shifted_on(robot: Robot, T: Reals, shifted_to: Reals, usable: Usable) -> Reals | None:
-    """The position shifted a little further and rounded; None where that is not usable."""
-    shift = shifted_to - T[:3, 3]
-    points = shifted_to + shift / np.linalg.norm(shift) * SPARE_SHIFTS[:, None]
-    points = np.round(points / SHOWN_LENGTH) * SHOWN_LENGTH
-    kept = np.flatnonzero(solvable(robot, _shifted(T, points), usable))
-    return np.asarray(points[kept[0]]) if len(kept) else None
-
-
-def _least_turn(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
-    """The pose (4, 4) turned by as little as has a usable solution."""
-    axes, angles = fibonacci_sphere(DIRECTIONS, turned_back=True), np.linspace(0, np.pi, TURN_STEPS + 1)[1:]
-    turns = angles[:, None, None] * axes
-    within = solvable(robot, _rotated(T, turns.reshape(-1, 3))).reshape(TURN_STEPS, DIRECTIONS)
-    for step in np.flatnonzero(within.any(axis=1)):
-        about = axes[within[step]]
-        if usable is not None:
-            about = about[solvable(robot, _rotated(T, angles[step] * about), usable)]
-        if len(about):
-            break
-    else:
-        return None
-    high = np.full(len(about), angles[step])
-    low = high - angles[0]
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        ok = solvable(robot, _rotated(T, about * middle[:, None]), usable)
-        low, high = np.where(ok, low, middle), np.where(ok, middle, high)
-    smallest = int(high.argmin())
-    return np.asarray(_rotated(T, (about[smallest] * high[smallest])[None])[0])
-
-
-def _nearest_position(robot: Robot, T: Reals, usable: Usable | None) -> Reals | None:
-    """Position (3,) nearest to that of T with a usable solution in its orientation, on a grid refined step by step."""
-    half = size_of(robot) + np.linalg.norm(robot.last_to_tool[:3, 3])
-    centre, count = robot.base[:3, 3], COARSE_GRID
+    ``grid``: centre (3,), half width and changes across of those that are tried first, rad or m. For advice the pose is
+    the first usable one made by a change that is larger by one of ``spare`` (k,), and rounded.
+    """
+    centre, half, count = grid
     for _ in range(1 + REFINEMENTS):
         ticks = np.linspace(-half, half, count)
-        points = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
-        points = points[solvable(robot, _shifted(T, points))]
-        points = points[np.linalg.norm(points - T[:3, 3], axis=1).argsort(kind="stable")]
-        nearest = _first_usable(robot, T, points, usable)
-        if nearest is None:
+        changes = centre + np.stack(np.meshgrid(ticks, ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+        changes = changes[np.linalg.norm(changes, axis=1).argsort(kind="stable")]
+        parts = (changes[k : k + CHUNK] for k in range(0, len(changes), CHUNK))
+        solved = (part[solvable(robot, made(part), usable)] for part in parts)
+        best = next((part[0] for part in solved if len(part)), None)
+        if best is None:
             return None
-        centre, half, count = nearest, ticks[1] - ticks[0], FINE_GRID
-    return centre
-
-
-def _first_usable(robot: Robot, T: Reals, points: Reals, usable: Usable | None) -> Reals | None:
-    """The first of points (N, 3) with a usable solution; None if there is none."""
+        centre, half, count = best, ticks[1] - ticks[0], FINE_GRID
     if usable is None:
-        return points[0] if len(points) else None
-    for start in range(0, len(points), CHUNK):
-        part = points[start : start + CHUNK]
-        kept = np.flatnonzero(solvable(robot, _shifted(T, part), usable))
-        if len(kept):
-            return np.asarray(part[kept[0]])
-    return None
+        return np.asarray(made(centre[None])[0])
+    size = np.linalg.norm(centre)
+    poses = made(centre / size * (size + spare)[:, None])
+    places, turns = (
+        np.round(x / unit) * unit for x, unit in ((poses[:, :3, 3], SHOWN_LENGTH), (rpy_of(poses), SHOWN_ANGLE))
+    )
+    poses = transform(places, turns)
+    kept = np.flatnonzero(solvable(robot, poses, usable))
+    return np.asarray(poses[kept[0]]) if len(kept) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -192,7 +193,7 @@ def _part(
     def narrowness(t: Reals) -> Reals:
         return -limit_margin(robot, at(t) + max_margin_member[1])
 
-    start = _least(distance, lengths, best[0], curve.closed)
+    start = place_of_least(distance, lengths, best[0], curve.closed)
     q0 = (at(np.array([start])) + best[1])[0]
     own = q_ref
     if np.abs(own - q0).max() < 1e-5 and chain.error(to_rows(robot, own)) < 1e-11:
@@ -200,7 +201,7 @@ def _part(
     shift = q0 - at(np.array([start]))[0]
     step = 1e-4
     direction = (at(np.array([start + step])) - at(np.array([start - step])))[0] / (2 * step)
-    widest = _least(narrowness, lengths, max_margin_member[0], curve.closed)
+    widest = place_of_least(narrowness, lengths, max_margin_member[0], curve.closed)
     room = (at(np.array([widest])) + max_margin_member[1])[0]
     span = np.array([-0.5, 0.5]) * lengths[-1] if curve.closed else np.array([0.0, lengths[-1]]) - start
     motion = SelfMotionCurve(
@@ -227,8 +228,16 @@ def to_rows(robot: Robot, q: Reals) -> Reals:
     return np.asarray(robot.direction * row_values(robot, q) + joint_starts(robot))
 
 
-def _least(cost, lengths: Reals, best: int, closed: bool) -> float:  # type: ignore[no-untyped-def]
-    """The minimum of the cost between the neighbours of the best point, by narrowing."""
+def place_of_least(cost: Callable[[Reals], Reals], lengths: Reals, best: int, closed: bool = False) -> float:
+    """The minimum of a cost along a curve between the neighbours of its best point, by narrowing.
+
+    Parameters
+    ----------
+    cost : of places (k,) along the curve
+    lengths : (m,), places of the curve's points, rising
+    best : number of the point
+    closed : whether the last point is the first
+    """
     low, high = lengths[max(best - 1, 0)], lengths[min(best + 1, len(lengths) - 1)]
     if closed and best == 0:
         low = lengths[-2] - lengths[-1]
@@ -264,11 +273,23 @@ def _range(motion: SelfMotionCurve) -> Reals:
             whole = 0.5 * lap if closed and not turns else reach[-1] if len(reach) else 0.0
             ends.append(side * whole)
             continue
-        first = int(ok.argmin())
-        good, bad = (reach[first - 1] if first else 0.0), reach[first]
-        for _ in range(SPLITS):
-            parts = np.linspace(good, bad, SPLIT + 1)
-            last = int(np.append(within(robot, motion.members(side * parts[1:-1])), False).argmin())
-            good, bad = parts[last], parts[last + 1]
-        ends.append(side * good)
+        ends.append(last_within(robot, motion.members, side * reach, ok))
     return np.array(ends)
+
+
+def last_within(robot: Robot, members: Callable[[Reals], Reals], reach: Reals, ok: Flags) -> float:
+    """How far members from place 0 on stay within the limits, by cutting again and again what holds the end.
+
+    Parameters
+    ----------
+    members : (k, n), rad or m, at places (k,)
+    reach : (m,), places, from 0 on in one sense
+    ok : (m,) bool, whether the members there are within the limits; not all of them
+    """
+    first = int(ok.argmin())
+    good, bad = (float(reach[first - 1]) if first else 0.0), float(reach[first])
+    for _ in range(SPLITS):
+        parts = np.linspace(good, bad, SPLIT + 1)
+        last = int(np.append(within(robot, members(parts[1:-1])), False).argmin())
+        good, bad = float(parts[last]), float(parts[last + 1])
+    return good

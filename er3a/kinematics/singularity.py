@@ -479,20 +479,6 @@ class NearSingular:
         """
         return {"wrist": self.wrist_rad, "elbow": self.elbow_rad, "shoulder": self.shoulder_m}[kind]
 
-    def is_near(self, kind: SingularityType, distance: Reals) -> Flags:
-        """Whether distances from the singular set of one type are below its threshold.
-
-        Parameters
-        ----------
-        kind : wrist, elbow or shoulder
-        distance : (...), rad or m, at least 0
-
-        Returns
-        -------
-        near : (...) bool, False for NaN
-        """
-        return distance < self.of(kind)
-
     def ratios(self, factors: DeterminantFactors) -> Reals:
         """Distances from the three singular sets in parts of their thresholds.
 

@@ -25,7 +25,7 @@ from er3a.numerics.arrays import Flags, Reals, runs
 from er3a.planning.follow import Followed
 from er3a.planning.piecewise import Pieces, PiecewiseMotion, evaluated, interpolated
 from er3a.robots.joint_limits import limit_amounts
-from er3a.robots.robot import Robot
+from er3a.robots.robot import Robot, derived
 from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 ON_SET = 1e-9  # rad or m: this near counts as on the singular set
@@ -241,6 +241,7 @@ class LimitSide:
         return fact("combination_exceeded", joints=joints, factors=factors, side=side, **amounts)
 
 
+@derived
 def limit_sides(robot: Robot) -> list[LimitSide]:
     """Both sides of each limit of a joint and of each limit of a sum of joints.
 
@@ -296,9 +297,11 @@ def limit_intervals(robot: Robot, motion: PiecewiseMotion) -> list[Interval[Find
     -------
     intervals : one per limit, side and stretch, sorted by start (s), then by joint
     """
+    ends = np.stack(motion.bounds(motion.angle))
     found = [
         Interval(start, end, side.cause(most), worst)
         for side in limit_sides(robot)
+        if (side.sign * side.factors * ends).max(axis=0).sum() > side.sign * side.limit
         for start, end, most, worst in Pieces(motion.times, side.of(motion.angle)).above(
             side.sign * side.limit + LIMIT_TOLERANCE
         )
@@ -319,9 +322,10 @@ def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[R
     intervals : sorted by start (s), then by joint; a step of the acceleration exceeds any limit of jerk
     """
     found = []
+    series = motion.velocity if limit.order == 1 else motion.acceleration if limit.order == 2 else motion.jerk
+    size = np.abs(motion.bounds(series)).max(axis=0)
     for j in np.flatnonzero(np.isfinite(limit.most)).tolist():
-        series = motion.velocity if limit.order == 1 else motion.acceleration if limit.order == 2 else motion.jerk
-        for sign in (1.0, -1.0):
+        for sign in (1.0, -1.0) if size[j] > limit.allowed[j] else ():
             stretches = motion.of_joint(series, j, sign).above(limit.allowed[j])
             found += [rate_interval(limit, j, *stretch) for stretch in stretches]
         if limit.order == 3:

@@ -239,6 +239,20 @@ class PiecewiseMotion(ByValue):
         """
         return Pieces(self.times, sign * series[:, :, j])
 
+    def bounds(self, series: Reals) -> tuple[Reals, Reals]:
+        """Bounds of each joint's angle or rate over the whole motion, by the sums of the coefficients' sizes.
+
+        Parameters
+        ----------
+        series : (m, d + 1, n), one of the motion's series, ``jerk`` included
+
+        Returns
+        -------
+        low, high : (n,), in the unit of the series; of gaps nothing
+        """
+        beside = np.abs(series[:, 1:]).sum(axis=1)
+        return np.fmin.reduce(series[:, 0] - beside), np.fmax.reduce(series[:, 0] + beside)
+
     def max_abs(self, series: Reals) -> Reals:
         """Largest size of each joint's angle or rate over the whole motion.
 

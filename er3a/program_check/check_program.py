@@ -42,6 +42,7 @@ from er3a.program_check.program_check_findings import (
     NotFollowedReason,
     gravity,
     level_of,
+    which,
     with_touches_of,
     worst_of,
 )
@@ -331,7 +332,7 @@ def _located(
     ]
     groups: dict[tuple[Place, str, str], list[LocatedFinding]] = defaultdict(list)
     for each in found:
-        groups[each.place, each.finding.code, _which(each.finding)].append(each)
+        groups[each.place, each.finding.code, which(each.finding)].append(each)
     grouped = [_at_worst(same) for same in groups.values()]
     order = {path: i for i, path in enumerate(dict.fromkeys(str(each.place.file) for each in grouped))}
     return tuple(sorted(grouped, key=lambda each: (order[str(each.place.file)], each.place.line, -RANKS[each.level])))
@@ -374,12 +375,6 @@ def _not_set(execution: Execution) -> Iterator[LocatedFinding]:
             kind = "tool" if what.base.own else "base" if what.tool.own else "both"
             yield LocatedFinding("note", fact("frames_from_robot_file", kind=kind), step.place, step.calls)
             return
-
-
-def _which(finding: Finding) -> str:
-    """Key that distinguishes findings of one code at one instruction."""
-    names = ("joint", "joints", "side", "type", "name", "text", "kind", "mass_kg", "reason")
-    return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
 
 
 def _place_of(finding: Finding, top: Place) -> Place:

@@ -1,5 +1,8 @@
 """The way of a motion through joint space, its time, and its faults except collisions.
 
+A way is points of the joints, near to each other. Cubics through them, by the motion's law of time, are polynomials in
+time; :mod:`er3a.planning.motion_faults` judges them as it does every motion.
+
 Durations follow from the program's speeds: from rest to rest at constant acceleration. A controller's own ramps and
 blends decide the true times; these are estimates.
 """
@@ -7,10 +10,11 @@ blends decide the true times; these are estimates.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from er3a.by_value import ByValue
 from er3a.errors import PoseError
@@ -19,14 +23,17 @@ from er3a.geometry.transforms import rotation_angle
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
-from er3a.kinematics.singularity import TYPES, NearSingular, factor_of, factors_where_defined
-from er3a.numerics.arrays import Reals, runs
+from er3a.kinematics.singularity import NearSingular
+from er3a.kinematics.wrist_partitioned import has_branches
+from er3a.numerics.arrays import Reals
 from er3a.planning import motion_faults
-from er3a.planning.timing import JointLimits
+from er3a.planning.piecewise import SAME_TIME, PiecewiseMotion, chebyshev_times, motion_through
+from er3a.planning.profiles import trapezoid
+from er3a.planning.timing import SPLINE_DEGREE, JointLimits, standing
+from er3a.program_check.program_check_findings import gravity, which
 from er3a.programs.instructions import RAMP_OF_A_DURATION, ArmMotion, Rate
 from er3a.programs.solving import WIDE_STEP, joints_along, way_of
 from er3a.robots.robot import Robot
-from er3a.robots.whole_turns import LIMIT_TOLERANCE
 
 TURN_LENGTH = 0.1  # m of the path, as long as which a turn of the tool by 1 rad counts
 POINTS_APART_M, POINTS_APART_RAD = 0.01, 0.05  # of the tool, or of a joint
@@ -36,7 +43,6 @@ SHORTEST_PART = 1e-4  # of a way, in which a joint that moves by more jumps
 NO_WAY = 1e-9  # m or rad
 SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does not matter
 SAME_ARRIVAL = 1e-4  # rad
-OVER_SPEED = 1.001  # ratio; rates are those between points
 FAR_TURN, NEAR_MOVE = math.radians(90.0), 0.05  # of a joint that jumps: it turns so far where the tool moves less
 SPARED = math.radians(10.0)  # the other way round is named where it is shorter by so much
 MOST_JOINTS = 6  # of arms whose joints follow from the tool's path
@@ -62,43 +68,6 @@ class MotionLaw:
         """Time (s) saved by not stopping at one end."""
         return self.duration * self.ramp / 2
 
-    @property
-    def top(self) -> float:
-        """Greatest speed, in ways per s."""
-        return 1 / (self.duration * (1 - self.ramp))
-
-    def speeds(self, share: Reals) -> Reals:
-        """Speeds at places of the way.
-
-        Parameters
-        ----------
-        share : (k,), of the whole way, 0 to 1
-
-        Returns
-        -------
-        speeds : (k,), whole ways per s
-        """
-        ramp = self.ramp * self.duration
-        near = np.minimum(share, 1 - share)
-        return (
-            np.minimum(self.top, np.sqrt(2 * self.top * np.maximum(near, 0.0) / ramp))
-            if ramp > 0
-            else near * 0 + self.top
-        )
-
-    def share_at(self, speed: float) -> float:
-        """Where on the way a speed is reached first.
-
-        Parameters
-        ----------
-        speed : whole ways per s, at most :attr:`top`
-
-        Returns
-        -------
-        share : of the way, by v^2 / (2 a) with the ramp's acceleration a
-        """
-        return speed**2 * self.ramp * self.duration / (2 * self.top)
-
     def times(self, share: Reals) -> Reals:
         """Times at which places of the way are passed.
 
@@ -112,12 +81,13 @@ class MotionLaw:
         """
         share, ramp = np.asarray(share, float), self.ramp * self.duration
         # On a ramp the share grows with the square of the time: share = top t^2 / (2 ramp).
-        rise = self.top * ramp / 2
+        top = 1 / (self.duration * (1 - self.ramp))
+        rise = top * ramp / 2
         early, late = (
-            np.sqrt(2 * ramp * np.clip(share, 0, None) / self.top),
-            np.sqrt(2 * ramp * np.clip(1 - share, 0, None) / self.top),
+            np.sqrt(2 * ramp * np.clip(share, 0, None) / top),
+            np.sqrt(2 * ramp * np.clip(1 - share, 0, None) / top),
         )
-        even = ramp + (share - rise) / self.top
+        even = ramp + (share - rise) / top
         return np.where(share < rise, early, np.where(share > 1 - rise, self.duration - late, even))
 
 
@@ -356,26 +326,71 @@ def _parts(length: float, turned: float) -> int:
     return int(np.clip(np.ceil(max(length / POINTS_APART_M, turned / POINTS_APART_RAD)), MIN_PARTS, MAX_PARTS))
 
 
-Shares = dict[Finding, float]
-"""Findings with the share of the way at which each begins."""
+Moments = dict[Finding, float]
+"""Findings with the time (s) of the motion at which each begins."""
 
 
-def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> Shares:
-    """Limits, speeds, reach and configuration along a way.
+def path_findings(path: MotionPath, rules: CheckRules, target: Reals | None) -> Moments:
+    """Limits, speeds, reach, configuration, and of lines and arcs singular poses.
 
     Parameters
     ----------
     target : T_world_tool (4, 4), m, of a line's or arc's end; None for a joint move
     """
-    found: Shares = {}
+    found: Moments = {}
+    curve = _curve(path)
     if path.ahead is not None and target is not None:
-        found[_stopped(path, path.ahead, target)] = float(path.share[-1])  # where the arm still is
-    found |= limit_findings(path.arm, path.share, path.q)
-    if path.ahead is None and len(path.share) > 1:  # towards the end of reach rates grow without bound
-        found |= _too_fast(path, rules.limits)
-        if not rules.limits.acceleration_assumed:
-            found |= _accelerates(path, rules.limits.acceleration)
+        found[_stopped(path, path.ahead, target)] = curve.duration  # where the arm still is
+    faults = motion_faults.limit_intervals(path.arm, curve)
+    if path.ahead is None:  # towards the end of reach rates grow without bound
+        limits = rules.limits
+        for limit in limits.rates[: 1 if limits.acceleration_assumed else 2]:
+            faults += motion_faults.rate_intervals(curve, limit)
+    found |= begun(faults)
+    if path.of_tool and has_branches(path.arm):
+        for event in motion_faults.singular_events(path.arm, curve, rules.near):
+            found[_singular(path, event)] = event.t
     return found
+
+
+def _curve(path: MotionPath) -> PiecewiseMotion:
+    """The motion in time: cubics in the share of the way, by its law."""
+    law, share = path.law, path.share
+    if len(share) == 1:
+        return standing(path.q[0], 0.0).curve
+    times = law.times(share)
+    ramps = law.duration * np.array([law.ramp, 1 - law.ramp])
+    times = np.union1d(times, ramps[ramps < times[-1]])
+    times = times[np.diff(times, prepend=-1.0) > SAME_TIME * times[-1]]
+    nodes = chebyshev_times(times[:-1], times[1:], SPLINE_DEGREE)[0]
+    progress = trapezoid(nodes, law.duration, law.ramp)[0]
+    spline = scipy.interpolate.make_interp_spline(share, path.q, k=min(3, len(share) - 1))
+    return motion_through(spline(progress), times)
+
+
+def begun(faults: Iterable[motion_faults.Interval[Finding]]) -> Moments:
+    """Each fault once, from where it begins first, as it is where it is worst.
+
+    Parameters
+    ----------
+    faults : in the order of time
+    """
+    found: dict[str, motion_faults.Interval[Finding]] = {}
+    for part in faults:
+        first = found.setdefault(part.cause.code + which(part.cause), part)
+        worst = max(first.cause, part.cause, key=gravity)
+        found[part.cause.code + which(part.cause)] = replace(first, cause=worst)
+    return {part.cause: part.start for part in found.values()}
+
+
+def _singular(path: MotionPath, event: motion_faults.SingularEvent) -> Finding:
+    """That a line or arc meets a singular pose, with joint speeds that stay finite, or passes one."""
+    at_mm = path.along_mm(float(trapezoid(np.array(event.t), path.law.duration, path.law.ramp)[0]))
+    if event.crossing:
+        return fact("meets_singularity", type=event.type, at_mm=at_mm)
+    moves = event.type == "shoulder"
+    distance = turned_or_moved(event.distance * (1000.0 if moves else float(np.degrees(1.0))), moves)
+    return fact("passes_singularity", type=event.type, at_mm=at_mm, distance=distance)
 
 
 def _stopped(path: MotionPath, ahead: Reals, target: Reals) -> Finding:
@@ -393,79 +408,6 @@ def _stopped(path: MotionPath, ahead: Reals, target: Reals) -> Finding:
     joint = int(np.abs(other).argmax())
     jump = Amount(float(np.degrees(other[joint])), "deg")
     return fact("configuration_ends", at_mm=at_mm, joint=joint + 1, jump=jump)
-
-
-def limit_findings(arm: Robot, share: Reals, q: Reals) -> Shares:
-    """Joints, and sums of joints, that are beyond a limit.
-
-    Parameters
-    ----------
-    share : (N,), of the way; q : (N, n), rad or m, there
-
-    Returns
-    -------
-    findings : one for each side of a limit that is exceeded by more than ``LIMIT_TOLERANCE``, as it is where it is so
-        most, with the share from which it is so
-    """
-    found: Shares = {}
-    inside = (q >= arm.lower - LIMIT_TOLERANCE).all() and (q <= arm.upper + LIMIT_TOLERANCE).all()
-    for side in motion_faults.limit_sides(arm) if arm.combined or not inside else ():
-        over = np.asarray(side.of(q), float) - side.sign * side.limit
-        beyond = np.flatnonzero(over > LIMIT_TOLERANCE)
-        if beyond.size:
-            cause = side.cause(float(np.asarray(side.of(q)).max()))
-            found[cause] = _crossing(share, over, beyond[0])
-    return found
-
-
-def _crossing(share: Reals, values: Reals, first: int) -> float:
-    """The share at which values (N,) become positive that are so at number ``first``, straight between points."""
-    if first == 0:
-        return float(share[0])
-    part = values[first - 1 : first + 1]
-    return float(share[first - 1] + (share[first] - share[first - 1]) * -part[0] / (part[1] - part[0]))
-
-
-def _too_fast(path: MotionPath, limits: JointLimits) -> Shares:
-    """Joints that are faster than they can be, known or assumed, each with the worst it comes to."""
-    slopes = np.abs(np.diff(path.q, axis=0)) / np.diff(path.share)[:, None]
-    speeds = slopes * np.maximum(path.law.speeds(path.share[:-1]), path.law.speeds(path.share[1:]))[:, None]
-    if path.law.ramp > 0:  # the fastest point of a part may lie within it
-        middle = path.law.speeds((path.share[:-1] + path.share[1:]) / 2)
-        speeds = np.maximum(speeds, slopes * middle[:, None])
-
-    def begins(j: int, first: int) -> float:
-        comes_to = path.law.share_at(float(limits.speed[j]) / float(slopes[first, j]))
-        return float(np.clip(comes_to, path.share[first], path.share[first + 1]))
-
-    return _beyond_rates(path, 1, speeds, limits.speed, begins)
-
-
-def _beyond_rates(
-    path: MotionPath, order: int, needed: Reals, able: Reals, begins: Callable[[int, int], float]
-) -> Shares:
-    """Joints that need more of a rate (parts, n) than they have (n,), each with the worst it comes to.
-
-    ``begins``: at which share of the way a joint does, by the number of the first part in which it does.
-    """
-    found: Shares = {}
-    for j in np.flatnonzero(needed.max(axis=0) > OVER_SPEED * able).tolist():
-        first = int(np.argmax(needed[:, j] > OVER_SPEED * able[j]))
-        worst, most = np.degrees(needed[:, j].max()), np.degrees(able[j])
-        assumed = order == 1 and not np.isfinite(path.arm.speed[j])
-        found[motion_faults.rate_fault(order, j + 1, float(worst), float(most), False, assumed)] = begins(j, first)
-    return found
-
-
-def _accelerates(path: MotionPath, able: Reals) -> Shares:
-    """Joints that have to accelerate more than they can (n,), in the middle of each part of the way."""
-    share, law = path.share, path.law
-    slopes, middle = np.diff(path.q, axis=0) / np.diff(share)[:, None], (share[:-1] + share[1:]) / 2
-    bends = np.gradient(slopes, middle, axis=0) if len(middle) > 1 else np.zeros_like(slopes)
-    ramp, speeds = law.ramp * law.duration, law.speeds(middle)
-    rises = np.where(speeds < law.top, law.top / ramp if ramp > 0 else 0.0, 0.0) * np.sign(0.5 - middle)
-    needed = np.abs(bends * speeds[:, None] ** 2 + slopes * rises[:, None])
-    return _beyond_rates(path, 2, needed, able, lambda j, first: float(share[first]))
 
 
 def far_turns(path: MotionPath) -> list[Finding]:
@@ -500,36 +442,6 @@ def far_turns(path: MotionPath) -> list[Finding]:
                     nearest_deg=float(np.degrees(nearer)),
                 )
             )
-    return found
-
-
-def singular_findings(path: MotionPath, near: NearSingular) -> Shares:
-    """Where a line or arc meets a singular pose, or passes close to one.
-
-    Parameters
-    ----------
-    near : distances below which a pose is near-singular
-
-    Returns
-    -------
-    findings : with the share of the way of each. The pose is met, with joint speeds that stay finite, where the factor
-        changes its sign from one point to the next; else it is passed, at a distance in deg, or in mm for the shoulder.
-    """
-    factors = factors_where_defined(path.arm, path.q)
-    found: Shares = {}
-    for kind in TYPES:
-        values = np.asarray(factor_of(factors, kind), float)
-        if not np.isfinite(values).any():
-            continue
-        size = np.abs(values)
-        for a, b in runs(near.is_near(kind, size)):
-            at = a + int(size[a:b].argmin())
-            share, moves = float(path.share[at]), kind == "shoulder"
-            distance = turned_or_moved(float(size[at]) * (1000.0 if moves else float(np.degrees(1.0))), moves)
-            if a < at + 1 < len(values) and values[max(at - 1, 0)] * values[at + 1] < 0:
-                found[fact("meets_singularity", type=kind, at_mm=path.along_mm(share))] = share
-            else:
-                found[fact("passes_singularity", type=kind, at_mm=path.along_mm(share), distance=distance)] = share
     return found
 
 

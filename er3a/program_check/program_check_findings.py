@@ -113,6 +113,17 @@ def gravity(finding: Finding) -> float:
     return max(abs(float(size.value if isinstance(size, Amount) else size or 0.0)) for size in sizes)
 
 
+def which(finding: Finding) -> str:
+    """Key that distinguishes findings of one code at one instruction.
+
+    Parameters
+    ----------
+    finding : of any kind
+    """
+    names = ("joint", "joints", "side", "type", "name", "text", "kind", "mass_kg", "reason")
+    return " ".join(f"{getattr(finding, name)}" for name in names if hasattr(finding, name))
+
+
 def worst_of(levels: Iterable[Level]) -> Level:
     """The most severe of levels.
 

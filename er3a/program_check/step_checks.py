@@ -30,20 +30,21 @@ from er3a.kinematics.chain import arm_length
 from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.numerics.arrays import Reals
+from er3a.planning.motion_faults import limit_intervals
+from er3a.planning.timing import standing
 from er3a.program_check import program_check_findings as found_in
 from er3a.program_check.motion_checks import (
     ASSUMED_JOINT_SHARE,
     ASSUMED_TOOL_SPEED,
     CheckRules,
+    Moments,
     MotionPath,
-    Shares,
     arrives_otherwise,
+    begun,
     far_turns,
     is_given,
     joint_path,
-    limit_findings,
     path_findings,
-    singular_findings,
     tool_path,
 )
 from er3a.program_check.program_check_findings import Level
@@ -97,17 +98,15 @@ class CheckedMotion(ByValue):
         for each in findings:
             self.findings.setdefault(each, None)
 
-    def add_on_way(self, found: Shares) -> None:
+    def add_on_way(self, found: Moments) -> None:
         """Add findings that begin somewhere on the way.
 
         Parameters
         ----------
-        found : findings with the share of the way (0 to 1) at which each begins; kept with the time in s. Nothing is
-            kept of a motion without a way.
+        found : findings with the time (s) of the motion at which each begins
         """
-        if self.path is not None:
-            for each, share in found.items():
-                self.findings.setdefault(each, float(self.path.law.times(np.array(share))))
+        for each, moment in found.items():
+            self.findings.setdefault(each, moment)
 
     def level_of(self, finding: Finding) -> Level:
         """How severe one of the motion's findings is.
@@ -192,7 +191,8 @@ class Judge:
         if goal is None:
             return
         if checked.start is None:
-            checked.add(fact("way_not_known"), *limit_findings(checked.arm, np.zeros(1), goal[None]))
+            limits = limit_intervals(checked.arm, standing(goal, 0.0).curve)
+            checked.add(fact("way_not_known"), *begun(limits))
             checked.end = goal
             return
         checked.path = joint_path(checked.arm, checked.motion, checked.start, goal, self.rules)
@@ -234,7 +234,6 @@ class Judge:
             return
         checked.path, checked.end = found, found.end
         checked.add_on_way(path_findings(found, self.rules, end))
-        checked.add_on_way(singular_findings(found, self.rules.near))
         if given is not None and (other := arrives_otherwise(found, given)) is not None:
             checked.add(other)
         branch = target.branch if isinstance(target, PoseTarget) else None
@@ -404,9 +403,9 @@ class Obstacles:
                 clearance_mm=1000 * checked.clearance,
                 margin_mm=1000 * self.assumed_margin,
             )
-            checked.add_on_way({near: float(share[nearest])})
+            checked.add_on_way({near: float(checked.path.law.times(share[nearest]))})
 
-    def _touching(self, path: MotionPath, share: Reals, rows: NDArray[np.intp]) -> Shares:
+    def _touching(self, path: MotionPath, share: Reals, rows: NDArray[np.intp]) -> Moments:
         """What touches at points of a way, of which ``rows`` do: from the first contact to the last, evenly."""
         clear, first = share[max(int(rows[0]) - 1, 0)], share[int(rows[0])]
         for _ in range(HALVINGS):
@@ -434,7 +433,7 @@ class Obstacles:
         given = any(is_one(each.pair, "carried_and_solid") for each in touches)  # by the scene, not the arm
         assumed = arm_shapes(self.robot).assumed and not given
         hit = fact("motion_collides", touches=(), assumed=assumed)
-        return {found_in.with_touches_of(hit, [hit.but(touches=tuple(touches))]): float(first)}
+        return {found_in.with_touches_of(hit, [hit.but(touches=tuple(touches))]): float(path.law.times(first))}
 
     def corner(self, one: CheckedMotion, other: CheckedMotion) -> None:
         """Find what the corner between two motions touches that a zone rounds; what is found is added to the first.

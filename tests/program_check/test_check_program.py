@@ -19,6 +19,7 @@ from er3a.kinematics.forward import forward
 from er3a.kinematics.inverse import inverse
 from er3a.kinematics.solutions import branch_labels
 from er3a.planning.commands import CommandSource, build
+from er3a.planning.timing import JointLimits
 from er3a.program_check.check_program import CheckOptions, check_program, parts_of
 from er3a.programs.instructions import numbers_of
 from er3a.programs.languages import read_program
@@ -176,6 +177,39 @@ def test_a_line_keeps_the_tool_on_its_way(tmp_path):
     assert np.abs(T[:3, 3] + along[:, None] * (end[:3, 3] - T[:3, 3]) - points).max() < 1e-8
     assert along[0] == pytest.approx(0, abs=1e-8)
     assert along[-1] == pytest.approx(1, abs=1e-6)
+
+
+def test_rates_of_a_line_are_those_of_its_way(tmp_path):
+    """Against differences of joints that are solved on the line at the times of its trapezoid, by its own formula."""
+    start = np.radians([10.0, -20.0, -15.0, 20.0, -60.0, 30.0])
+    T = forward(ROBOT, start)
+    way = np.array([0.05, 0.3, -0.15])
+    limits = JointLimits(np.full(6, 1e-3), np.full(6, 1e-3), acceleration_assumed=False)
+    words = ", ".join(f"{key} {1000 * value:.6f}" for key, value in zip("XYZ", T[:3, 3] + way))
+    check = checked(f"$VEL.CP=1.0\n$ACC.CP=4.0\nLIN {{{words}}}", tmp_path, joint_limits=limits, start=start)
+    speed, acceleration, length = 1.0, 4.0, np.linalg.norm(way)
+    ramp, step = speed / acceleration, 2e-4
+    duration = length / speed + ramp
+    t = np.arange(0, duration, step)
+    ahead = np.minimum(t, duration - t)
+    done = np.where(ahead < ramp, acceleration * ahead**2 / 2, speed * (ahead - ramp / 2))
+    share = np.where(t < duration / 2, done, length - done) / length
+    poses = np.tile(T, (len(t), 1, 1))
+    poses[:, :3, 3] += share[:, None] * way
+    q = [start]
+    for pose in poses:
+        rows = inverse(ROBOT, pose, q[-1]).q
+        q.append(rows[np.abs(rows - q[-1]).max(axis=1).argmin()])
+    velocity = np.abs(np.diff(q[1:], axis=0)).max(axis=0) / step
+    bend = np.abs(np.diff(q[1:], 2, axis=0)) / step**2
+    smooth = (np.abs(t[1:-1] - ramp) > 2 * step) & (np.abs(t[1:-1] - duration + ramp) > 2 * step)
+    found = {
+        (each.finding.code, each.finding.joint): each.finding for each in check.findings if "oo_" in each.finding.code
+    }
+    for joint in range(1, 7):
+        for code, most in (("too_fast", velocity), ("acceleration_too_great", bend[smooth].max(axis=0))):
+            needed = np.radians(found[code, joint].needed.value)
+            assert needed == pytest.approx(most[joint - 1], rel=0.01)
 
 
 def test_the_branch_of_joint_angles_is_that_of_the_inverse():

@@ -318,9 +318,7 @@ class ParallelAxes(ChainSolver):
         marked : (N,), where branches meet, so that rounding may have lost both
         unsolved : nothing is said of empty slots
         """
-        q, marked = np.empty((len(T), self.slots, 6)), np.empty(len(T), dtype=bool)
-        solve_parallel_blocks(self.arm.constants, T, 0.0, q, marked)
-        return q, marked, None
+        return *solve_parallel_blocks(self.arm.constants, T, 0.0), None
 
     def seeds(self, T: Reals) -> list[Reals]:
         """Two members of each range of each four-bar, with both elbows.

@@ -15,7 +15,6 @@ from er3a.geometry.vectors import TURN, wrap_to_pi
 from er3a.kinematics.chain import size_of
 from er3a.kinematics.classes.arm_angle import about_z
 from er3a.kinematics.classes.parallel_axes import (
-    SLOTS,
     ParallelConstants,
     ThreeParallel,
     polish_rows,
@@ -116,8 +115,7 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
         :func:`four_bars` may have a family, of whose each range and elbow the middle is a row
     """
     T = np.ascontiguousarray(T, dtype=float)
-    q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
-    solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
+    q, marked = solve_parallel_blocks(arm.constants, T, 0.0)
     if len(left := np.flatnonzero(marked)):
         q[left] = _careful_rows(arm, T[left], True)
         for n in left:
@@ -127,8 +125,7 @@ def solve_three_parallel(arm: ThreeParallel, T: Reals) -> tuple[Reals, Flags]:
 
 def _careful_rows(arm: ThreeParallel, T: Reals, once: bool) -> Reals:
     """Rows (N, 8, 6) of poses near singular ones, polished as :func:`polish_rows` does."""
-    rows = np.empty((len(T), SLOTS, 6))
-    solve_parallel_blocks(arm.constants, T, arm.constants.near_m, rows, np.empty(len(T), dtype=bool))
+    rows = solve_parallel_blocks(arm.constants, T, arm.constants.near_m)[0]
     polish_rows(arm.links, size_of(arm.links), T, rows, once)
     return rows
 
@@ -149,8 +146,7 @@ def solve_near_reference(arm: ThreeParallel, T: Reals, x_ref: Reals) -> tuple[Re
     gap : (N, 8), m, by how much W or axis 4 are out of reach in slots without solution, 0 in others
     """
     T = np.ascontiguousarray(T, dtype=float)
-    q, marked = np.empty((len(T), SLOTS, 6)), np.empty(len(T), dtype=bool)
-    solve_parallel_blocks(arm.constants, T, 0.0, q, marked)
+    q, marked = solve_parallel_blocks(arm.constants, T, 0.0)
     for n in np.flatnonzero(marked):
         q[n] = _careful_rows(arm, T[n : n + 1], False)[0]
         phi = turn_of_three(arm, x_ref[n])

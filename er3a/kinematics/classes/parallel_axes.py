@@ -159,7 +159,7 @@ def _constants(links: Reals, axes: Reals, points: Reals, wrist: Reals) -> Parall
 
 
 @kernel
-def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals, marked: Flags) -> None:
+def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float) -> tuple[Reals, Flags]:
     """Solve poses in closed form, block by block [1]_. Kernel.
 
     Parameters
@@ -167,9 +167,13 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
     k : constants of the arm
     T : (N, 4, 4), m
     slack : m, roots that miss by less are taken as met
-    q : (N, 8, 6), filled, rad, NaN where a slot has no solution
-    marked : (N,), filled with where branches meet, for the careful solver
+
+    Returns
+    -------
+    q : (N, 8, 6), rad, NaN where a slot has no solution
+    marked : (N,), where branches meet, for the careful solver
     """
+    q, marked = np.empty((T.shape[0], SLOTS, 6)), np.empty(T.shape[0], np.bool_)
     pose, side, out = np.empty(_POSE_ROWS * BLOCK), np.empty(12 * BLOCK), np.empty(13 * BLOCK)
     turn = np.empty(7 * BLOCK)
     for start in range(0, T.shape[0], BLOCK):
@@ -187,6 +191,7 @@ def solve_parallel_blocks(k: ParallelConstants, T: Reals, slack: float, q: Reals
                         q[start + i, slot + 2, j] = out[(6 + j) * BLOCK + i]
         for i in range(size):
             marked[start + i] = pose[_MARK * BLOCK + i] > 0.0
+    return q, marked
 
 
 @inner_kernel

@@ -74,16 +74,6 @@ RULE_NAMES = words(
         "mix": "mix",
     }
 )
-RULE_TITLES = words(
-    {
-        "nearest": "smallest maximum joint motion",
-        "weighted": "least joint moves, weighted by how far each joint swings the tool",
-        "time": "least time at the joint speeds",
-        "manipulability": "farthest from singularities (manipulability)",
-        "limits": "farthest from the joint limits",
-        "clearance": "farthest from obstacles and from itself",
-    }
-)
 
 
 TEXTS = texts(
