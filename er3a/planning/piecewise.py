@@ -52,8 +52,7 @@ class Pieces:
     @cached_property
     def range(self) -> tuple[Reals, Reals]:
         """Bounds (m,) from below and above on each piece, by the sum of its coefficients' sizes."""
-        beside = np.abs(self.series[:, 1:]).sum(axis=1)
-        return self.series[:, 0] - beside, self.series[:, 0] + beside
+        return _range_of(self.series)
 
     def nodes(self, i: int) -> tuple[Reals, Reals]:
         """Points between which one piece is monotone.
@@ -250,8 +249,8 @@ class PiecewiseMotion(ByValue):
         -------
         low, high : (n,), in the unit of the series; of gaps nothing
         """
-        beside = np.abs(series[:, 1:]).sum(axis=1)
-        return np.fmin.reduce(series[:, 0] - beside), np.fmax.reduce(series[:, 0] + beside)
+        low, high = _range_of(series)
+        return np.fmin.reduce(low), np.fmax.reduce(high)
 
     def max_abs(self, series: Reals) -> Reals:
         """Largest size of each joint's angle or rate over the whole motion.
@@ -401,6 +400,12 @@ def turning_points(series: Reals) -> Reals:
     roots = chebyshev.chebroots(slope)
     real: Reals = np.sort(roots[np.abs(roots.imag) < NEARLY_REAL].real)
     return real[(real > -1) & (real < 1)]
+
+
+def _range_of(series: Reals) -> tuple[Reals, Reals]:
+    """Bounds (m, ...) of series (m, d + 1, ...) on each piece, by the sums of their coefficients' sizes."""
+    most = np.abs(series[:, 1:]).sum(axis=1)
+    return series[:, 0] - most, series[:, 0] + most
 
 
 def _max_between(values: Reals, first: Integers, last: Integers) -> Reals:
