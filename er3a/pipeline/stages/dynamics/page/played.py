@@ -6,11 +6,14 @@ import numpy as np
 
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of, fixed, number
-from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion, at_rest
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, DynamicsSummary, HoldingTorque, JointLoad
+from er3a.pipeline.viewing.drawn import poses_at
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
+DROP_M = 0.2  # length of the line that stands for a weight
 FELT = 0.01  # of the greatest peak: what is less is no event
 
 
@@ -36,13 +39,33 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
             tr(
                 "J{joint} holds {torque} at most.",
                 joint=each.joint,
-                torque=with_unit(number(abs(each.torque), 3), each.unit),
+                torque=with_unit(within(abs(each.torque), each.tolerance), each.unit),
             ),
             q=meant(robot, np.array(each.q)),
             loads=np.where(np.arange(robot.joints) == each.joint - 1, abs(each.torque), np.tile(np.nan, (2, 1))),
+            marks=_weight(robot, results.summary, each),
         )
         for each in results.summary.holding
     ]
+
+
+def _weight(robot: Robot, summary: DynamicsSummary, held: HoldingTorque) -> list[Mark]:
+    """The weight that a joint with a level axis holds, and its lever: level, from the axis to above or below it."""
+    poses = poses_at(robot, meant(robot, np.array(held.q)))
+    axis, at = poses[held.joint, :3, 2], poses[held.joint, :3, 3]
+    moved = (
+        [each for each in summary.masses.links if each.link >= held.joint and each.mass_kg] if summary.masses else []
+    )
+    kg = np.array([each.mass_kg for each in moved])
+    if not len(kg) or abs(axis[2]) > LEVEL or summary.masses.load_kg:
+        return []
+    places = np.array([poses[each.link] @ [*(value / 1000 for value in each.centre_mm), 1.0] for each in moved])
+    centre = kg @ places[:, :3] / kg.sum()
+    lever = (centre - at) * [1, 1, 0]
+    lever -= lever @ axis * axis
+    end, down = at + lever, np.array([0, 0, DROP_M])
+    shown = ((at, end, fixed(1000 * np.linalg.norm(lever), 0), "mm"), (end, end - down, number(kg.sum(), 3), "kg"))
+    return [Mark(0.0, 1.0, tuple(start), tuple(to), with_unit(text, unit)) for start, to, text, unit in shown]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
@@ -156,7 +156,10 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order]
+    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
+    if idle := order[len(rows) :]:
+        names = joined((f"J{motor.joint}" for motor in idle), ", ")
+        rows.append(ListRow("none", names, _sized(0.0, idle[0]), "#motors"))
     still = [_held_row(motor, longest) for motor in order if motor.holding >= LEAST]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
@@ -165,6 +168,9 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         rest,
         [payload, (power, tr("greatest power of a joint"))],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
+        None
+        if limited
+        else Fix(tr("give the motors' peak torques in the robot's file, under drives."), "#motors", False),
     )
 
 
