@@ -168,9 +168,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         rest,
         [payload, (power, tr("greatest power of a joint"))],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
-        None
-        if limited
-        else Fix(tr("give the motors' peak torques in the robot's file, under drives."), "#motors", False),
+        None if limited else Fix(tr("give the motors' peak torques in the robot's file."), "#motors", False),
     )
 
 
