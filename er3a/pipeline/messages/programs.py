@@ -139,7 +139,7 @@ TEXTS = texts(
         "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
-        "zone_too_large": "zone {zone_mm:.1f} mm, motion only {motion_mm:.1f} mm",
+        "zone_too_large": "zone {zone_mm:.1f} > motion {motion_mm:.1f} mm",
         "target_out_of_reach": "target out of reach: {reasons:; }",
         "way_out_of_reach": (
             "out of reach[ at its start{at_start:?}][ after {at_mm:.1f} mm{at_start:!}]: {reasons:; }"
