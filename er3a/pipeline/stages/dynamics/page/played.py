@@ -14,7 +14,7 @@ from er3a.robots.robot import Robot
 
 MM = 1000.0
 LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
-DROP_M = 0.2  # length of the line that stands for a weight
+DROP_M = 0.2  # length of a line drawn for a weight
 FELT = 0.01  # of the greatest peak: what is less is no event
 
 
@@ -61,7 +61,7 @@ def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> lis
     centre = kg @ [(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM for each in moved] / kg.sum()
     lever = (centre - at - (centre - at) @ axis * axis) * [1, 1, 0]
     end = tuple(at + lever)
-    far, heavy = with_unit(fixed(MM * np.linalg.norm(lever), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
+    far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
     return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, (*end[:2], end[2] - DROP_M), heavy)]
 
 

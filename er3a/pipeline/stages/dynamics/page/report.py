@@ -35,11 +35,6 @@ KEY: dict[str, Any] = {
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
-def joint_colour(joint: int) -> str:
-    """The colour of a joint (from 0)."""
-    return JOINTS[joint % len(JOINTS)]
-
-
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
@@ -47,7 +42,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
-        colour = joint_colour(j)
+        colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
@@ -160,7 +155,11 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     if idle := order[len(rows) :]:
         names = joined((f"J{motor.joint}" for motor in idle), ", ")
         rows.append(ListRow("none", names, _sized(0.0, idle[0]), "#motors"))
-    still = [_held_row(motor, longest) for motor in order if motor.holding >= LEAST]
+    still = [
+        ListRow("none", name, _sized(each.holding, each), "#rest", (name, 0.0), 1.0, _filled(each.holding / longest))
+        for each in order
+        if each.holding >= LEAST and (name := holding_name(each.joint))
+    ]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
@@ -185,14 +184,6 @@ def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> List
     note = joined([_sized(motor.peak, motor), limit or moment[0]], ", ")
     full = motor.peak_limit or most or 1.0
     return ListRow(_mark(motor), f"J{motor.joint}", note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
-
-
-def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
-    """What a joint holds in its worst pose, which the player shows."""
-    play = holding_name(motor.joint), 0.0
-    return ListRow(
-        "none", play[0], _sized(motor.holding, motor), "#rest", play, 1.0, _filled(motor.holding / (most or 1.0))
-    )
 
 
 def _filled(share: float) -> list[Part]:
