@@ -38,7 +38,7 @@ STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.9, sharex=True)
+    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.2, sharex=True)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
@@ -60,7 +60,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
     power.set_xlabel(axis_label(rows, "t_s"))
