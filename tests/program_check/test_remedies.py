@@ -11,7 +11,8 @@ import pytest
 from er3a.files.robot_library import load_robot
 from er3a.files.scene_file import load_scene
 from er3a.finding import fact, is_one
-from er3a.pipeline.messages.programs import ADVISED, NOT_FOLLOWED, REMEDIES, remedy
+from er3a.pipeline.messages.programs import ADVISED, NEARER, NOT_FOLLOWED, REMEDIES, remedies, remedy
+from er3a.pipeline.stages.programs.model import FindingAt
 from er3a.program_check.check_program import CheckOptions, check_program
 from er3a.program_check.program_check_findings import NOTES
 from er3a.programs.execution import RunLimits
@@ -217,3 +218,13 @@ def test_a_program_that_is_mended_as_advised_passes(tmp_path, code):
 def test_each_reason_why_something_is_not_followed_that_has_a_remedy_is_mended():
     asked = {f"not_followed.{reason}" for reason in NOT_FOLLOWED} - {"not_followed.too_far"}
     assert asked <= MENDED.keys()
+
+
+@pytest.mark.parametrize(("times", "drifts"), [(3, False), (5, True), (0, False)])
+def test_what_is_out_of_reach_in_later_rounds_alone_is_no_target_to_be_moved(times, drifts):
+    """A line that was carried out more often than it was out of reach is in a loop that drifts."""
+    found = [FindingAt("a.src", 10, "fail", 1, fact("way_out_of_reach", at_mm=0.2, reasons=()))]
+    found.append(FindingAt("a.src", 10, "fail", 2, fact("target_out_of_reach", reasons=())))
+    advised = remedies(found, times)
+    assert len(advised) == 1
+    assert (advised != [NEARER]) == drifts

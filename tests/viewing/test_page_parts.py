@@ -84,6 +84,7 @@ def test_a_box_that_may_be_placed_is_named_where_nothing_recommends_against_it()
     [
         ("pass", 0, "pass", "pass"),
         ("pass", 7, "caution", "pass as_meant"),
+        ("pass", 7, "unsettled", "caution"),
         ("caution", 7, "pass", "caution"),
         ("pass", 7, "fail", "no_verdict"),
         ("not_computed", 0, "fail", "not_computed"),

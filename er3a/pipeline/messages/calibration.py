@@ -83,9 +83,8 @@ def lines_of(found: Calibration, fitted: Sequence[Measurement] = (), others: Seq
     ]
     terms = found.beyond.terms if found.beyond else found.ratios
     if terms:
-        lines.append(
-            f"errors of joints beyond the table: {', '.join(map(term_name, terms))}; --html and --json list all"
-        )
+        named = ", ".join(f"J{term.joint} {term_kind(term)}" for term in terms)
+        lines.append(f"errors of joints beyond the table: {named}; --html and --json list all")
     if found.scatter > MUCH_SCATTER:
         lines.append("warning: residuals exceed the stated standard deviations; errors may exceed the intervals")
     if found.deviation_mm is None and found.scatter < LITTLE_SCATTER:
@@ -234,11 +233,6 @@ def file_text(found: Calibration) -> str | None:
         table=found.left_out.mean_mm,
         model=found.beyond.left_out.mean_mm,
     )
-
-
-def term_name(term: TriedTerm | TermEstimate) -> str:
-    """Such as J2 once a turn."""
-    return f"J{term.joint} {term_kind(term)}"
 
 
 def term_kind(term: TriedTerm | TermEstimate) -> str:

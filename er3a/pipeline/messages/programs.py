@@ -62,6 +62,9 @@ REASONS: dict[NotFollowedReason, str] = words(
     }
 )
 NEARER = N_("Move the target nearer to the arm, or tilt the tool towards it.")
+LATER = N_("Only later passes of this line are out of reach: end the loop before them, or set its target anew.")
+OUT_OF_REACH = ("target_out_of_reach", "way_out_of_reach")
+AT_START_MM = 0.5  # of a way: what ends within that is out of reach from its start
 OTHER_SOLUTION = N_(
     "Correct the target's joint values; if it is given as a pose, give it another orientation or place."
 )
@@ -69,8 +72,7 @@ FRAMES = N_("Map the name to a frame under frames in the file that lists the pro
 REMEDIES: dict[str, str] = words(
     {
         "combination_exceeded": OTHER_SOLUTION,
-        "target_out_of_reach": NEARER,
-        "way_out_of_reach": NEARER,
+        **dict.fromkeys(OUT_OF_REACH, NEARER),
         "configuration_ends": "End the line before that point: it does not lead on in this configuration.",
         "joint_jumps": "Teach the target with this joint near to where it comes from.",
         "whole_turn": "Teach the target with the nearer angle, unless the turn is meant to unwind cables.",
@@ -137,9 +139,11 @@ TEXTS = texts(
         "clear_of_assumed": "{pair}: {clearance_mm:.1f} mm clear of assumed shapes, wrong by up to {margin_mm:g} mm",
         "clearance_not_proven": "clear at points of the way; not settled between them in the given time",
         "zone_collides": "blending zone allows a collision ({assumed:shapes}): {pair}, {depth_mm:.1f} mm deep",
-        "zone_too_large": "zone {zone_mm:.1f} mm, motion only {motion_mm:.1f} mm",
+        "zone_too_large": "zone {zone_mm:.1f} > motion {motion_mm:.1f} mm",
         "target_out_of_reach": "target out of reach: {reasons:; }",
-        "way_out_of_reach": "out of reach after {at_mm:.1f} mm: {reasons:; }",
+        "way_out_of_reach": (
+            "out of reach[ at its start{at_start:?}][ after {at_mm:.1f} mm{at_start:!}]: {reasons:; }"
+        ),
         "configuration_ends": "configuration ends after {at_mm:.1f} mm: J{joint} would have to jump by {jump:.1f}",
         "meets_singularity": "{type:singularity} singularity after {at_mm:.1f} mm: joint speeds stay bounded",
         "passes_singularity": "passes the {type:singularity} singularity at {distance:.2f}, after {at_mm:.1f} mm",
@@ -226,6 +230,11 @@ def _(found: Finding) -> str:
     return sentence("remedy.limit", joint=found.joint, limit=found.limit_deg)
 
 
+@says("way_out_of_reach")
+def _(found: Finding) -> str:
+    return say_as(found, at_start=found.at_mm < AT_START_MM)
+
+
 @advises("motion_collides")
 def _(found: Finding) -> str:
     there = next((touch for touch in found.touches if touch.at_target), None)
@@ -260,15 +269,24 @@ def singular_cause(found: Finding) -> str:
     return sentence("path.cause", event=found, pose=singular_pose(found.type))
 
 
-def remedies(findings: Sequence[Finding | FindingAt]) -> list[str]:
-    """What to do about findings at one line, each thing once: about those that weigh most; of speeds the slowest."""
+def remedies(findings: Sequence[Finding | FindingAt], times: int = 0) -> list[str]:
+    """What to do about findings at one line, each thing once: about those that weigh most; of speeds the slowest.
+
+    ``times``: how often the line is carried out; what is out of reach only later than the first time is in a loop that
+    drifts.
+    """
     located = [each for each in findings if isinstance(each, FindingAt)]
     worst = max((RANKS[each.level] for each in located), default=0)
     kept: list[Finding] = [each for each in findings if not isinstance(each, FindingAt)]
     kept += [each.finding for each in located if RANKS[each.level] == worst]
     fast = [each for each in kept if is_one(each, "too_fast")]
     slowest = max(fast, key=rate_ratio, default=None)
-    said = (remedy(each) for each in kept if not is_one(each, "too_fast") or each is slowest)
+    short = sum(each.times for each in located if is_one(each.finding, *OUT_OF_REACH))
+    said = (
+        tr(LATER) if short < times and is_one(each, *OUT_OF_REACH) else remedy(each)
+        for each in kept
+        if not is_one(each, "too_fast") or each is slowest
+    )
     return list(dict.fromkeys(filter(None, said)))
 
 

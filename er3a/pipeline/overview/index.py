@@ -181,7 +181,7 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
     value, note = glance(stored[stage].results)
     if head.no_verdict:
         return StageCell(stage, "no_verdict", value, "")
-    return StageCell(stage, head.status, value, note, head.text)
+    return StageCell(stage, head.sign.split()[0], value, note, head.text)
 
 
 def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:

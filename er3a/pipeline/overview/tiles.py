@@ -22,8 +22,8 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
-FEW = 4  # rows of a tile: so many are seen whole on the first screen
-LETTERS = 0.14  # of the reach, in the small view from above
+FEW = 6  # rows of a tile: so many are seen whole on the first screen
+LETTERS = 0.16  # of the reach, in the small view from above
 
 
 @dataclass(frozen=True)
@@ -108,5 +108,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
     answer = tr("Centre at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    title, rest = tr("Where does the tray go?"), tr("Payload {kg}, {hole}.", kg=carried, hole=glance(results)[1])
+    rest = tr("{where}. Payload {kg}, {hole}.", where=placing.tray.where, kg=carried, hole=glance(results)[1])
+    title = tr("Where does the tray go?")
     return Tile(title, answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

@@ -35,13 +35,13 @@ const space = new Space(canvas, data.target, data.length, refresh);
 const arms = [data, ...data.others].map((arm, k) => ({
   table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
 }));
-const ghosts = Array.from({ length: Math.max(...data.motions.map(({ ghosts }) => ghosts.length)) }, () => new Arm(space, data));
 const surroundings = space.add(data.scene);
 if (arms.length > 1) space.turn(data.turned, 0); // arms that stand beside each other along y
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
 });
+const ranges = [...part("joints").querySelectorAll("summary i")];
 const stretches = [...document.querySelectorAll("[data-from]")];
 
 function prepared(motion) {
@@ -117,8 +117,7 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  ghosts.forEach((ghost, k) => (others[k] ? ghost.show(others[k], new Map(), "visual", others.length > 1 ? FAINT / 2 : true) : ghost.hide()));
-  for (const own of others) space.line(own.map((T) => column(T, 3)), others.length > 1 ? page.grid : page.accent, 2);
+  others.forEach((own, k) => sticks(own, others.length > 1 && motion.events[k]?.status === "fail" ? page.touching : page.accent, poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -149,6 +148,14 @@ function draw() {
   for (const { text, at } of data.signs) space.word(text, at);
   space.names(surroundings, touching);
   space.end();
+}
+
+/** An arm as lines between its joints, which hide nothing; its joints where those of the arm that is shown are not. */
+function sticks(poses, css, shown) {
+  const joints = poses.map((T) => column(T, 3));
+  const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
+  if (off.length) space.line(joints, css, 3);
+  off.forEach((joint) => space.dot(joint, css, 3.5));
 }
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */
@@ -218,7 +225,7 @@ function tellJoints() {
   const withUnit = (value, unit) => fixed(value, 1) + (unit === "°" ? unit : ` ${unit}`);
   const nearest = [...least].filter(([, i]) => quiet && rooms[i] > -0.05).map(([unit, i]) => words.nearest_joint.replace("{joint}", `J${i + 1}`).replace("{room}", withUnit(rooms[i], unit)));
   show(part("nearest"), nearest.length ? words.nearest.replace("{joints}", nearest.join(words.between)) : "");
-  data.joints.forEach(({ unit }, i) => {
+  data.joints.forEach(({ unit, lower, upper }, i) => {
     const fault = fails.get(i + 1);
     const past = rooms[i] <= -0.05; // what one decimal shows
     const text = rooms[i] === Infinity ? words.unlimited : past ? words.beyond : words.room;
@@ -227,6 +234,8 @@ function tellJoints() {
     cells[i].place.classList.toggle("least", quiet && least.get(unit) === i);
     cells[i].place.classList.toggle("doubtful", fault?.status === "caution");
     cells[i].place.classList.toggle("past", past || (fault !== undefined && fault.status !== "caution"));
+    ranges[i].className = cells[i].place.className;
+    ranges[i].style.setProperty("--at", rooms[i] === Infinity ? 0.5 : Math.min(1.04, Math.max(-0.04, (values[i] - lower) / (upper - lower || 1))));
   });
 }
 

@@ -187,7 +187,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     poses = [poses_at(robot, q) for robot, q in zip(robots, at)]
     picture = scene_still(data, poses, colours, TURNED if len(robots) > 1 else 0.0)
     for q in motion.ghosts:
-        picture.solids([shape | {"pale": True} for shape in data["looks"]["checked"]], poses_at(robots[0], q), {})
+        picture.line(poses_at(robots[0], q)[:, :3, 3], AXES[2], 3.0)
     for robot, q in zip(robots, values):
         picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
     for mark in motion.marks:

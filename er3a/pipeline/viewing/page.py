@@ -235,11 +235,16 @@ class Head:
 
     @property
     def sign(self) -> str:
-        """The classes of its mark, the same on every page: a pass beside what is expected to fail has its own."""
+        """The classes of its mark, the same on every page: a pass with what is expected to fail has its own; one that
+        rests on a table of which documents settle nothing is a caution."""
         if self.no_verdict:
             return "no_verdict"
-        meant = self.status == "pass" and self.finding.params.get("demonstrations")
-        return "pass as_meant" if meant else self.status
+        if self.status != "pass":
+            return self.status
+        first = self.caveats.get("validation")
+        if first is not None and first.status == "unsettled":
+            return "caution"
+        return "pass as_meant" if self.finding.params.get("demonstrations") else "pass"
 
     @property
     def foundation(self) -> str:

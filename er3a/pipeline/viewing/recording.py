@@ -189,7 +189,8 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
     """
     robot, stage = shown.robot, shown.stage
     shown = replace(shown, curves=[Curves.of_joints(robot, "angle", "angle"), *shown.curves])
-    shown = replace(shown, runs=[_with_angles(robot, run) for run in shown.runs])
+    runs = [replace(r, curves={"angle": in_units(robot, r.q), **r.curves}) if len(r.t) else r for r in shown.runs]
+    shown = replace(shown, runs=runs)
     starts = np.cumsum([0.0, *(_end(run) + run.pause_s for run in shown.runs)]).tolist()
     title = f"{robot.title}: {stage}"
     first = (0.0, _end(shown.runs[0])) if shown.runs else None
@@ -213,10 +214,6 @@ def write_recording(shown: Recorded, output: Path) -> float | None:
         for run, start in zip(shown.runs, starts):
             before = _log_run(stream, shown, run, start, before)
     return _moment_to_show(shown, starts)
-
-
-def _with_angles(robot: Robot, run: Run) -> Run:
-    return replace(run, curves={"angle": in_units(robot, run.q), **run.curves}) if len(run.t) else run
 
 
 def _moment_to_show(shown: Recorded, starts: Sequence[float]) -> float | None:
@@ -481,7 +478,9 @@ def _log_run(stream: rr.RecordingStream, shown: Recorded, run: Run, start: float
         times = clock.columns(np.array([t for t, _, _ in states]))
         columns = rr.StateChange.columns(state=[state for _, state, _ in states])
         stream.send_columns(f"{stage}/states/{lane}", times, columns)
-    _send_texts(stream, f"{stage}/now", clock, [(0.0, run.text), *run.texts])
+    last = dict([(0.0, run.text), *run.texts])  # of several at one time
+    said = rr.TextDocument.columns(text=list(last.values()), media_type=[rr.MediaType.MARKDOWN] * len(last))
+    stream.send_columns(f"{stage}/now", clock.columns(np.array(list(last))), said)
     _send_events(stream, f"{stage}/events", clock)
     marks = _marks(run.marks, size_of(shown.robot))
     shapes = [*run.shapes, *marks, *_touching(shown, run.events)]
@@ -531,12 +530,6 @@ def _send_curves(stream: rr.RecordingStream, entity: str, clock: Clock, values: 
     if len(gaps):  # a chunk without rows makes the viewer panic
         cleared = rr.Clear.columns(is_recursive=np.zeros(len(gaps), dtype=bool))  # type: ignore[arg-type]
         stream.send_columns(entity, clock.columns(gaps), cleared)
-
-
-def _send_texts(stream: rr.RecordingStream, entity: str, clock: Clock, texts: Sequence[tuple[float, str]]) -> None:
-    last = dict(texts)  # of several at one time
-    columns = rr.TextDocument.columns(text=list(last.values()), media_type=[rr.MediaType.MARKDOWN] * len(last))
-    stream.send_columns(entity, clock.columns(np.array(list(last))), columns)
 
 
 def _send_events(stream: rr.RecordingStream, entity: str, clock: Clock) -> None:

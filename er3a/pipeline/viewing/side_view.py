@@ -22,6 +22,7 @@ LabelKind = Literal["wrong", "open", "hole", "tray", "right", "sound"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
+LETTERS = 0.021  # of the height: of a joint's name at its arrow
 GAP = 0.045  # of the height, between two labels
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
@@ -118,7 +119,8 @@ def side_view(
     labels : moved up or down where they would be on each other
     outlines : of what is drawn behind the arms: kind, and corners (k, 2), mm
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
-    over : lines over the arms: kind, and points (k, 2), mm
+    over : lines over the arms: kind, and points (k, 2), mm; an arrow that a joint turns by (``turn J1``) has its name
+        above it
 
     Returns
     -------
@@ -155,7 +157,7 @@ def side_view(
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed]
     parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
-    parts += [Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points)) for kind, points in over]
+    parts += [_over(kind, points, LETTERS * tall) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
         low[0], -high[1], wide, tall, said, Markup("").join(parts)
@@ -168,6 +170,13 @@ def side_view(
     return Markup('<div class="arms" style="--ratio: {:.3f}">{}<div class="drawn">{}{}{}</div></div>').format(
         wide / tall, Markup("").join(map(_name, arms)), drawn, Markup("").join(words), scale
     )
+
+
+def _over(kind: str, points: Reals, letters: float) -> Markup:
+    x, z = points.mean(axis=0)[0], points[:, 1].max() + letters / 3
+    name = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(x, -z, letters, kind[5:])
+    line = Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points))
+    return line + name if kind.startswith("turn ") else line
 
 
 def _name(arm: SeenArm) -> Markup:

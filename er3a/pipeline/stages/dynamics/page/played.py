@@ -6,11 +6,15 @@ import numpy as np
 
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of, fixed, number
-from er3a.pipeline.player.motions import PlayedEvent, PlayedMotion, at_rest
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, JointLoad
+from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, HoldingTorque, JointLoad, MassesUsed
+from er3a.pipeline.viewing.drawn import poses_at
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
+MM = 1000.0
+LEVEL = 0.01  # sine of an axis' slope, up to which it counts as level
+DROP_M = 0.2  # length of a line drawn for a weight
 FELT = 0.01  # of the greatest peak: what is less is no event
 
 
@@ -36,13 +40,29 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
             tr(
                 "J{joint} holds {torque} at most.",
                 joint=each.joint,
-                torque=with_unit(number(abs(each.torque), 3), each.unit),
+                torque=with_unit(within(abs(each.torque), each.tolerance), each.unit),
             ),
             q=meant(robot, np.array(each.q)),
             loads=np.where(np.arange(robot.joints) == each.joint - 1, abs(each.torque), np.tile(np.nan, (2, 1))),
+            marks=_weight(robot, results.summary.masses, each),
         )
         for each in results.summary.holding
     ]
+
+
+def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> list[Mark]:
+    """What a joint with a level axis holds: the weight, and its level distance from the axis."""
+    poses = poses_at(robot, meant(robot, np.array(held.q)))
+    axis, at = poses[held.joint, :3, 2], poses[held.joint, :3, 3]
+    moved = [each for each in masses.links if each.link >= held.joint and each.mass_kg] if masses else []
+    kg = np.array([each.mass_kg for each in moved])
+    if not masses or masses.load_kg or not moved or abs(axis[2]) > LEVEL:
+        return []
+    centre = kg @ [(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM for each in moved] / kg.sum()
+    lever = (centre - at - (centre - at) @ axis * axis) * [1, 1, 0]
+    end = tuple(at + lever)
+    far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
+    return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, (*end[:2], end[2] - DROP_M), heavy)]
 
 
 def within(value: float, tolerance: float, decimals: int = 2) -> str:

@@ -37,7 +37,10 @@ def record(study: Study, stored: Stored[DynamicsResults], output: Path) -> float
     results, robot = stored.results, study.robot(stored.robot)
     titles = {path.name: path.title for path in results.summary.paths}
     unit = shared_unit(FORCE if slides else TORQUE for slides in robot.slides)
-    scale = _arrow_scales(robot, results.torques.torque)
+    # Metres per N m, or per N of prismatic joints, (n,): the largest of each gets the longest arrow.
+    peaks = np.abs(np.concatenate([results.torques.torque, np.zeros((1, robot.joints))])).max(axis=0)
+    turning, sliding = (peaks[robot.slides == slides].max(initial=1e-12) for slides in (False, True))
+    scale = LONGEST * size_of(robot) / np.where(robot.slides, sliding, turning)
     return record_stage(
         study,
         stored,
@@ -61,14 +64,6 @@ def _limits(robot: Robot, results: DynamicsResults) -> Reals:
         if motor.peak_limit is not None:
             peaks[motor.joint - 1] = motor.peak_limit
     return np.stack([-peaks, peaks])
-
-
-def _arrow_scales(robot: Robot, torques: Reals) -> Reals:
-    """Metres per N m, or per N of prismatic joints, (n,): the largest of each gets the longest arrow."""
-    peaks = np.abs(np.concatenate([torques, np.zeros((1, robot.joints))])).max(axis=0)
-    turning, sliding = (peaks[robot.slides == slides].max(initial=1e-12) for slides in (False, True))
-    scales: Reals = LONGEST * size_of(robot) / np.where(robot.slides, sliding, turning)
-    return scales
 
 
 def _run(robot: Robot, motion: PlayedMotion, title: str, results: DynamicsResults, scale: Reals) -> Run:

@@ -19,7 +19,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
 from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions, within
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Mark, Part
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
 from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
@@ -35,19 +35,14 @@ KEY: dict[str, Any] = {
 STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
-def joint_colour(joint: int) -> str:
-    """The colour of a joint (from 0)."""
-    return JOINTS[joint % len(JOINTS)]
-
-
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.9, sharex=True)
+    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.2, sharex=True)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
-        colour = joint_colour(j)
+        colour = JOINTS[j % len(JOINTS)]
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
@@ -65,7 +60,7 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
             continue
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    parts.set_ylabel(tr("parts at J{joint} ({unit})", joint=worst + 1, unit=load.unit))
+    parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
     power.axhline(0.0, color=MUTED, linewidth=0.8)
     power.set_ylabel(axis_label(rows, "power_w"))
     power.set_xlabel(axis_label(rows, "t_s"))
@@ -156,8 +151,15 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order]
-    still = [_held_row(motor, longest) for motor in order if motor.holding >= LEAST]
+    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
+    if idle := order[len(rows) :]:
+        names = joined((f"J{motor.joint}" for motor in idle), ", ")
+        rows.append(ListRow("none", names, _sized(0.0, idle[0]), "#motors"))
+    still = [
+        ListRow("none", name, _sized(each.holding, each), "#rest", (name, 0.0), 1.0, _filled(each.holding / longest))
+        for each in order
+        if each.holding >= LEAST and (name := holding_name(each.joint))
+    ]
     holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
         tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
@@ -165,6 +167,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         rest,
         [payload, (power, tr("greatest power of a joint"))],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
+        None if limited else Fix(tr("give the motors' peak torques in the robot's file."), "#motors", False),
     )
 
 
@@ -181,14 +184,6 @@ def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> List
     note = joined([_sized(motor.peak, motor), limit or moment[0]], ", ")
     full = motor.peak_limit or most or 1.0
     return ListRow(_mark(motor), f"J{motor.joint}", note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
-
-
-def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
-    """What a joint holds in its worst pose, which the player shows."""
-    play = holding_name(motor.joint), 0.0
-    return ListRow(
-        "none", play[0], _sized(motor.holding, motor), "#rest", play, 1.0, _filled(motor.holding / (most or 1.0))
-    )
 
 
 def _filled(share: float) -> list[Part]:

@@ -236,13 +236,9 @@ def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> st
     return with_singularity(taken, branches, k)
 
 
-def _short(label: str, branch: int) -> str:
-    """A branch in words that need little room."""
-    return branch_word(label, branch).replace("elbow ", "")
-
-
 def _on_one_line(label: str, branch: int) -> str:
-    return _short(label, branch).replace(" ", NO_BREAK_SPACE)
+    """A branch in words that need little room."""
+    return branch_word(label, branch).replace("elbow ", "").replace(" ", NO_BREAK_SPACE)
 
 
 def _units(robot: Robot) -> str:

@@ -133,12 +133,19 @@ def faults(results: ProgramsResults) -> list[Fault]:
                 is_met(program),
                 as_expected(program),
                 moments,
-                " ".join(dict.fromkeys(text for each in shown for text in remedies(_same_line(program, each))[:1])),
+                " ".join(dict.fromkeys(text for each in shown for text in _advice(results, program, each)[:1])),
                 address_of("programs", program.name, moments[0].seen_s or 0.0, program.name),
                 cause=cause,
             )
         )
     return found
+
+
+def _advice(results: ProgramsResults, program: ProgramSummary, found: FindingAt) -> list[str]:
+    """What to do about the line of a finding."""
+    rows = results.instructions
+    own = (rows.program == program.name) & (rows.line == found.line) & (Path(program.file).name == found.file)
+    return remedies(_same_line(program, found), int(rows.times[own].sum()))
 
 
 def _cause(program: ProgramSummary, found: FindingAt) -> str:

@@ -178,7 +178,7 @@ def _listing(
                     (re.split("[;；]", say(each.finding))[0], _remark(name, each))
                     for each in sorted(here, key=cause_first)
                 ],
-                remedies=remedies(here),
+                remedies=remedies(here, int(rows.times[moves[number]].sum())),
                 facts=_facts(rows, moves[number]),
                 stretch=leads[0],
                 moment=leads[1],

@@ -52,7 +52,10 @@ def path_picture(
         column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
     _joint_curves(joints, robot, path, rows)
     _distances(measures[0], rows, near)
-    _condition(measures[1], rows)
+    condition = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
+    measures[1].plot(rows.t_s, condition, color=palette.MODEL)
+    _logarithmic(measures[1], 1.0, min(1e6, 2 * np.nanmax(np.append(condition, 50.0))))
+    measures[1].set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
     for ax in figure.axes:
         _mark(ax, path)
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -96,14 +99,9 @@ def _distances(ax: Axes, rows: model.PathChecks, near: model.NearThresholds) -> 
     ax.axhline(1.0, color=palette.INK, linewidth=1, linestyle="--")
     _logarithmic(ax, 0.01, 100.0)
     ax.set_ylabel(tr("distance / threshold"), fontsize=FONT)
-    _key(ax)
-
-
-def _condition(ax: Axes, rows: model.PathChecks) -> None:
-    values = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
-    ax.plot(rows.t_s, values, color=palette.MODEL)
-    _logarithmic(ax, 1.0, min(1e6, 2 * np.nanmax(np.append(values, 50.0))))
-    ax.set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
+    legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
+    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
+    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
 
 
 def _logarithmic(ax: Axes, low: float, high: float) -> None:
@@ -115,12 +113,6 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_locator(FixedLocator(ticks.tolist()))
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:.10g}" if value < 1e5 else f"1e{round(np.log10(value))}")
-
-
-def _key(ax: Axes) -> None:
-    legend = ax.legend(loc="lower left", ncols=3, fontsize=8, handlelength=1.2, columnspacing=1.0, borderpad=0.1)
-    legend.set_frame_on(True)  # a ground of its own, where a curve passes behind it
-    legend.get_frame().set(facecolor="white", edgecolor="none", alpha=0.85)
 
 
 def _limits(ax: Axes, robot: Robot, q_deg: Reals) -> None:

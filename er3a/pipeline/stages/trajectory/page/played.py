@@ -266,7 +266,11 @@ def near_assumed(path: model.PathSummary, summary: model.TrajectorySummary) -> F
 def events(path: model.PathSummary) -> list[PlayedEvent]:
     """Singular poses and faults of a path."""
     faults = [(kind, part) for kind, stretches in kinds(path) for part in stretches]
-    return [_pass(each, "plain" if path.verdict == "safe" else "caution") for each in path.singularities] + [
+    weight: Weight = "plain" if path.verdict == "safe" else "caution"  # of a pass by a singular pose
+    return [
+        PlayedEvent(s.t_s, s.until_s, _singular(s), weight, axes=s.axes or SINGULAR_AXES.get(s.type, ()))
+        for s in path.singularities
+    ] + [
         PlayedEvent(
             s.t0_s,
             s.t1_s,
@@ -277,12 +281,6 @@ def events(path: model.PathSummary) -> list[PlayedEvent]:
         )
         for kind, s in faults
     ]
-
-
-def _pass(event: model.Singularity, status: Weight) -> PlayedEvent:
-    """A singular pose, or a pass by one, which harms no path that passes."""
-    axes = event.axes or SINGULAR_AXES.get(event.type, ())
-    return PlayedEvent(event.t_s, event.until_s, _singular(event), status, axes=axes)
 
 
 def _few_words(part: model.Stretch) -> str:

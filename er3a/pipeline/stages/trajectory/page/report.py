@@ -95,8 +95,10 @@ def paths_answer(robot: Robot, results: model.TrajectoryResults) -> Answer:
 
 
 def _by_name(results: model.TrajectoryResults) -> dict[str, Fault]:
-    """What is wrong with paths, by their names: what is not as expected first, of the others what collides."""
-    return {fault.name: fault for fault in sorted(faults(results), key=lambda fault: _plainest(results, fault))}
+    """What is wrong with paths, by their names: what is not as expected first, then what collides, of these what has no
+    other fault."""
+    known = {path.name: (not path.collisions, len(path.outcomes)) for path in results.summary.paths}
+    return {fault.name: fault for fault in sorted(faults(results), key=lambda each: (each.meant, *known[each.name]))}
 
 
 def answer_of(
@@ -133,36 +135,13 @@ def answer_of(
         Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
     )
     caught = sum(fault.meant for fault in wrong.values())
-    unsure = sum(not fault.meant and fault.status != "fail" for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
-    return Answer(headline, rest, _in_short(faulty, unsure, len(repairable)), keys, groups, fix)
-
-
-def _plainest(results: model.TrajectoryResults, fault: Fault) -> tuple[bool, bool, int]:
-    """By which faults are sorted: what is not as expected first, then what collides, of these what has no other
-    fault."""
-    path = next(path for path in results.summary.paths if path.name == fault.name)
-    return fault.meant, not path.collisions, len(path.outcomes)
-
-
-def _in_short(wrong: Sequence[model.PathSummary], unsure: int, repairable: int) -> str:
-    """What becomes of the paths that may not be run as they are, ``unsure`` of which have no fault that is certain."""
-    if not wrong:
-        return ""
-    early = sum(not path.chosen and path.sound_end is not None for path in wrong)
-    text = tr(
-        "{faulty} faulty: {repairable} can be repaired, {early} can end early, {rest} neither.",
-        faulty=len(wrong) - unsure,
-        repairable=repairable,
-        early=early,
-        rest=len(wrong) - repairable - early,
-    )
-    return tr("{count} unsure", count=unsure) + ", " + text if unsure else text
+    return Answer(headline, rest, "", keys, groups, fix)
 
 
 def _sound_row(path: model.PathSummary, length: float, limits: model.LimitsUsed) -> ListRow:
@@ -182,15 +161,10 @@ def _programs(
     found = [dict(file=file, text=text, empty=not text, assumed=speed) for file, text, speed in texts]
     for each in found:
         meeting = met.get(repaired(path) if _repairs(path, each) else path.name)
-        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *_in_head(meeting)]))
+        with using("en"):
+            met_at = meeting and [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
+        each["packed"] = packed_text(with_head_lines(each.pop("text"), [*head, *(met_at or ())]))
     return found
-
-
-def _in_head(meeting: Meeting | None) -> list[str]:
-    with using("en"):
-        return (
-            [] if meeting is None else [tr("meets the tray that the workspace page places at {t:.2f} s", t=meeting.t)]
-        )
 
 
 def _section(

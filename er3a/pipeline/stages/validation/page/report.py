@@ -55,9 +55,10 @@ from er3a.robots.robot import Robot
 
 ANGLES = ("alpha", "beta", "offset")
 AROUND = np.radians(np.linspace(-125.0, 125.0, 31))  # of an arrow around an axis: open at the back
-HEAD = 0.4  # of its radius, the length of its head
+SEEN_FROM_SIDE = 0.64  # of that: the half before an axis in the drawing's plane
+HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
-RADIUS = 0.065  # of such an arrow, of the size of the arm
+RADIUS = 0.045  # of such an arrow, of the size of the arm
 BELOW = 0.07  # of a reach: how far below the base its dimension is drawn
 SEEN = "seen"  # address in the picture of what is to be done next
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
@@ -196,13 +197,14 @@ def _turn_arrow(robot: Robot, joint: int, at: Reals, radius: float) -> tuple[str
     """An arrow about a place (2,), mm, as an axis turns with its joint's value: before an axis in the drawing's
     plane, over one across it."""
     axis = robot.direction[joint - 1] * frames(robot, np.zeros(robot.joints))[joint - 1, :3, 2]
-    first = np.array([0.0, 0.0, 1.0] if abs(axis[1]) > np.sqrt(0.5) else [0.0, -1.0, 0.0])
-    ring = np.outer(np.cos(AROUND), first) + np.outer(np.sin(AROUND), np.cross(axis, first))
+    across = abs(axis[1]) > np.sqrt(0.5)
+    first, around = ([0.0, 0.0, 1.0], AROUND) if across else ([0.0, -1.0, 0.0], SEEN_FROM_SIDE * AROUND)
+    ring = np.outer(np.cos(around), first) + np.outer(np.sin(around), np.cross(axis, first))
     seen = ring[:, ::2] + TILT * ring[:, 1:2] * np.abs(axis[::2])
     tip, back = seen[-1], seen[-3] - seen[-1]
     back *= HEAD / np.linalg.norm(back)
-    across = back[::-1] * [-0.7, 0.7]
-    return "turn", at + radius * np.stack([*seen, tip + back + across, tip, tip + back - across])
+    wide = back[::-1] * [-0.7, 0.7]
+    return f"turn J{joint}", at + radius * np.stack([*seen, tip + back + wide, tip, tip + back - wide])
 
 
 def _dimension(label: Label, height: float) -> list[tuple[str, Reals]]:

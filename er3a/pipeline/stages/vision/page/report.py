@@ -21,7 +21,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, all_caught
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.figures import new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
@@ -39,7 +39,7 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
     """Length of each sample's residual, position above, rotation below."""
     sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
     usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
-    figure, axes = new_figure(2, 1, 5.2, 4.6, sharex=True)
+    figure, axes = new_figure(2, 1, 5.2, 5.1, sharex=True)
     for ax, size, mean, label in zip(axes, sizes, usual, (tr("position (mm)"), tr("rotation (deg)"))):
         number = np.arange(1, len(rows) + 1)
         ax.bar(number[rows.used], size[rows.used], color=MODEL, label=tr("used"))
@@ -183,8 +183,9 @@ def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
         return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
-    note = tr("within the gripper's tolerance: {percent} %", percent=fixed(100 * each.grasp.probability, 1))
-    return ListRow("pass", each.name, note, "#objects", moment)
+    sure = each.grasp.probability
+    note = tr("within tolerance: {percent} %", percent=fixed(100 * sure, 1))
+    return ListRow("pass", each.name, note, "#objects", moment, 1.0, [Part(sure, 1.0, "rest")])
 
 
 def _image_folder(study: Study, name: str) -> Path:

@@ -41,7 +41,7 @@ PROOF = {
     N_("unreachable"): "#ffffff",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
-ASIDE = 0.7  # of the reach, from there to the name of a void at the right
+ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
 STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
@@ -227,10 +227,10 @@ def labelled(
     lines = border_lines(border.arc, border.rho_m, border.z_m)
     outer = np.concatenate(lines)
     low, high = outer.min(axis=0), outer.max(axis=0)
-    labels = []  # in corners that are not reached: their own colour would hide them
+    labels = []
     for number_, void in enumerate(summary.voids, 1):
         label = void_label(number_, void)
-        labels.append(replace(label, at=high * [ASIDE, 1.0] if label.at[0] > 0 else low, start=label.at))
+        labels.append(replace(label, at=label.at + high * ASIDE if label.at[0] > 0 else low, start=label.at))
     outlines = [("pocket", _pocket(results, k)) for k, void in enumerate(summary.voids, 1) if void.kind == "open"]
     for tray in trays[:1]:
         corners = _tray_corners(tray)
