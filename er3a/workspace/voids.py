@@ -178,6 +178,7 @@ def mesh(blocks: Blocks, mask: Flags) -> tuple[Reals, Integers]:
 VoidKind = Literal["enclosed", "open"]
 
 _EVERY = 97  # of the points, a sample by which the faces of a hull are put in order
+_FACES = 8  # of a hull, looked at together: few enough that their values stay small
 _FLAT = 1e-9  # thickness, in parts of the length, of a flat hull
 
 
@@ -217,8 +218,8 @@ def inside_hull(corners: Reals, points: Reals) -> Flags:
     # few points are left to be looked at then.
     faces = np.unique(scipy.spatial.ConvexHull(corners).equations, axis=0)
     beyond = points[::_EVERY] @ faces[:, :3].T + faces[:, 3] >= 0
-    for x, y, z, offset in faces[np.argsort(-beyond.sum(axis=0), kind="stable")]:
-        inside = inside[points[inside] @ (x, y, z) + offset < 0]
+    for part in np.array_split(faces[np.argsort(-beyond.sum(axis=0), kind="stable")], -(-len(faces) // _FACES)):
+        inside = inside[(points[inside] @ part[:, :3].T + part[:, 3] < 0).all(axis=1)]
     return np.isin(every, inside)
 
 
