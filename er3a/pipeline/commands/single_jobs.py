@@ -65,11 +65,9 @@ def views(
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
     with language.using("en"):
-        for problem in {
-            _record(loaded, robot, stage.name, results, reports) for stage in stages if "record" in stage.views
-        }:
-            if problem:
-                options.print_note(f"previews of recordings were skipped: {problem}")
+        recorded = [stage.name for stage in stages if "record" in stage.views]
+        if problem := _record(loaded, robot, recorded, results, reports):
+            options.print_note(f"previews of recordings were skipped: {problem}")
     with house_style():
         for stage in stages:
             page = reports / robot / f"{stage.name}.html"
@@ -79,17 +77,20 @@ def views(
         _write_teach_page(loaded, robot, results, reports)
 
 
-def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
-    """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
+def _record(study: Study, robot: str, stages: list[str], results: Path, reports: Path) -> str:
+    """Write recordings of stages and their pictures; why there is no picture, if there is to be one."""
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview
+    from er3a.pipeline.viewing.viewer import draw_previews
 
-    recording = reports / robot / f"{stage}.rrd"
-    picture = recording.with_suffix(".webp")
-    moment = run.show("record", stage, study, robot, results / robot / stage, recording)
-    problem = draw_preview(recording, picture, moment) or ""
-    write_checksum(recording)
-    write_checksum(picture)
+    wanted = []
+    for stage in stages:
+        recording = reports / robot / f"{stage}.rrd"
+        moment = run.show("record", stage, study, robot, results / robot / stage, recording)
+        wanted.append((recording, recording.with_suffix(".webp"), moment))
+    problem = draw_previews(wanted)
+    for recording, picture, _ in wanted:
+        write_checksum(recording)
+        write_checksum(picture)
     return problem
 
 
