@@ -290,7 +290,7 @@ def _pictures(wanted: Sequence[tuple[Path, Path, float | None]]) -> tuple[list[b
 
 
 def _shoot(client: Any, viewer: subprocess.Popen[bytes], recording: Path, moment: float | None) -> bytes:
-    """Have the viewer open a recording and draw pictures until one is like the one before: everything is loaded then."""
+    """A recording's picture: drawn again until one is like the one before, as everything is loaded then."""
     opened = _answered(viewer, lambda: client.open(str(recording.resolve()))).store_ids
     before = b""
 
