@@ -12,6 +12,8 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from er3a.pipeline.run_study import RunLog, RunLogSettings
 
+OUTPUT = ["results/arm/workspace/summary.json (update)", "results/arm/workspace/SHA256SUMS (update)"]
+
 
 @pytest.fixture
 def log(tmp_path, monkeypatch):
@@ -32,7 +34,7 @@ def log(tmp_path, monkeypatch):
 
 
 def test_a_line_for_each_verdict_with_its_seconds_and_what_is_left(log, capsys):
-    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute", wildcards={}, output=OUTPUT)
     log(LogEvent.JOB_FINISHED, job_id=1)
     line = capsys.readouterr().err
     assert line == "✗ arm  workspace   fail  0 s  (2 jobs left)\n"
@@ -40,7 +42,7 @@ def test_a_line_for_each_verdict_with_its_seconds_and_what_is_left(log, capsys):
 
 def test_expected_verdicts_say_so(log, capsys, monkeypatch):
     monkeypatch.setattr(RunLog, "expected", {("arm", "workspace"): "fail"})
-    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute", wildcards={}, output=OUTPUT)
     log(LogEvent.JOB_FINISHED, job_id=1)
     assert "fail, as expected" in capsys.readouterr().err
 

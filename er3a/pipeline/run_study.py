@@ -35,7 +35,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
+from er3a.pipeline.results import JUNIT, OVERALL, SUMMARY, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -103,6 +103,7 @@ class RunLog(LogHandlerBase):
 
     def __post_init__(self) -> None:
         self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
+        self._outputs: dict[int, Sequence[str]] = {}
         self._left = 0
         self._killed: dict[str, int] = {}
 
@@ -123,6 +124,7 @@ class RunLog(LogHandlerBase):
         elif event == LogEvent.JOB_INFO:
             job = record.__dict__
             self._jobs[job["jobid"]] = (job["rule_name"], dict(job["wildcards"] or {}), time.monotonic())
+            self._outputs[job["jobid"]] = job.get("output") or ()
         elif event == LogEvent.JOB_FINISHED:
             self._finish(record.__dict__["job_id"])
         elif event == LogEvent.JOB_ERROR:
@@ -149,16 +151,19 @@ class RunLog(LogHandlerBase):
         return str(job.get("rule_msg") or ": ".join(filter(None, (of.get("robot"), " ".join(filter(None, words))))))
 
     def _finish(self, job: int) -> None:
-        rule, wildcards, begun = self._jobs.pop(job, ("", {}, time.monotonic()))
+        """A line for each stage that a job has computed; Snakemake adds to names of files what they are flagged as."""
+        _, _, begun = self._jobs.pop(job, ("", {}, time.monotonic()))
         self._left -= 1
-        verb, _, stage = rule.partition("_")
-        if verb == "compute":
-            of = wildcards.get("robot", ""), stage
-            status = _verdict(*of)
-            note = ", as expected" if self.expected.get(of) == status else ""
+        for output in self._outputs.pop(job, ()):
+            path = Path(str(output).partition(" (")[0])
+            if path.name != SUMMARY:
+                continue
+            robot, stage = path.parts[-3:-1]
+            status = _verdict(robot, stage)
+            note = ", as expected" if self.expected.get((robot, stage)) == status else ""
             took = f"{time.monotonic() - begun:.0f} s  ({self._left} jobs left)"
             mark = MARKS.get(status, NO_VERDICT)
-            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
+            self._print(f"{mark} {robot}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
 
     def _print(self, line: str) -> None:
         print(line, file=sys.stderr, flush=True)
