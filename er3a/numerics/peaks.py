@@ -82,6 +82,8 @@ def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Re
         gains = reached[best] > here[going] + GAINS_NOTHING
         going = going[gains]
         q[going], here[going] = trials[best][gains], reached[best][gains]
+        if not len(going):
+            break
     return q, here
 
 
