@@ -73,9 +73,6 @@ def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Re
         values = _of_each(function, q[going, None] + _stencil(q.shape[1]))
         here[going] = values[:, 0]
         steps = np.array([_step(own, q[k], lower, upper) for own, k in zip(values, going)])
-        going, steps = going[steps.any(axis=1)], steps[steps.any(axis=1)]
-        if not len(going):
-            break
         trials = np.minimum(np.maximum(q[going, None] + SHARES[:, None] * steps[:, None], lower), upper)
         reached = _of_each(function, trials)
         best = np.arange(len(going)), reached.argmax(axis=1)
