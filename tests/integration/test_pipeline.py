@@ -31,8 +31,6 @@ from tests.conftest import ALL_THERE
 
 pytestmark = pytest.mark.long
 
-STAGES = ("validation", "workspace", "collision", "inverse", "trajectory", "dynamics")
-
 
 @contextmanager
 def edited(path: Path, old: str, new: str, newer: bool = True) -> Iterator[None]:
@@ -133,7 +131,7 @@ def test_edits_of_code_a_table_and_references_compute_again_what_rests_on_them(s
         edited(data / "manual_refs/er3a_c60/axes.csv", "cad", "export", newer=False),
     ):
         planned = small_study.planned()
-    assert computing("er3_600", STAGES) <= planned
+    assert computing("er3_600", stages_of("er3_600")) <= planned
     computed = {job for job in planned if "compute" in job and not job.startswith("er3_600")}
     assert computed == {"er3a_c60: compute validation", "er3a_c60_article: compute validation"}
     with edited(small_study.folder / "er3a/kinematics/neighbours.py", '"""', '"""Edited. '):
@@ -192,7 +190,7 @@ def test_what_is_missing_damaged_or_of_an_older_version_is_made_again(small_stud
         assert line.endswith("; it is made again")
     log = max((run.folder / ".snakemake/log").glob("*.snakemake.log")).read_text(encoding="utf-8")
     jobs = set(re.findall(r"^Job \d+: (.+)$", log, flags=re.MULTILINE)) - {ALL_THERE}
-    again = {job for job in computing("er3_600", STAGES) if "inverse" in job}
+    again = {job for job in computing("er3_600", stages_of("er3_600")) if "inverse" in job}
     assert jobs == again | {views("er3_600"), "write the index"}
     kept = results / "er3_600/trajectory/summary.json"
     assert kept.stat().st_ino == untouched, "stages of the job whose results are whole are left alone"
