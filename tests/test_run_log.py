@@ -12,6 +12,8 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from er3a.pipeline.run_study import RunLog, RunLogSettings
 
+OUTPUT = ["results/arm/workspace/summary.json (update)", "results/arm/workspace/SHA256SUMS (update)"]
+
 
 @pytest.fixture
 def log(tmp_path, monkeypatch):
@@ -32,7 +34,7 @@ def log(tmp_path, monkeypatch):
 
 
 def test_a_line_for_each_verdict_with_its_seconds_and_what_is_left(log, capsys):
-    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_INFO, jobid=1, output=OUTPUT)
     log(LogEvent.JOB_FINISHED, job_id=1)
     line = capsys.readouterr().err
     assert line == "✗ arm  workspace   fail  0 s  (2 jobs left)\n"
@@ -40,13 +42,13 @@ def test_a_line_for_each_verdict_with_its_seconds_and_what_is_left(log, capsys):
 
 def test_expected_verdicts_say_so(log, capsys, monkeypatch):
     monkeypatch.setattr(RunLog, "expected", {("arm", "workspace"): "fail"})
-    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_INFO, jobid=1, output=OUTPUT)
     log(LogEvent.JOB_FINISHED, job_id=1)
     assert "fail, as expected" in capsys.readouterr().err
 
 
 def test_pages_and_snakemakes_own_words_stay_out_errors_do_not(log, capsys):
-    log(LogEvent.JOB_INFO, jobid=2, rule_name="views_arm", wildcards={})
+    log(LogEvent.JOB_INFO, jobid=2, output=["reports/arm/inverse.html"])
     log(LogEvent.JOB_FINISHED, job_id=2)
     log(None, "Building DAG of jobs...")
     assert capsys.readouterr().err == ""
@@ -70,9 +72,9 @@ def test_a_killed_job_s_log_says_so_in_place_of_it(log, capsys, ended, reason):
     told = Path("logs/arm/workspace.compute.log")
     told.parent.mkdir(parents=True)
     told.write_text("its own words\n", encoding="utf-8")
-    log(LogEvent.JOB_INFO, jobid=1, rule_name="compute_workspace", wildcards={"robot": "arm"})
+    log(LogEvent.JOB_INFO, jobid=1)
     log(LogEvent.ERROR, f"CalledProcessError:\nCommand 'a; er3a compute 2> {told}' {ended}", level=logging.ERROR)
-    log(LogEvent.JOB_ERROR, jobid=1, rule_name="compute_workspace", rule_msg=None, log=[str(told)])
+    log(LogEvent.JOB_ERROR, jobid=1, rule_msg="arm: compute workspace", log=[str(told)])
     (line,) = capsys.readouterr().err.splitlines()
     assert (reason.removeprefix("error: ") in line) == ("killed" in reason)
     assert told.read_text(encoding="utf-8").splitlines()[-1] == reason

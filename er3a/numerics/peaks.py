@@ -61,30 +61,42 @@ def peak(function: Function, lower: Reals, upper: Reals, points: Reals, climbs: 
     at, value : (d,), and the function there; the largest that was found, not proven
     """
     starts = points[_best_apart(points, function(points), climbs)]
-    ends = [_climb(function, start, lower, upper) for start in starts]
-    return max(ends, key=lambda end: end[1])
+    ends, values = _climb(function, starts, lower, upper)
+    best = int(np.argmax(values))
+    return ends[best], float(values[best])
 
 
-def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, float]:
-    """From a point up to the next maximum: the point and its value."""
-    offsets = _stencil(len(q))
+def _climb(function: Function, q: Reals, lower: Reals, upper: Reals) -> tuple[Reals, Reals]:
+    """From points (K, d) up to the next maximum each, all in one batch: the points and their values (K,)."""
+    q, here, going = q.copy(), np.empty(len(q)), np.arange(len(q))
     for _ in range(PEAK_STEPS):
-        values = function(q + offsets)
-        here = float(values[0])
-        slope, curvature = _derivatives(values, len(q))
-        held = ((q <= lower) & (slope <= 0)) | ((q >= upper) & (slope >= 0))
-        free = ~held
-        if not free.any() or np.abs(slope[free]).max() < GAINS_NOTHING:
+        values = _of_each(function, q[going, None] + _stencil(q.shape[1]))
+        here[going] = values[:, 0]
+        steps = np.array([_step(own, q[k], lower, upper) for own, k in zip(values, going)])
+        trials = np.minimum(np.maximum(q[going, None] + SHARES[:, None] * steps[:, None], lower), upper)
+        reached = _of_each(function, trials)
+        best = np.arange(len(going)), reached.argmax(axis=1)
+        gains = reached[best] > here[going] + GAINS_NOTHING
+        going = going[gains]
+        q[going], here[going] = trials[best][gains], reached[best][gains]
+        if not len(going):
             break
-        step = np.zeros(len(q))
-        step[free] = _newton(slope[free], curvature[free][:, free])
-        trials = np.minimum(np.maximum(q + SHARES[:, None] * step, lower), upper)
-        reached = function(trials)
-        best = int(np.argmax(reached))
-        if not reached[best] > here + GAINS_NOTHING:
-            break
-        q, here = trials[best], float(reached[best])
     return q, here
+
+
+def _step(values: Reals, q: Reals, lower: Reals, upper: Reals) -> Reals:
+    """A step (d,) uphill from a point, by the values at its stencil; zeros at a maximum."""
+    step = np.zeros(len(q))
+    slope, curvature = _derivatives(values, len(q))
+    free = ~(((q <= lower) & (slope <= 0)) | ((q >= upper) & (slope >= 0)))
+    if free.any() and np.abs(slope[free]).max() >= GAINS_NOTHING:
+        step[free] = _newton(slope[free], curvature[free][:, free])
+    return step
+
+
+def _of_each(function: Function, points: Reals) -> Reals:
+    """Values (K, P) at points (K, P, d)."""
+    return function(points.reshape(-1, points.shape[-1])).reshape(points.shape[:-1])
 
 
 def _best_apart(points: Reals, values: Reals, count: int) -> list[int]:

@@ -502,6 +502,25 @@ def changed_since(folder: Path, study: Study, robot: str, stage: str) -> tuple[s
     return tuple(changed)
 
 
+def is_current(folder: Path, study: Study, robot: str, stage: str) -> bool:
+    """Whether a stage's results are there, whole, and what they would be if they were computed again.
+
+    Parameters
+    ----------
+    folder : of the stage's results
+    study : as it is now
+
+    Returns
+    -------
+    current : False also where there are none
+    """
+    try:
+        check_results(folder)
+        return not changed_since(folder, study, robot, stage)
+    except ResultError:
+        return False
+
+
 def result_records(results: Path, robots: Iterable[str]) -> tuple[Input, ...]:
     """What provenance says of the results of robots that a page shows.
 

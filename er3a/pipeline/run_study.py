@@ -24,7 +24,6 @@ from itertools import chain
 from logging import WARNING, LogRecord
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from filelock import FileLock, Timeout
 from snakemake_interface_logger_plugins.base import LogHandlerBase
@@ -35,7 +34,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from er3a.errors import Er3aError, ResultError
 from er3a.files.kept_files import ROOT, half_written
 from er3a.pipeline.check import check_study
-from er3a.pipeline.results import JUNIT, OVERALL, check_checksum, check_results, checksum_file
+from er3a.pipeline.results import JUNIT, OVERALL, SUMMARY, check_checksum, check_results, checksum_file
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import write_junit_error
@@ -102,7 +101,7 @@ class RunLog(LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
-        self._jobs: dict[int, tuple[str, dict[str, str], float]] = {}
+        self._jobs: dict[int, tuple[Sequence[str], float]] = {}  # outputs, and when it began
         self._left = 0
         self._killed: dict[str, int] = {}
 
@@ -122,12 +121,12 @@ class RunLog(LogHandlerBase):
             self._left = record.__dict__["stats"]["total"]
         elif event == LogEvent.JOB_INFO:
             job = record.__dict__
-            self._jobs[job["jobid"]] = (job["rule_name"], dict(job["wildcards"] or {}), time.monotonic())
+            self._jobs[job["jobid"]] = job.get("output") or (), time.monotonic()
         elif event == LogEvent.JOB_FINISHED:
             self._finish(record.__dict__["job_id"])
         elif event == LogEvent.JOB_ERROR:
             job = record.__dict__
-            name, logs = self._job_name(job), [str(log) for log in job.get("log") or ()]
+            name, logs = job.get("rule_msg") or job.get("rule_name"), [str(log) for log in job.get("log") or ()]
             number = self._killed.get(logs[0], 0) if logs else 0
             reason = f"killed (signal {number}{'; out of memory?' * (number == SIGKILL)})"
             self._print(f"✗ {name}: {reason if number else 'ended with an error'}; see {', '.join(logs)}")
@@ -142,23 +141,20 @@ class RunLog(LogHandlerBase):
         elif event is None and _concerns_a_person(record):
             self._print(record.getMessage())
 
-    def _job_name(self, job: Mapping[str, Any]) -> str:
-        """A job's message; without one its robot, its rule and, unless the rule names it, its stage."""
-        rule, of, _ = self._jobs.get(job.get("jobid", -1), (str(job.get("rule_name")), {}, 0.0))
-        words = [rule.replace("_", " "), of.get("stage", "")]
-        return str(job.get("rule_msg") or ": ".join(filter(None, (of.get("robot"), " ".join(filter(None, words))))))
-
     def _finish(self, job: int) -> None:
-        rule, wildcards, begun = self._jobs.pop(job, ("", {}, time.monotonic()))
+        """A line for each stage that a job has computed; Snakemake adds to names of files what they are flagged as."""
+        outputs, begun = self._jobs.pop(job, ((), 0.0))
         self._left -= 1
-        verb, _, stage = rule.partition("_")
-        if verb == "compute":
-            of = wildcards.get("robot", ""), stage
-            status = _verdict(*of)
-            note = ", as expected" if self.expected.get(of) == status else ""
+        for output in outputs:
+            path = Path(str(output).partition(" (")[0])
+            if path.name != SUMMARY:
+                continue
+            robot, stage = path.parts[-3:-1]
+            status = _verdict(robot, stage)
+            note = ", as expected" if self.expected.get((robot, stage)) == status else ""
             took = f"{time.monotonic() - begun:.0f} s  ({self._left} jobs left)"
             mark = MARKS.get(status, NO_VERDICT)
-            self._print(f"{mark} {of[0]}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
+            self._print(f"{mark} {robot}  {stage:<10}  {status.replace('_', ' ')}{note}  {took}")
 
     def _print(self, line: str) -> None:
         print(line, file=sys.stderr, flush=True)

@@ -150,7 +150,7 @@ def test_the_preview_shows_the_arm_and_the_page_shows_the_preview(small_study, r
 
 def test_a_preview_drawn_again_is_the_same_to_the_byte(small_study, vulkan, tmp_path):
     recording = small_study.folder / f"reports/{ROBOT}/inverse.rrd"
-    assert viewer.draw_preview(recording, tmp_path / "again.webp") is None
+    assert viewer.draw_previews([(recording, tmp_path / "again.webp", None)]) == ""
     assert (tmp_path / "again.webp").read_bytes() == recording.with_suffix(".webp").read_bytes()
 
 
@@ -158,9 +158,13 @@ def test_without_a_driver_the_preview_is_empty_and_one_line_says_why(small_study
     for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
         monkeypatch.setenv(name, "/nowhere")
     monkeypatch.setenv("LIBGL_DRIVERS_PATH", "/nowhere")
-    told = viewer.draw_preview(small_study.folder / f"reports/{ROBOT}/inverse.rrd", tmp_path / "inverse.webp")
+    recording, pictures = (
+        small_study.folder / f"reports/{ROBOT}/inverse.rrd",
+        [tmp_path / "a.webp", tmp_path / "b.webp"],
+    )
+    told = viewer.draw_previews([(recording, picture, None) for picture in pictures])
     assert re.fullmatch("the Rerun viewer .+", told)
-    assert (tmp_path / "inverse.webp").read_bytes() == b""
+    assert [picture.read_bytes() for picture in pictures] == [b"", b""]
 
 
 RANGE = "AbsoluteTimeRange {{ min: TimeInt({}), max: TimeInt({}) }}"

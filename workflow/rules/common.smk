@@ -75,6 +75,18 @@ else:
     ER3A = "exec er3a"
 
 
+def asked_of(stages):
+    """The words that ask a job for stages: it leaves alone those whose results are as they would be, but not where a run
+    is to make all anew, which Snakemake says only when it has read all rules."""
+
+    def words(wildcards):
+        forced = workflow.dag_settings
+        anew = forced and (forced.forceall or forced.forcerun or forced.forcetargets)
+        return ",".join(stages) + ("" if anew else " --changed")
+
+    return words
+
+
 def told(start):
     """The lines with this start that jobs of this run have told, each once."""
     logs = [path for path in Path("logs").rglob("*.log") if path.stat().st_mtime >= STARTED - 1]
@@ -90,6 +102,17 @@ def inputs(robot, stage):
 def results_of(robot, stage):
     """Paths of a stage's results: the list of checksums stands for its tables."""
     return [f"results/{robot}/{stage}/{name}" for name in ("summary.json", "SHA256SUMS")]
+
+
+ALONE = ("validation", "workspace")  # each takes as long as all others together
+
+
+def jobs_of(robot):
+    """The stages of a robot by the job that computes them: all but the longest share one, as each would take longer to
+    start than to work."""
+    stages = STUDY.stages(robot)
+    shared = [stage for stage in stages if stage not in ALONE]
+    return [*([stage] for stage in stages if stage in ALONE), *([shared] if shared else [])]
 
 
 def asked_stages(robot):

@@ -1,32 +1,40 @@
-# The rule that computes a stage of a robot, for each stage in the registry; and one to ask for the stage by its name.
+# The rules that compute the stages of a robot, and a rule to ask for each stage in the registry by its name.
+
+
+for robot in ROBOTS:
+    for stages in jobs_of(robot):
+        asked = [stage for stage in stages if stage in ASKED]
+        if asked:
+
+            rule:
+                name:
+                    f"compute_{robot}_{stages[0] if stages[0] in ALONE else 'others'}"
+                input:
+                    list(dict.fromkeys(path for stage in stages for path in inputs(robot, stage))),
+                output:
+                    [update(path) for stage in asked for path in results_of(robot, stage)],
+                log:
+                    f"logs/{robot}/{stages[0] if stages[0] in ALONE else 'others'}.compute.log",
+                priority: {"validation": 3, "workspace": 2}.get(stages[0], 1)  # what takes longest starts first
+                conda:
+                    "../envs/er3a.yaml"
+                resources:
+                    **{f"compiles_{stage}": 1 for stage in asked},
+                    # No parameter: results do not become others because fewer are asked for.
+                    asked=asked_of(asked),
+                params:
+                    robot=robot,
+                    settings={stage: STUDY.computed_from(robot, stage) for stage in stages},
+                    # Snakemake sees a changed file only if it is newer, and no edit of an imported package.
+                    contents=[STUDY.inputs_digest(robot, stage) for stage in stages],
+                    code=numbers_digest(),
+                message:
+                    f"{robot}: compute {', '.join(asked)}"
+                shell:
+                    f"{ER3A} compute {{resources.asked}} {{params.robot}} 2> {{log}}"
 
 
 for stage in STAGES.values():
-
-    rule:
-        name:
-            f"compute_{stage.name}"
-        input:
-            lambda wildcards, stage=stage.name: inputs(wildcards.robot, stage),
-        output:
-            results_of("{robot}", stage.name),
-        log:
-            f"logs/{{robot}}/{stage.name}.compute.log",
-        priority: {"validation": 3, "workspace": 2, "programs": 1}.get(stage.name, 0)  # what takes longest starts first
-        conda:
-            "../envs/er3a.yaml"
-        resources:
-            **{f"compiles_{stage.name}": 1},
-        params:
-            stage=stage.name,
-            settings=lambda wildcards, stage=stage.name: STUDY.computed_from(wildcards.robot, stage),
-            # Snakemake sees a changed file only if it is newer, and no edit of an imported package.
-            contents=lambda wildcards, stage=stage.name: STUDY.inputs_digest(wildcards.robot, stage),
-            code=numbers_digest(),
-        message:
-            f"{{wildcards.robot}}: compute {stage.name}"
-        shell:
-            f"{ER3A} compute {{params.stage}} {{wildcards.robot}} 2> {{log}}"
 
     rule:
         name:

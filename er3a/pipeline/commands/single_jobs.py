@@ -13,7 +13,7 @@ from er3a.errors import Er3aError
 from er3a.pipeline import language
 from er3a.pipeline.commands import options
 from er3a.pipeline.commands.dh_options import Angles, Lengths
-from er3a.pipeline.results import write_checksum
+from er3a.pipeline.results import is_current, write_checksum
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.study import Study, load_study
 from er3a.robots.robot import Convention
@@ -25,22 +25,31 @@ def _stages(incomplete: str) -> list[str]:
     return [name for name in STAGES if name.startswith(incomplete)]
 
 
-StageName = Annotated[str, typer.Argument(metavar="STAGE", help=" | ".join(STAGES), autocompletion=_stages)]
+StageNames = Annotated[
+    str,
+    typer.Argument(metavar="STAGE", help=f"{' | '.join(STAGES)}, or several with commas", autocompletion=_stages),
+]
 
 
 @options.app.command(rich_help_panel=options.JOBS)
 def compute(
-    stage: StageName,
+    stage: StageNames,
     robot: options.RobotName,
     study: options.StudyFile = options.DEFAULT_STUDY,
     results: options.Results = options.DEFAULT_RESULTS,
+    *,
+    changed: Annotated[bool, typer.Option("--changed", help="only stages whose results are not up to date")] = False,
 ):
     """Compute a stage: tables and summary.json."""
     from er3a.pipeline.stages import run
 
-    loaded = load_study(study)
-    if absent := run.compute(_known(stage, STAGES), loaded, robot, results / robot / stage):
-        options.print_note(f"{robot}, {stage}: {absent}")
+    for name in [_known(each, STAGES) for each in stage.split(",")]:
+        loaded = load_study(study)  # for each: what is noted while files are read belongs to the stage that reads them
+        folder = results / robot / name
+        if changed and is_current(folder, loaded, robot, name):
+            continue
+        if absent := run.compute(name, loaded, robot, folder):
+            options.print_note(f"{robot}, {name}: {absent}")
 
 
 @options.app.command(rich_help_panel=options.JOBS)
@@ -65,11 +74,9 @@ def views(
     named = [_known(page, (*STAGES, TEACH)) for page in pages or loaded.pages(robot)]
     stages = [STAGES[page] for page in named if page != TEACH]
     with language.using("en"):
-        for problem in {
-            _record(loaded, robot, stage.name, results, reports) for stage in stages if "record" in stage.views
-        }:
-            if problem:
-                options.print_note(f"previews of recordings were skipped: {problem}")
+        recorded = [stage.name for stage in stages if "record" in stage.views]
+        if problem := _record(loaded, robot, recorded, results, reports):
+            options.print_note(f"previews of recordings were skipped: {problem}")
     with house_style():
         for stage in stages:
             page = reports / robot / f"{stage.name}.html"
@@ -79,17 +86,20 @@ def views(
         _write_teach_page(loaded, robot, results, reports)
 
 
-def _record(study: Study, robot: str, stage: str, results: Path, reports: Path) -> str:
-    """Write a stage's recording and its picture; why there is no picture, if there is to be one."""
+def _record(study: Study, robot: str, stages: list[str], results: Path, reports: Path) -> str:
+    """Write recordings of stages and their pictures; why there is no picture, if there is to be one."""
     from er3a.pipeline.stages import run
-    from er3a.pipeline.viewing.viewer import draw_preview
+    from er3a.pipeline.viewing.viewer import draw_previews
 
-    recording = reports / robot / f"{stage}.rrd"
-    picture = recording.with_suffix(".webp")
-    moment = run.show("record", stage, study, robot, results / robot / stage, recording)
-    problem = draw_preview(recording, picture, moment) or ""
-    write_checksum(recording)
-    write_checksum(picture)
+    wanted = []
+    for stage in stages:
+        recording = reports / robot / f"{stage}.rrd"
+        moment = run.show("record", stage, study, robot, results / robot / stage, recording)
+        wanted.append((recording, recording.with_suffix(".webp"), moment))
+    problem = draw_previews(wanted)
+    for recording, picture, _ in wanted:
+        write_checksum(recording)
+        write_checksum(picture)
     return problem
 
 

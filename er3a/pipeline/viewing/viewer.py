@@ -21,11 +21,13 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any, TypeVar
 from urllib.parse import urlencode
 
 from PIL import Image
@@ -236,56 +238,83 @@ TITLE_BAR = 36
 TIME_BAR = 34  # left out: it fills as loading goes
 QUALITY = 75
 PATIENCE_S = 60
+Answer = TypeVar("Answer")
 
 
-def draw_preview(recording: Path, output: Path, moment: float | None = None) -> str | None:
-    """Draw a recording as a WebP picture.
+def draw_previews(wanted: Sequence[tuple[Path, Path, float | None]]) -> str:
+    """Draw recordings as WebP pictures, in one viewer: starting it takes longer than a picture.
 
     Parameters
     ----------
-    moment : s on the recording's timeline, that the picture shows; None for how it opens
+    wanted : recording, picture to write, and the moment that it shows, s on the recording's timeline; None for how it
+        opens
 
     Returns
     -------
-    why it could not be drawn, None if it was; what could not be drawn becomes an empty file
+    why one could not be drawn, empty if all were; what could not be drawn becomes an empty file
     """
-    try:
-        picture = _picture(recording, moment)
-    except Er3aError as error:
-        write_empty(output)
-        return str(error)
-    write_atomically(output, lambda file: file.write_bytes(picture))
-    return None
+    reason = ""
+    while wanted:
+        pictures, problem = _pictures(wanted)
+        reason = problem or reason
+        done = [*pictures, b""] if problem else pictures
+        for (_, output, _), picture in zip(wanted, done):
+            write_atomically(output, partial(Path.write_bytes, data=picture))
+        wanted = wanted[len(done) :]
+    return reason
 
 
-def write_empty(output: Path) -> None:
-    """Write the picture of a recording that is not drawn.
+def _pictures(wanted: Sequence[tuple[Path, Path, float | None]]) -> tuple[list[bytes], str]:
+    """As many of the pictures, in their order, as one viewer draws; and why it does not draw the next one, if so."""
+    from rerun.experimental import ViewerClient  # takes long to import, and `er3a view` needs none
 
-    Parameters
-    ----------
-    output : becomes an empty file, by which pages know that there is no picture
-    """
-    write_atomically(output, lambda file: file.write_bytes(b""))
-
-
-def _picture(recording: Path, moment: float | None) -> bytes:
+    drawn: list[bytes] = []
     with TemporaryDirectory(prefix="er3a-preview-") as folder:
         messages, port = Path(folder) / "messages", free_port()
         words = ("--headless", "--port", str(port), "--window-size", WINDOW, "--hide-welcome-screen")
-        with viewer_running([recording], *words, messages=messages) as viewer:
+        with viewer_running([wanted[0][0].resolve()], *words, messages=messages) as viewer:
             try:
-                shot = _shoot(port, viewer, moment)
+                client = _answered(viewer, lambda: ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy"))
+                for recording, _, moment in wanted:
+                    image = Image.open(io.BytesIO(_shoot(client, viewer, recording, moment))).convert("RGB")
+                    encoded = io.BytesIO()
+                    image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR)).save(
+                        encoded, "WEBP", quality=QUALITY
+                    )
+                    drawn.append(encoded.getvalue())
             except EOFError:
-                raise Er3aError(_why(messages.read_text(encoding="utf-8", errors="replace"))) from None
-        image = Image.open(io.BytesIO(shot)).convert("RGB")
-        views = image.crop((0, TITLE_BAR, image.width, image.height - TIME_BAR))
-        encoded = io.BytesIO()
-        views.save(encoded, "WEBP", quality=QUALITY)
-        return encoded.getvalue()
+                return drawn, _why(messages.read_text(encoding="utf-8", errors="replace"))
+            except Er3aError as error:
+                return drawn, str(error)
+    return drawn, ""
 
 
-def _shoot(port: int, viewer: subprocess.Popen[bytes], moment: float | None) -> bytes:
-    """Have the viewer draw pictures until one is like the one before: everything is loaded then.
+def _shoot(client: Any, viewer: subprocess.Popen[bytes], recording: Path, moment: float | None) -> bytes:
+    """A recording's picture: drawn again until one is like the one before, as everything is loaded then."""
+    opened = _answered(viewer, lambda: client.open(str(recording.resolve()))).store_ids
+    before = b""
+
+    def shown() -> bool:
+        state = client.get_state()
+        if state.active_recording not in opened or state.loading:
+            return False
+        client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
+        if moment is not None:
+            client.set_time(duration=moment)
+        return True
+
+    def steady() -> bytes:
+        nonlocal before
+        picture, last = client.take_screenshot(), before
+        before = picture
+        return picture if picture == last else b""
+
+    _answered(viewer, shown)
+    return _answered(viewer, steady)
+
+
+def _answered(viewer: subprocess.Popen[bytes], ask: Callable[[], Answer]) -> Answer:
+    """What the viewer answers as soon as it has something to say.
 
     Raises
     ------
@@ -294,30 +323,14 @@ def _shoot(port: int, viewer: subprocess.Popen[bytes], moment: float | None) -> 
     Er3aError
         if that takes longer than PATIENCE_S
     """
-    from rerun.experimental import ViewerClient  # takes long to import, and `er3a view` needs none
-
-    client, bare, before = None, False, b""
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline:
         if viewer.poll() is not None:
             raise EOFError
-        try:
-            client = client or ViewerClient(f"rerun+http://{LOOPBACK}:{port}/proxy")
-            state = client.get_state()
-            if not state.active_recording or state.loading:
-                raise ConnectionError
-            if not bare:
-                client.run_command("ui.toggle_blueprint_panel")  # its tree unfolds or not, as loading goes
-                if moment is not None:
-                    client.set_time(duration=moment)
-                bare = True
-            picture = client.take_screenshot()
-        except (ConnectionError, RuntimeError):
-            time.sleep(0.05)
-            continue
-        if picture == before:
-            return picture
-        before = picture
+        with suppress(ConnectionError, RuntimeError):
+            if answer := ask():
+                return answer
+        time.sleep(0.05)
     raise Er3aError(f"the viewer drew no steady picture in {PATIENCE_S} s")
 
 
