@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
+from er3a.files.straight_code import Straight
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
 
@@ -79,7 +80,17 @@ class Code:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
-        self.text = _COMMENT.sub(kept, text)
+        self._lines = list(range(1, text.count("\n") + 2))
+        self._take(_COMMENT.sub(kept, text))
+        straight = Straight(
+            self.text, _arrays(self), parts, [(each.start, each.end, each.inside) for each in self.groups]
+        )
+        if straight.text != self.text:
+            self._lines = straight.lines
+            self._take(straight.text)
+
+    def _take(self, text: str) -> None:
+        self.text = text
         self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
         self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
         self.lists = {name: cells for name, cells, _, _ in _named_lists(self)}
@@ -87,7 +98,7 @@ class Code:
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
-        return self.text.count("\n", 0, place) + 1
+        return self._lines[self.text.count("\n", 0, place)]
 
 
 def groups_of(text: str) -> list[CodeGroup]:
@@ -153,6 +164,29 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
     return grid
 
 
+def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
+    """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of a name
+    that has two."""
+    found, twice = dict[str, list[dict[str, str]]](), set[str]()
+    for group in code.groups:
+        name = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)?$", group.before)
+        if name is None:
+            continue
+        rows = [cells for _, cells in _rows(code, group)]
+        rows = rows if len(rows) > 1 else [[cell] for cell in code.lists.get(name[1], ())]
+        fields = next(
+            (names for each, names in code.fields.items() if each and re.search(rf"\b{each}\b", group.before)), []
+        )
+        made = []
+        for cells in rows:
+            pairs = [re.fullmatch(r"[\"'.]?(\w+)[\"']?\s*[:=]\s*(.+)", cell, re.S) for cell in cells]
+            named = {pair[1]: pair[2] for pair in pairs if pair} or dict(zip(fields, cells))
+            made.append({str(k): cell for k, cell in enumerate(cells)} | named)
+        if made and found.setdefault(name[1], made) != made:
+            twice.add(name[1])
+    return {name: rows for name, rows in found.items() if name not in twice}
+
+
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     """The tables in a program or in data.
 
@@ -203,11 +237,6 @@ def _calls(code: Code) -> list[Grid]:
         )
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    plain = "0", "revolute", "standard", "modified"
-    if len(rows) == 1 and all(
-        _INDEXED.search(cell) or cell in (*plain, *code.lists) for cell in texts
-    ):  # made of lists in a loop
-        return []
     looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))
     if rows and (".extend(" in code.text or looped):
         problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
