@@ -103,7 +103,7 @@ class Straight:
         blocks = {start: (end, body) for start, end, body in inside}
         for each in _C.finditer(text):
             end, body = blocks.get(each.end(), (0, ""))
-            over = each[6] or f"{each[2]}:{each[4]}" + ("" if each[3] == "<=" else " - 1")
+            over = each[6] or (f"{each[2]}:{each[4]}" if each[3] == "<=" else f"range({each[2]},{each[4]})")
             if end or (statement := re.match(r"[^;{}]*;", text[each.end() :])):
                 end, body = (end, body) if end else (each.end() + len(statement[0]) - 1, statement[0])
                 yield _Loop(each.start(), end + 1, body, each[1] or each[5], over)

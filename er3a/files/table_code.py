@@ -211,8 +211,8 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 def _calls(code: Code) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread = list[_Link](), list[int]()
-    for each in code.groups:
+    rows, unread = list(_segments(code)), list[int]()
+    for each in () if rows else code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
@@ -250,10 +250,36 @@ def _calls(code: Code) -> list[Grid]:
     return [_grid([(row.line, row.cells) for row in each]) for each in held]
 
 
+def _segments(code: Code) -> Iterator[_Link]:
+    """Rows of KDL's chain, ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``; its joint comes first."""
+    if "Frame::DH(" not in code.text:
+        return
+    joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=][^;\n]*?(\w+)\)*\s*;", code.text))
+    frames = dict(re.findall(r"\bFrame\s+(\w+)\s*[({=]([^;\n]*)", code.text))
+    for each in code.groups:
+        if not re.search(r"\bSegment\s*$", each.before):
+            continue
+        said = [joints.get(part) or frames.get(part) or part for part in parts(each.inside)]
+        kind = next(filter(None, (re.search(r"\b(?:Rot|Trans)\w+\b|\bNone\b", part) for part in said)), None)
+        row = next(filter(None, (re.search(r"Frame::DH\((.*)\)", part, re.S) for part in said)), None)
+        if kind is None or row is None or kind[0] not in _KDL:
+            remedy = "Write all as Frame::DH of joints RotZ, TransZ or None, or as rows of a table"
+            raise InputError(
+                None, f"line {code.line(each.start)}", f"'{each.inside[:60]}' is no row of a table", remedy
+            )
+        cells = dict(zip(("a", "alpha", "d", "theta"), parts(row[1])))
+        chain = re.findall(r"(\w+)(?:\.|->)addSegment", each.before)
+        name = f"{chain[-1] if chain else ''}[{each.start}"
+        yield _Link(code.line(each.start), name, each.start, cells | {"type": _KDL[kind[0]], "convention": "standard"})
+
+
+_KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
+
+
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
-    orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
+    orders = dict[str, list[str]]()
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
@@ -503,8 +529,15 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     for text in texts:
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
-        windows = (words[start : start + width] for start in range(len(words) - width + 1))
-        if names := next(filter(_names_columns, windows), []):
+        windows = [words[start : start + width] for start in range(len(words) - width + 1)]
+        # Part of a wider row's names is none of a narrower.
+        wider = [words[start : start + width + 1] for start in range(len(words) - width)]
+        whole = [
+            window
+            for window in windows
+            if not any(window in (each[1:], each[:-1]) for each in filter(_names_columns, wider))
+        ]
+        if names := next(filter(_names_columns, whole), []):
             found.setdefault(" ".join(map(_place, names)), names)
     return next(iter(found.values())) if len(found) == 1 else []
 
@@ -577,6 +610,8 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
         heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
+        if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
+            continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
             text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)
