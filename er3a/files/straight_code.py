@@ -15,12 +15,14 @@ Arrays = Mapping[str, list[dict[str, str]]]
 of one cell."""
 
 MOST_RUNS = 40
-LONGEST_RESULT = 200_000
+LONGEST = 200_000
 _MAKES = re.compile(r"\b\w*(?:link|revolute|prismatic)\w*\s*\(|\bDH\s*\(|\balpha\s*=(?!=)", re.I)
 _BRANCHES = re.compile(r"\b(?:if|else|elif|while|switch|case|for|lambda)\b")
 _NAMES = r"([\w, \t()]+?)"
 _PYTHON = re.compile(rf"(?m)^([ \t]*)for[ \t]+{_NAMES}[ \t]+in[ \t]+([^\n]+?):[ \t]*\n((?:\1[ \t]+.*\n?|[ \t]*\n)+)")
-_MATLAB = re.compile(r"(?ms)^[ \t]*for\s*\(?\s*(\w+)\s*(=|in)\s*(\d+:[^\n,;]+?)\)?[ \t]*[,;\n](.{0,4000}?)\bend\b")
+_MATLAB = re.compile(
+    r"(?ms)^[ \t]*for\s*\(?\s*(\w+)\s*(=|in)\s*(\d+:[^\n,;]+?)\)?[ \t]*[,;\n](.{0,4000}?)\bend\b(?!\s*\+)"
+)
 _C = re.compile(
     r"\bfor\s*\((?:[^;()]*?(\w+)\s*=\s*(\d+)\s*;\s*\1\s*(<=?)\s*([^;]+?)\s*;[^)]*"
     r"|\s*(?:const\s+)?auto\s*&?\s*(\w+)\s*:\s*(\w+)\s*)\)\s*"
@@ -73,27 +75,34 @@ class Straight:
         self.arrays, self.parts, self.program = arrays, parts, text
         self.first = {"(": 1, "[": 1 if re.search(r"(?m)^\s*for\s+\w+\s+in\s+1:", text) else 0}
         self.used: dict[str, set[int]] = {}
-        made, self.lines, done, line = "", [1], 0, 1
+        self.text, self.lines, done, line, several = "", [1], 0, 1, 0
         for loop in sorted(self._loops(text, inside), key=lambda each: each.start):
             straight = loop.start >= done and _MAKES.search(loop.body) and not _BRANCHES.search(loop.body)
-            runs = self._runs(loop) if straight else []
             kept = {name: {*rows} for name, rows in self.used.items()}
-            copies = [self._run(loop, k, run) for k, run in enumerate(runs[:MOST_RUNS])]
-            if not runs or self.used == kept:  # nothing of an array is used
+            copies = [self._run(loop, k, run) for k, run in enumerate(self._runs(loop)[:MOST_RUNS])] if straight else []
+            if self.used == kept:  # nothing of an array is used, or what has been used
                 continue
-            before, after = text[done : loop.start], loop.mark.join(copies)
-            made += before + after + loop.mark
-            self.lines += [line + k for k in range(1, before.count("\n") + 1)]
-            line += before.count("\n")
-            self.lines += [line] * (after + loop.mark).count("\n")
+            for piece, grows in ((text[done : loop.start], 1), (loop.mark.join([*copies, ""]), 0)):
+                self.text += piece
+                self.lines += [line + grows * k for k in range(1, piece.count("\n") + 1)]
+                line += grows * piece.count("\n")
             line += text.count("\n", loop.start, loop.end)
-            done = loop.end
-        rest = text[done:]
-        self.lines += [line + k for k in range(1, rest.count("\n") + 1)]
-        self.text = _ELEMENT.sub(lambda found: self._element(found, 2), made + rest)
-        partly = any(len(arrays[name]) != len(rows) for name, rows in self.used.items() if len(arrays[name][0]) > 2)
-        if partly or len(self.text) > LONGEST_RESULT:
+            done, several = loop.end, several + 1
+        self.lines += [line + k for k in range(1, text.count("\n", done) + 1)]
+        self.text += text[done:]
+        looped, self.used = self.used, {name: {*rows} for name, rows in self.used.items()}
+        filled = _ELEMENT.sub(self._element, self.text)
+        whole = {
+            name for name, rows in self.used.items() if len(rows) == len(arrays[name]) and len(arrays[name][0]) > 1
+        }
+        if (
+            several > 1
+            or any(len(arrays[name][0]) > 1 and name not in whole for name in looped)
+            or len(filled) > LONGEST
+        ):
             self.text, self.lines = text, list(range(1, text.count("\n") + 2))
+        elif whole:
+            self.text = _ELEMENT.sub(lambda found: self._element(found) if found[1] in whole else found[0], self.text)
 
     def _loops(self, text: str, inside: list[tuple[int, int, str]]) -> Iterator[_Loop]:
         for each in _PYTHON.finditer(text):
@@ -165,7 +174,7 @@ class Straight:
         for statement in statements:
             assigned = _ASSIGNED.fullmatch(statement)
             names = re.findall(r"\w+", assigned[1]) if assigned else []
-            value = self._filled(assigned[2] if assigned else statement, values)
+            value = self._filled(assigned[2] if assigned else re.sub(r"\bend\s*\+\s*1", f"{k + 1}", statement), values)
             cells = self.parts(value.strip("[]()") if len(names) > 1 else value, ",")
             if names and (loop.mark == ", " or _MAKES.search(value) or len(cells) != len(names)):
                 values |= {name: f"{name}_{k}" for name in names} if loop.mark == "\n" else {}
@@ -181,13 +190,13 @@ class Straight:
         names = "|".join(map(re.escape, values))
         pattern = rf"(?<![\w.'\"])({names})\b(?!\s*=(?!=)|['\"])"
         text = re.sub(pattern, lambda found: values[found[1]], text) if values else text
-        return _ELEMENT.sub(lambda found: self._element(found, 0), text)
+        return _ELEMENT.sub(self._element, text)
 
-    def _element(self, found: re.Match[str], narrowest: int) -> str:
+    def _element(self, found: re.Match[str]) -> str:
         """A row, a cell or a named part of an array, as it is written in a program; unchanged if it has none."""
         rows, first = self.arrays.get(found[1], []), self.first[found[2]]
         k = sum(int(each.replace(" ", "")) for each in re.findall(r"[-+]?\s*\d+", found[3])) - first
-        if not 0 <= k < len(rows) or len(rows[k]) < narrowest:
+        if not 0 <= k < len(rows):
             return found[0]
         row, key = rows[k], found[5] or found[6]
         cells = [_whole(cell) for place, cell in row.items() if place.isdecimal()]

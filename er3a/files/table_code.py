@@ -165,26 +165,31 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
 
 
 def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
-    """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of a name
-    that has two."""
-    found, twice = dict[str, list[dict[str, str]]](), set[str]()
+    """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of what is
+    assigned twice, or in part."""
+    found, times = dict[str, list[dict[str, str]]](), dict[str, list[bool]]()
     for group in code.groups:
         name = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)?$", group.before)
         if name is None:
             continue
         rows = [cells for _, cells in _rows(code, group)]
         rows = rows if len(rows) > 1 else [[cell] for cell in code.lists.get(name[1], ())]
-        fields = next(
-            (names for each, names in code.fields.items() if each and re.search(rf"\b{each}\b", group.before)), []
-        )
-        made = []
+        typed = (names for each, names in code.fields.items() if each and re.search(rf"\b{each}\b", group.before))
+        fields, made = next(typed, ()), []
         for cells in rows:
             pairs = [re.fullmatch(r"[\"'.]?(\w+)[\"']?\s*[:=]\s*(.+)", cell, re.S) for cell in cells]
             named = {pair[1]: pair[2] for pair in pairs if pair} or dict(zip(fields, cells))
             made.append({str(k): cell for k, cell in enumerate(cells)} | named)
-        if made and found.setdefault(name[1], made) != made:
-            twice.add(name[1])
-    return {name: rows for name, rows in found.items() if name not in twice}
+        if made:
+            times.setdefault(name[1], []).append(found.setdefault(name[1], made) == made)
+    calls = [each for each in code.groups if each.bracket == "("]
+    for name in [*found]:
+        again = rf"(?m)(?:^|;)[ \t]*(?:[\w:<>]+ )*(?:self\.)?{name}[ \t]*(?:[\[(][^\n=]*[\])])?[ \t]*[-+*/]?=(?!=)"
+        set_at = [each.end() for each in re.finditer(again, code.text)]
+        set_at = [place for place in set_at if not any(each.start < place < each.end for each in calls)]
+        if not all(times[name]) or len(set_at) > len(times[name]):
+            del found[name]
+    return found
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
