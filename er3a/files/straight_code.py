@@ -1,37 +1,38 @@
-"""Loops of a program that make links, written out, with the elements of lists and matrices in place of their indices.
+"""A program's loops over the rows of a table, written out, with elements of its lists and matrices in their places.
 
-Only what runs straight on is: a loop over a known range, or over the rows of a matrix, whose body has no branch. It is
-text that is rewritten; nothing is executed.
+Only what runs straight on is: a loop over all rows, which makes links and has no branch. It is text that is rewritten;
+nothing is executed.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+
+from er3a.files.code_brackets import groups_of, parts
 
 Arrays = Mapping[str, list[dict[str, str]]]
 """Rows by the name of their matrix: cells by their place, ``"0"``, and by their name if they have one. A list has rows
 of one cell."""
 
-MOST_RUNS = 40
-LONGEST = 200_000
-_MAKES = re.compile(r"\b\w*(?:link|revolute|prismatic)\w*\s*\(|\bDH\s*\(|\balpha\s*=(?!=)", re.I)
+MOST_ROWS = 40
+_MAKES = re.compile(r"\b\w*(?:link|revolute|prismatic)\w*\s*\(|\bDH\s*\(|[(,]\s*alpha\s*=(?!=)", re.I)
 _BRANCHES = re.compile(r"\b(?:if|else|elif|while|switch|case|for|lambda)\b")
-_NAMES = r"([\w, \t()]+?)"
-_PYTHON = re.compile(rf"(?m)^([ \t]*)for[ \t]+{_NAMES}[ \t]+in[ \t]+([^\n]+?):[ \t]*\n((?:\1[ \t]+.*\n?|[ \t]*\n)+)")
-_MATLAB = re.compile(
-    r"(?ms)^[ \t]*for\s*\(?\s*(\w+)\s*(=|in)\s*(\d+:[^\n,;]+?)\)?[ \t]*[,;\n](.{0,4000}?)\bend\b(?!\s*\+)"
+_LOOPS = (
+    re.compile(
+        r"(?m)^([ \t]*)for[ \t]+(?P<names>[\w, \t()]+?)[ \t]+in[ \t]+(?P<over>[^\n]+?):[ \t]*\n"
+        r"(?P<body>(?:\1[ \t]+.*\n?|[ \t]*\n)+)"
+    ),
+    re.compile(
+        r"(?ms)^[ \t]*for[\s(]+(?P<names>\w+)\s*(?:=|in)\s*(?P<over>1:[^\n,;)]+)\)?[ \t]*[,;\n]"
+        r"(?P<body>.{0,4000}?)\bend\b(?!\s*\+)"
+    ),
+    re.compile(
+        r"\bfor\s*\([^;:()]*?(?P<names>\w+)\s*(?::(?!:)|=)\s*(?P<over>[^;()]+?(?:;[^;]+;[^)]*)?)\)\s*"
+        r"\{?(?P<body>[^{}]*?)(?:\}|(?<=;))"
+    ),
 )
-_C = re.compile(
-    r"\bfor\s*\((?:[^;()]*?(\w+)\s*=\s*(\d+)\s*;\s*\1\s*(<=?)\s*([^;]+?)\s*;[^)]*"
-    r"|\s*(?:const\s+)?auto\s*&?\s*(\w+)\s*:\s*(\w+)\s*)\)\s*"
-)
-_BUILT = re.compile(rf"(.*?\S)\s+for\s+{_NAMES}\s+in\s+([^\[\]{{}}]+)", re.S)
-_RANGE = re.compile(r"range\((?:([^,()]+),)?\s*([^,]+)\)|(\d+)\s*:\s*(.+)")
-_LENGTH = re.compile(
-    r"(?:len|length|numel|size)\(\s*(?:\w+\.)*(\w+)\s*(?:,\s*1\s*)?\)|(?:\w+\.)*?(\w+)\.(?:shape\[0\]|size\(\))"
-)
+_BUILT = re.compile(r"(?P<body>.*?\S)\s+for\s+(?P<names>[\w, \t()]+?)\s+in\s+(?P<over>[^\[\]{}]+)", re.S)
 _ELEMENT = re.compile(
     r"\*?(?<![\w'\"])(?:\w+\.)*\b([^\W\d]\w*)([\[(])\s*([\d+\- ]+?)\s*(?:(?:,|\]\s*\[)\s*(\d+|:)\s*)?[\])]"
     r"(?:\.([^\W\d]\w*)\b(?!\()|\[[\"'](\w+)[\"']\])?(?!\s*=(?!=))"
@@ -39,178 +40,116 @@ _ELEMENT = re.compile(
 _ASSIGNED = re.compile(r"(?:(?:const|double|float|auto)\s+)*([^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*=(?!=)\s*(.+)", re.S)
 
 
-@dataclass(frozen=True)
-class _Loop:
-    start: int
-    end: int
-    body: str
-    names: str
-    over: str
-    mark: str = "\n"
-
-
-class Straight:
-    """A program's text with its loops written out.
+class Program:
+    """A program whose loop over a table's rows is written out.
 
     Parameters
     ----------
     text : without comments
     arrays : what its lists and matrices hold
-    parts : cuts a text at marks that are in no brackets
-    inside : the beginnings, ends and texts of its pairs of brackets
-
-    Attributes
-    ----------
-    text : with the loops written out; as it was if a matrix would be used in part only
-    lines : the number of each of its lines in the program
     """
 
-    def __init__(
-        self,
-        text: str,
-        arrays: Arrays,
-        parts: Callable[[str, str], list[str]],
-        inside: list[tuple[int, int, str]],
-    ):
-        self.arrays, self.parts, self.program = arrays, parts, text
-        self.first = {"(": 1, "[": 1 if re.search(r"(?m)^\s*for\s+\w+\s+in\s+1:", text) else 0}
+    def __init__(self, text: str, arrays: Arrays):
+        self.text, self.arrays = text, arrays
+        self.first = {"(": 1, "[": int(bool(re.search(r"(?m)^\s*for\s+\w+\s+in\s+1:", text)))}
         self.used: dict[str, set[int]] = {}
-        self.text, self.lines, done, line, several = "", [1], 0, 1, 0
-        for loop in sorted(self._loops(text, inside), key=lambda each: each.start):
-            straight = loop.start >= done and _MAKES.search(loop.body) and not _BRANCHES.search(loop.body)
-            kept = {name: {*rows} for name, rows in self.used.items()}
-            copies = [self._run(loop, k, run) for k, run in enumerate(self._runs(loop)[:MOST_RUNS])] if straight else []
-            if self.used == kept:  # nothing of an array is used, or what has been used
-                continue
-            for piece, grows in ((text[done : loop.start], 1), (loop.mark.join([*copies, ""]), 0)):
-                self.text += piece
-                self.lines += [line + grows * k for k in range(1, piece.count("\n") + 1)]
-                line += grows * piece.count("\n")
-            line += text.count("\n", loop.start, loop.end)
-            done, several = loop.end, several + 1
-        self.lines += [line + k for k in range(1, text.count("\n", done) + 1)]
-        self.text += text[done:]
-        looped, self.used = self.used, {name: {*rows} for name, rows in self.used.items()}
-        filled = _ELEMENT.sub(self._element, self.text)
-        whole = {
-            name for name, rows in self.used.items() if len(rows) == len(arrays[name]) and len(arrays[name][0]) > 1
-        }
-        if (
-            several > 1
-            or any(len(arrays[name][0]) > 1 and name not in whole for name in looped)
-            or len(filled) > LONGEST
-        ):
-            self.text, self.lines = text, list(range(1, text.count("\n") + 2))
-        elif whole:
-            self.text = _ELEMENT.sub(lambda found: self._element(found) if found[1] in whole else found[0], self.text)
 
-    def _loops(self, text: str, inside: list[tuple[int, int, str]]) -> Iterator[_Loop]:
-        for each in _PYTHON.finditer(text):
-            yield _Loop(each.start(), each.end(), each[4], each[2], each[3])
-        for each in _MATLAB.finditer(text):
-            yield _Loop(each.start(), each.end(), each[4], each[1], each[3])
-        blocks = {start: (end, body) for start, end, body in inside}
-        for each in _C.finditer(text):
-            end, body = blocks.get(each.end(), (0, ""))
-            over = each[6] or (f"{each[2]}:{each[4]}" if each[3] == "<=" else f"range({each[2]},{each[4]})")
-            if end or (statement := re.match(r"[^;{}]*;", text[each.end() :])):
-                end, body = (end, body) if end else (each.end() + len(statement[0]) - 1, statement[0])
-                yield _Loop(each.start(), end + 1, body, each[1] or each[5], over)
-        for start, end, body in inside:
-            if built := _BUILT.fullmatch(body):
-                yield _Loop(start + 1, end, built[1], built[2], built[3], ", ")
+    def written_out(self) -> str:
+        """The text with the loop's runs, in as many lines, and with the elements of matrices that are used whole.
 
-    def _runs(self, loop: _Loop) -> list[dict[str, str]]:
-        """What the loop's variables are in each of its runs; [] if that is not known."""
-        names, over = re.findall(r"\w+", loop.names), re.sub(r"\bself\.", "", loop.over.strip())
-        counter = ""
-        if found := re.fullmatch(r"enumerate\((.+?)(?:,.*)?\)", over):
-            counter, over = names.pop(0), found[1].strip()
-        if found := re.fullmatch(r"zip\((.+)\)", over):
-            several = [each.strip() for each in found[1].split(",")]
-            sizes = {len(self.arrays.get(each, ())) for each in several}
-            if len(several) != len(names) or len(sizes) > 1:
-                return []
-            return [{name: f"{each}[{k}]" for name, each in zip(names, several)} for k in range(*sizes)]
-        if over in self.arrays:
-            runs = [self._row(names, over, k) for k in range(len(self.arrays[over]))]
-        elif found := _RANGE.fullmatch(over):
-            first = self._number(found[1] or found[3] or "0")
-            last = self._number(found[2] or found[4])
-            size = self._common(names, loop.body) if last is None else last - (first or 0) + bool(found[4])
-            runs = [{names[0]: str((first or 0) + k)} for k in range(size)] if first is not None else []
-        else:
-            runs = [{names[0]: str(k)} for k in range(self._common(names, loop.body))]
-        return [run | ({counter: str(k)} if counter else {}) for k, run in enumerate(runs)] if all(runs) else []
+        Returns
+        -------
+        text : as it was if several loops make links, or the loop leaves rows of a matrix to others
+        """
+        made = [(*each[1:], after) for each in self._loops() if (after := self._runs(*each))]
+        if len(made) > 1:
+            return self.text
+        text, looped = self.text, {*self.used}
+        for _, start, end, after in made:
+            text = f"{text[:start]}{after}{text.count(chr(10), start, end) * chr(10)}{text[end:]}"
+        _ELEMENT.sub(self._element, text)
+        wide = {name for name in self.used if len(self.arrays[name][0]) > 1}
+        whole = {name for name in wide if len(self.used[name]) == len(self.arrays[name])}
+        if looped & wide - whole:
+            return self.text
+        return _ELEMENT.sub(lambda found: self._element(found) if found[1] in whole else found[0], text)
 
-    def _row(self, names: list[str], over: str, k: int) -> dict[str, str]:
-        """What the variables of a loop over a matrix are in its row; {} if they are not as many as its cells."""
-        row = self.arrays[over][k]
-        if len(names) == 1:
-            return {names[0]: f"{over}[{k + self.first['[']}]"}
-        cells = [cell for place, cell in row.items() if place.isdecimal()]
-        self.used.setdefault(over, set()).add(k)
-        return dict(zip(names, map(_whole, cells))) if len(cells) == len(names) else {}
+    def _loops(self) -> Iterator[tuple[re.Match[str], str, int, int]]:
+        """Loops without a branch that make links, what is between their runs, where they begin and end."""
+        found = [(each, "; ", 0) for pattern in _LOOPS for each in pattern.finditer(self.text)]
+        built = [(_BUILT.fullmatch(group.inside), ", ", group.start + 1) for group in groups_of(self.text)]
+        for loop, mark, start in [*found, *built]:
+            if loop and _MAKES.search(loop["body"]) and not _BRANCHES.search(loop["body"]):
+                yield loop, mark, start + loop.start(), start + loop.end()
 
-    def _common(self, names: list[str], body: str) -> int:
-        """The length of all lists that a variable goes through, if they say enough of a row; 0 if it is not one."""
-        through = rf"\b{{}}\s*[\[(]\s*{names[0]}\b"
-        held = [rows for name, rows in self.arrays.items() if re.search(through.format(name), body)]
-        sizes = {len(rows) for rows in held}
-        return sizes.pop() if len(sizes) == 1 and (len(held) > 2 or len(held[0][0]) > 2) else 0
+    def _runs(self, loop: re.Match[str], mark: str, *_: int) -> str:
+        """A loop's runs; "" if it is not known to go through all rows in their order."""
+        counts = dict(re.findall(r"\b(\w+)\s*=\s*(\d+)\s*(?:[;\n]|$)", self.text))
+        over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), loop["over"].strip())
+        names = re.findall(r"\w+", loop["names"])
+        indexed = rf"\b([^\W\d]\w*)\s*[\[(]\s*{names[0]}\b"
+        inside = self.arrays.keys() & {*re.findall(indexed, loop["body"])}
+        through = [name for name in re.findall(r"[^\W\d]\w*", over) if name in self.arrays]
+        sizes = {len(self.arrays[name]) for name in (*inside, *through)}
+        first, numbers = int(over[:1] == "1"), {*map(int, re.findall(r"\d+", over))}
+        said = numbers & sizes or through or len(inside) > 2 or any(len(self.arrays[name][0]) > 2 for name in inside)
+        other = numbers - {first, *sizes} or re.search(r"[-+]\s*\d|reversed|sorted", over)
+        if len(sizes) != 1 or other or not said:
+            return ""
+        by_index = not through or re.search(r"range|len|numel|size|[:;]", over)
+        runs = [{names[0]: str(k + first)} if by_index else self._row(names, through, over, k) for k in range(*sizes)]
+        return mark.join(self._run(loop["body"], k, run, mark) for k, run in enumerate(runs)) if all(runs) else ""
 
-    def _number(self, text: str) -> int | None:
-        """A count: a number, the length of a list, or a name that has one value."""
-        text = text.strip()
-        if found := _LENGTH.fullmatch(text):
-            return len(self.arrays.get(found[1] or found[2], ())) or None
-        given = {text} if text.isdecimal() else {*re.findall(rf"\b{re.escape(text)}\s*=\s*(\d+)\b(?!\.)", self.program)}
-        return int(given.pop()) if len(given) == 1 else None
+    def _row(self, names: list[str], through: list[str], over: str, k: int) -> dict[str, str]:
+        """What the variables of a loop over rows are in one; {} if they are not as many as its cells."""
+        run = {names[0]: str(k)} if "enumerate" in over else {}
+        names = names[len(run) :]
+        values = [f"{name}[{k + self.first['[']}]" for name in through]
+        if len(through) == 1 and len(names) > 1:
+            self.used.setdefault(through[0], set()).add(k)
+            values = _cells(self.arrays[through[0]][k])
+        return run | dict(zip(names, values)) if len(names) == len(values) else {}
 
-    def _run(self, loop: _Loop, k: int, run: dict[str, str]) -> str:
-        """The statements of a loop's run, with the values of what is assigned in it."""
-        made, values = [], dict(run)
-        statements = [each for line in self.parts(loop.body, "\n") for each in self.parts(line, ";") if each]
-        for statement in statements:
-            assigned = _ASSIGNED.fullmatch(statement)
+    def _run(self, body: str, k: int, run: dict[str, str], mark: str) -> str:
+        """The statements of a run, with the values of what is assigned in it."""
+        made, values = list[str](), dict(run)
+        for statement in (each for line in parts(body, "\n") for each in parts(line, ";") if each):
+            assigned = _ASSIGNED.fullmatch(statement) if mark == "; " else None
             names = re.findall(r"\w+", assigned[1]) if assigned else []
             value = self._filled(assigned[2] if assigned else re.sub(r"\bend\s*\+\s*1", f"{k + 1}", statement), values)
-            cells = self.parts(value.strip("[]()") if len(names) > 1 else value, ",")
-            if names and (loop.mark == ", " or _MAKES.search(value) or len(cells) != len(names)):
-                values |= {name: f"{name}_{k}" for name in names} if loop.mark == "\n" else {}
-                made.append(f"{', '.join(values.get(name, name) for name in names)} = {value}")
-            elif names:
-                values |= dict(zip(names, map(_whole, cells)))
-            else:
+            cells = parts(value.strip("[]()")) if len(names) > 1 else [value]
+            if not names:
                 made.append(value)
-        return "\n".join(made)
+            elif len(cells) != len(names) or _MAKES.search(value):
+                values |= {name: f"{name}_{k}" for name in names}
+                made.append(f"{', '.join(map(values.__getitem__, names))} = {value}")
+            else:
+                values |= dict(zip(names, map(_whole, cells)))
+        return mark.join(made).replace("\n", " ")
 
     def _filled(self, text: str, values: Mapping[str, str]) -> str:
         """A text with values in place of names, which are no keys, attributes or words."""
-        names = "|".join(map(re.escape, values))
-        pattern = rf"(?<![\w.'\"])({names})\b(?!\s*=(?!=)|['\"])"
-        text = re.sub(pattern, lambda found: values[found[1]], text) if values else text
-        return _ELEMENT.sub(self._element, text)
+        pattern = rf"(?<![\w.'\"])({'|'.join(map(re.escape, values))})\b(?!\s*=(?!=)|['\"])"
+        return _ELEMENT.sub(self._element, re.sub(pattern, lambda found: values[found[1]], text))
 
     def _element(self, found: re.Match[str]) -> str:
         """A row, a cell or a named part of an array, as it is written in a program; unchanged if it has none."""
         rows, first = self.arrays.get(found[1], []), self.first[found[2]]
         k = sum(int(each.replace(" ", "")) for each in re.findall(r"[-+]?\s*\d+", found[3])) - first
-        if not 0 <= k < len(rows):
-            return found[0]
-        row, key = rows[k], found[5] or found[6]
-        cells = [_whole(cell) for place, cell in row.items() if place.isdecimal()]
-        if found[4] and found[4] != ":":
-            key = str(int(found[4]) - first)
-        if key and key not in row:
+        row = rows[k] if 0 <= k < len(rows) else {}
+        key = str(int(found[4]) - first) if found[4] and found[4] != ":" else found[5] or found[6]
+        if not row or (key and key not in row):
             return found[0]
         self.used.setdefault(found[1], set()).add(k)
-        if key:
-            return _whole(row[key])
+        cells = [_whole(row[key])] if key else _cells(row)
+        if found[2] == "[" and found[0][0] != "*" and len(cells) > 1:
+            return f"[{', '.join(cells)}]"
         around = found.string[: found.start()].rstrip()[-1:] + found.string[found.end() :].lstrip()[:1]
-        if found[2] == "[" and found[0][0] != "*":
-            return f"[{', '.join(cells)}]" if len(cells) > 1 else cells[0]
         return (", " if found[2] == "[" or re.fullmatch(r"[\[,(][\]),]", around) else " ").join(cells)
+
+
+def _cells(row: Mapping[str, str]) -> list[str]:
+    return [_whole(cell) for place, cell in row.items() if place.isdecimal()]
 
 
 def _whole(cell: str) -> str:

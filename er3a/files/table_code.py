@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
-from er3a.files.straight_code import Straight
+from er3a.files.code_brackets import CodeGroup, groups_of, parts
+from er3a.files.straight_code import Program
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
 
@@ -47,19 +48,6 @@ _UNPACKED = re.compile(
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
 _INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
-LONGEST_GROUP = 30_000  # characters between two brackets
-_CLOSING = {"(": ")", "[": "]", "{": "}"}
-
-
-@dataclass(frozen=True)
-class CodeGroup:
-    """A pair of brackets: where they are, what is in them and what is written before them."""
-
-    start: int
-    end: int
-    bracket: str
-    inside: str
-    before: str
 
 
 class Code:
@@ -80,14 +68,9 @@ class Code:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
-        self._lines = list(range(1, text.count("\n") + 2))
         self._take(_COMMENT.sub(kept, text))
-        straight = Straight(
-            self.text, _arrays(self), parts, [(each.start, each.end, each.inside) for each in self.groups]
-        )
-        if straight.text != self.text:
-            self._lines = straight.lines
-            self._take(straight.text)
+        if (written := Program(self.text, _arrays(self)).written_out()) != self.text:
+            self._take(written)
 
     def _take(self, text: str) -> None:
         self.text = text
@@ -98,39 +81,7 @@ class Code:
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
-        return self._lines[self.text.count("\n", 0, place)]
-
-
-def groups_of(text: str) -> list[CodeGroup]:
-    """All pairs of brackets, in the order of their ends."""
-    found, open_ones = list[CodeGroup](), list[int]()
-    for bracket in re.finditer(r"[()\[\]{}]", text):
-        place = bracket.start()
-        if bracket[0] in _CLOSING:
-            open_ones.append(place)
-        elif open_ones and _CLOSING[text[open_ones[-1]]] == bracket[0]:
-            start = open_ones.pop()
-            if place - start > LONGEST_GROUP:
-                continue
-            before = text[max(0, start - 120) : start]
-            found.append(CodeGroup(start, place, text[start], text[start + 1 : place], before))
-    return found
-
-
-def parts(text: str, mark: str = ",") -> list[str]:
-    """A text cut at marks that are in no brackets and no quotes."""
-    cut, depth, quote, start = list[str](), 0, "", 0
-    for place, sign in enumerate(text):
-        if quote:
-            quote = "" if sign == quote else quote
-        elif sign in "\"'" and not re.match(r"[\w\])}.]", text[max(place - 1, 0) : place]):
-            quote = sign
-        else:
-            depth += (sign in "([{") - (sign in ")]}")
-            if sign == mark and depth == 0:
-                cut.append(text[start:place])
-                start = place + 1
-    return [each.strip() for each in [*cut, text[start:]]]
+        return self.text.count("\n", 0, place) + 1
 
 
 def row_cells(text: str) -> list[str]:
@@ -182,14 +133,14 @@ def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
             made.append({str(k): cell for k, cell in enumerate(cells)} | named)
         if made:
             times.setdefault(name[1], []).append(found.setdefault(name[1], made) == made)
-    calls = [each for each in code.groups if each.bracket == "("]
-    for name in [*found]:
-        again = rf"(?m)(?:^|;)[ \t]*(?:[\w:<>]+ )*(?:self\.)?{name}[ \t]*(?:[\[(][^\n=]*[\])])?[ \t]*[-+*/]?=(?!=)"
-        set_at = [each.end() for each in re.finditer(again, code.text)]
-        set_at = [place for place in set_at if not any(each.start < place < each.end for each in calls)]
-        if not all(times[name]) or len(set_at) > len(times[name]):
-            del found[name]
-    return found
+    flat = code.text
+    while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
+        pass
+    again = r"(?<![\w.\"'])(?:self\.)?{}\s*(?:\[[^\]=]*\]\s*)*[-+*/]?=(?!=)"
+    once = {
+        name for name, same in times.items() if all(same) and len(re.findall(again.format(name), flat)) <= len(same)
+    }
+    return {name: found[name] for name in found.keys() & once}
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
