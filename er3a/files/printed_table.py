@@ -22,7 +22,7 @@ from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
+from er3a.files.table_code import LIBRARIES, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -349,7 +349,7 @@ class _Table:
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
-        self.given = (elements(self.text) if from_code else {}) | self._given()
+        self.given = self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):

@@ -29,7 +29,7 @@ _LOOPS = (
     ),
     re.compile(
         r"\bfor\s*\([^;:()]*?(?P<names>\w+)\s*(?::(?!:)|=)\s*(?P<over>[^;()]+?(?:;[^;]+;[^)]*)?)\)\s*"
-        r"\{?(?P<body>[^{}]*?)(?:\}|(?<=;))"
+        r"\{?(?P<body>(?<=\{)[^{}]*(?=\})|[^;{}]*;)"
     ),
 )
 _BUILT = re.compile(r"(?P<body>.*?\S)\s+for\s+(?P<names>[\w, \t()]+?)\s+in\s+(?P<over>[^\[\]{}]+)", re.S)
@@ -37,6 +37,7 @@ _ELEMENT = re.compile(
     r"\*?(?<![\w'\"])(?:\w+\.)*\b([^\W\d]\w*)([\[(])\s*([\d+\- ]+?)\s*(?:(?:,|\]\s*\[)\s*(\d+|:)\s*)?[\])]"
     r"(?:\.([^\W\d]\w*)\b(?!\()|\[[\"'](\w+)[\"']\])?(?!\s*=(?!=))"
 )
+_ANGLES = re.compile(r"(?:q|θ|th|t)_?\d*|(?:q_|theta)\w*")
 _ASSIGNED = re.compile(r"(?:(?:const|double|float|auto)\s+)*([^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*=(?!=)\s*(.+)", re.S)
 
 
@@ -69,10 +70,20 @@ class Program:
             text = f"{text[:start]}{after}{text.count(chr(10), start, end) * chr(10)}{text[end:]}"
         _ELEMENT.sub(self._element, text)
         wide = {name for name in self.used if len(self.arrays[name][0]) > 1}
-        whole = {name for name in wide if len(self.used[name]) == len(self.arrays[name])}
-        if looped & wide - whole:
+        partly = {name for name in wide if len(self.used[name]) < len(self.arrays[name])}
+        if looped & partly:
             return self.text
-        return _ELEMENT.sub(lambda found: self._element(found) if found[1] in whole else found[0], text)
+        known = {name for name in self.used.keys() - partly if name in wide or self._counted(name)}
+        return _ELEMENT.sub(lambda found: self._element(found) if found[1] in known else found[0], text)
+
+    def _numbers(self, name: str) -> set[int]:
+        """The numbers of the elements of a list that are used in square brackets."""
+        return {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", self.text)}
+
+    def _counted(self, name: str) -> bool:
+        """Whether it is known where a list's numbers begin; values of joints are a pose and are left out."""
+        used = self._numbers(name)
+        return not re.fullmatch(_ANGLES, name) and (not used or bool(used & {0, len(self.arrays[name])}))
 
     def _loops(self) -> Iterator[tuple[re.Match[str], str, int, int]]:
         """Loops without a branch that make links, what is between their runs, where they begin and end."""
@@ -134,7 +145,9 @@ class Program:
 
     def _element(self, found: re.Match[str]) -> str:
         """A row, a cell or a named part of an array, as it is written in a program; unchanged if it has none."""
-        rows, first = self.arrays.get(found[1], []), self.first[found[2]]
+        rows = self.arrays.get(found[1], [])
+        numbers = self._numbers(found[1]) if found[2] == "[" else set[int]()
+        first = self.first[found[2]] or int(0 not in numbers and len(rows) in numbers)  # Julia's begin at 1
         k = sum(int(each.replace(" ", "")) for each in re.findall(r"[-+]?\s*\d+", found[3])) - first
         row = rows[k] if 0 <= k < len(rows) else {}
         key = str(int(found[4]) - first) if found[4] and found[4] != ":" else found[5] or found[6]

@@ -76,7 +76,6 @@ class Code:
         self.text = text
         self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
         self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
-        self.lists = {name: cells for name, cells, _, _ in _named_lists(self)}
         self.orders = _signatures(self)
 
     def line(self, place: int) -> int:
@@ -118,29 +117,33 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
 def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
     """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of what is
     assigned twice, or in part."""
-    found, times = dict[str, list[dict[str, str]]](), dict[str, list[bool]]()
+    found: dict[str, list[list[dict[str, str]]]] = {}
     for group in code.groups:
         name = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)?$", group.before)
-        if name is None:
-            continue
-        rows = [cells for _, cells in _rows(code, group)]
-        rows = rows if len(rows) > 1 else [[cell] for cell in code.lists.get(name[1], ())]
-        typed = (names for each, names in code.fields.items() if each and re.search(rf"\b{each}\b", group.before))
-        fields, made = next(typed, ()), []
-        for cells in rows:
-            pairs = [re.fullmatch(r"[\"'.]?(\w+)[\"']?\s*[:=]\s*(.+)", cell, re.S) for cell in cells]
-            named = {pair[1]: pair[2] for pair in pairs if pair} or dict(zip(fields, cells))
-            made.append({str(k): cell for k, cell in enumerate(cells)} | named)
-        if made:
-            times.setdefault(name[1], []).append(found.setdefault(name[1], made) == made)
+        rows = [cells for _, cells in _rows(code, group)] if name else []
+        if name and len(rows) > 1:
+            fields = next((names for each, names in code.fields.items() if each and each in group.before), [])
+            made = [
+                dict(zip(map(str, range(9)), cells)) | (_pairs(cells) or dict(zip(fields, cells))) for cells in rows
+            ]
+            found.setdefault(name[1], []).append(made)
+    for name, cells, *_ in _named_lists(code):
+        found.setdefault(name, []).append([{"0": cell} for cell in cells])
     flat = code.text
     while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
         pass
-    again = r"(?<![\w.\"'])(?:self\.)?{}\s*(?:\[[^\]=]*\]\s*)*[-+*/]?=(?!=)"
-    once = {
-        name for name, same in times.items() if all(same) and len(re.findall(again.format(name), flat)) <= len(same)
+    again = r"(?<![\w.\"'])(?:self\.)?{}[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:)"
+    return {
+        name: same[0]
+        for name, same in found.items()
+        if same.count(same[0]) == len(same) >= len(re.findall(again.format(name), flat))
     }
-    return {name: found[name] for name in found.keys() & once}
+
+
+def _pairs(texts: Iterable[str]) -> dict[str, str]:
+    """Values by their keys, of texts such as ``"a": 0`` and ``.a = 0``."""
+    pairs = [re.split("[:=]", part, maxsplit=1) for part in texts if re.search("[:=]", part)]
+    return {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
 
 
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
@@ -376,10 +379,9 @@ def _records(code: Code) -> list[Grid]:
     rows = list[tuple[int, dict[str, str]]]()
     for each in code.groups:
         if each.bracket == "{":
-            pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
             label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
-            named = [(key.strip(" .\"'\n").lower(), value.strip(" \"'\n")) for key, value in pairs]
-            cells = {key: value for key, value in named if not re.match(r"[(\[].*,", value)}  # no colour, no column
+            pairs = _pairs(parts(each.inside)).items()
+            cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
             rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
     if full := [row for row in rows if _is_row(row[1])]:
         return [_grid(full)]
@@ -521,20 +523,6 @@ def _names_columns(names: list[str]) -> bool:
     """Whether names are those of a D-H table's columns, each once."""
     quantities = {*quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
-
-
-def elements(text: str) -> dict[str, str]:
-    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``.
-
-    In square brackets numbers begin at 0 if a 0 is used, at 1 if the list's length is (Julia); else no element has a
-    value.
-    """
-    found = dict[str, str]()
-    for name, cells in Code(text).lists.items():
-        used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
-        if not used or used & {0, len(cells)}:
-            found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
-    return found
 
 
 def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
