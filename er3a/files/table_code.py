@@ -47,7 +47,7 @@ _UNPACKED = re.compile(
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
-_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
+_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])},]")
 
 
 class Code:
@@ -170,26 +170,33 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 def _calls(code: Code) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread = list(_segments(code)), list[int]()
-    for each in () if rows else code.groups:
+    rows, unread = list[_Link](), list[CodeGroup]()
+    for each in code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        cells = _arguments(named[2], each.inside) or _of_signature(code.orders.get(named[2], []), each.inside)
-        toolbox = _TOOLBOX.fullmatch(named[2])
-        if cells and not (toolbox or _says_numbers(code, cells)):
-            continue
-        index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if not cells and toolbox and not (index or named[2] in code.orders):
-            unread.append(code.line(each.start))
-        elif cells:
-            target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
+        order, toolbox = code.orders.get(named[2], []), _TOOLBOX.fullmatch(named[2])
+        cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
+        if cells and (toolbox or _says_numbers(code, cells)):
+            target = re.sub(r"\s", "", named[1] or "")
+            if target.isidentifier() and "type" not in cells:
+                target = ""
             added = re.search(
                 r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
             )
             if added and named[1] is None:
                 target = f"{added[1]}[{each.start}"
-            rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
+            rows.append(_Link(code.line(each.start), target, each.start, cells))
+        elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+            unread.append(each)
+    if "Frame::DH(" in code.text:
+        _segments(code, rows)
+    if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
+        problem = f"'{unread[0].inside[:60]}' can't be read as a link"
+        remedy = "Write its numbers there, or the matrix that they come from above it"
+        raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
+    if "Frame::DH(" in code.text:
+        _segments(code, rows)
     if unread and (rows or "Link([" in code.text):
         raise InputError(
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
@@ -209,27 +216,19 @@ def _calls(code: Code) -> list[Grid]:
     return [_grid([(row.line, row.cells) for row in each]) for each in held]
 
 
-def _segments(code: Code) -> Iterator[_Link]:
-    """Rows of KDL's chain, ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``; its joint comes first."""
-    if "Frame::DH(" not in code.text:
-        return
-    joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=][^;\n]*?(\w+)\)*\s*;", code.text))
-    frames = dict(re.findall(r"\bFrame\s+(\w+)\s*[({=]([^;\n]*)", code.text))
+def _segments(code: Code, rows: list[_Link]) -> None:
+    """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
+    joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
     for each in code.groups:
-        if not re.search(r"\bSegment\s*$", each.before):
-            continue
-        said = [joints.get(part) or frames.get(part) or part for part in parts(each.inside)]
-        kind = next(filter(None, (re.search(r"\b(?:Rot|Trans)\w+\b|\bNone\b", part) for part in said)), None)
-        row = next(filter(None, (re.search(r"Frame::DH\((.*)\)", part, re.S) for part in said)), None)
-        if kind is None or row is None or kind[0] not in _KDL:
-            remedy = "Write all as Frame::DH of joints RotZ, TransZ or None, or as rows of a table"
-            raise InputError(
-                None, f"line {code.line(each.start)}", f"'{each.inside[:60]}' is no row of a table", remedy
-            )
-        cells = dict(zip(("a", "alpha", "d", "theta"), parts(row[1])))
-        chain = re.findall(r"(\w+)(?:\.|->)addSegment", each.before)
-        name = f"{chain[-1] if chain else ''}[{each.start}"
-        yield _Link(code.line(each.start), name, each.start, cells | {"type": _KDL[kind[0]], "convention": "standard"})
+        if re.search(r"\bSegment\s*$", each.before):
+            said = " ".join(joints.get(part, part) for part in parts(each.inside))
+            row = next((row for row in rows if each.start < row.place < each.end), None)
+            kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
+            if row is None or len(kinds) != 1:
+                problem = f"the segment '{each.inside[:60]}' is no row of a table"
+                remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
+                raise InputError(None, f"line {code.line(each.start)}", problem, remedy)
+            row.cells.update(type=_KDL[kinds[0]], convention="standard")
 
 
 _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
@@ -238,7 +237,7 @@ _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
-    orders = dict[str, list[str]]()
+    orders = {"DH": ["a", "alpha", "d", "theta"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
@@ -487,15 +486,10 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     for text in texts:
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
-        windows = [words[start : start + width] for start in range(len(words) - width + 1)]
-        # Part of a wider row's names is none of a narrower.
-        wider = [words[start : start + width + 1] for start in range(len(words) - width)]
-        whole = [
-            window
-            for window in windows
-            if not any(window in (each[1:], each[:-1]) for each in filter(_names_columns, wider))
-        ]
-        if names := next(filter(_names_columns, whole), []):
+        windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
+        names = next(filter(_names_columns, windows), [])  # all that it names, of which the row's number is no column
+        names = names if len(names) == width else [name for name in names if _place(name) != "joint"]
+        if len(names) == width:
             found.setdefault(" ".join(map(_place, names)), names)
     return next(iter(found.values())) if len(found) == 1 else []
 
