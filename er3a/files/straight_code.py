@@ -96,15 +96,16 @@ class Program:
     def _runs(self, loop: re.Match[str], mark: str, *_: int) -> str:
         """A loop's runs; "" if it is not known to go through all rows in their order."""
         counts = dict(re.findall(r"\b(\w+)\s*=\s*(\d+)\s*(?:[;\n]|$)", self.text))
-        over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), loop["over"].strip())
         names = re.findall(r"\w+", loop["names"])
+        counts.pop(names[0], "")
+        over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), loop["over"].strip())
         indexed = rf"\b([^\W\d]\w*)\s*[\[(]\s*{names[0]}\b"
         inside = self.arrays.keys() & {*re.findall(indexed, loop["body"])}
         through = [name for name in re.findall(r"[^\W\d]\w*", over) if name in self.arrays]
         sizes = {len(self.arrays[name]) for name in (*inside, *through)}
-        first, numbers = int(over[:1] == "1"), {*map(int, re.findall(r"\d+", over))}
+        first, numbers = int(over[:1] == "1"), {*map(int, re.findall(r"\d+", re.sub(r"^[01]\s*[:;]|\(0,", "", over)))}
         said = numbers & sizes or through or len(inside) > 2 or any(len(self.arrays[name][0]) > 2 for name in inside)
-        other = numbers - {first, *sizes} or re.search(r"[-+]\s*\d|reversed|sorted", over)
+        other = numbers - sizes or re.search(r"[-+]\s*\d|reversed|sorted", over)
         if len(sizes) != 1 or other or not said:
             return ""
         by_index = not through or re.search(r"range|len|numel|size|[:;]", over)
@@ -128,7 +129,7 @@ class Program:
             assigned = _ASSIGNED.fullmatch(statement) if mark == "; " else None
             names = re.findall(r"\w+", assigned[1]) if assigned else []
             value = self._filled(assigned[2] if assigned else re.sub(r"\bend\s*\+\s*1", f"{k + 1}", statement), values)
-            cells = parts(value.strip("[]()")) if len(names) > 1 else [value]
+            cells = parts(re.sub(r"^\[(.*)\]$", r"\1", value)) if len(names) > 1 else [value]
             if not names:
                 made.append(value)
             elif len(cells) != len(names) or _MAKES.search(value):

@@ -97,6 +97,8 @@ def row_cells(text: str) -> list[str]:
 def _rows(code: Code, group: CodeGroup) -> Grid:
     """The rows of a matrix with their lines; [] if the group is none."""
     texts = [each for each in parts(group.inside) if each]
+    if re.match(r"[)\s]*(?:'|\.T\b|\.?[*/])(?![*/'])", code.text[group.end + 1 :]):  # transposed, or in other units
+        return Grid()
     if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
         texts = [each[1:-1] for each in texts]
     else:
@@ -128,11 +130,11 @@ def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
             ]
             found.setdefault(name[1], []).append(made)
     for name, cells, *_ in _named_lists(code):
-        found.setdefault(name, []).append([{"0": cell} for cell in cells])
+        found.setdefault(name, []).append([{"0": cell} for cell in cells or ("",)])
     flat = code.text
     while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
         pass
-    again = r"(?<![\w.\"'])(?:self\.)?{}[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:)"
+    again = r"(?<![\w.\"'])(?:self\.)?{}[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{{]))"
     return {
         name: same[0]
         for name, same in found.items()
@@ -446,6 +448,10 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
+    firsts = [cells[0] for _, cells in rows]
+    if not header and len(rows[0][1]) > 3 and all(re.fullmatch(r"[A-Za-z][\w -]*", first) for first in firsts):
+        rows, labels = [(line, cells[1:]) for line, cells in rows], firsts  # names of the joints
+        header = _order(code, rows, before)
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
@@ -484,6 +490,7 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
     found: dict[str, list[str]] = {}
     for text in texts:
+        text = re.sub(r"\b(?:joint_?)?type\b", "sigma", text)
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
