@@ -58,6 +58,8 @@ _KIND_ELSEWHERE = re.compile(
     re.I,
 )
 """A joint that slides, said outside the table."""
+_OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]{}]*[1-9][^\[\]{}]*)[\]}]", re.I)
+"""A list of offsets."""
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
@@ -198,7 +200,8 @@ def nearest_headings(text: str) -> str:
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
     missing = ", ".join(sorted(NEEDED.difference(found)))
-    return f"line {line} has headings of {', '.join(found)}, and none of {missing}" if len({*found}) > 1 else ""
+    rest = f"none of {missing}" if missing else "no rows of a table follow"
+    return f"line {line} has headings of {', '.join(found)}, and {rest}" if len({*found}) > 1 else ""
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -355,6 +358,11 @@ class _Table:
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
+        for found in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
+            if len(re.split(r"[,;\s]+", found[2].strip(" ,;\n"))) == len(self.rows):
+                line = self.text.count("\n", 0, found.start()) + 1
+                problem = f"'{found[1]}' may be offsets of the table's joints, and no column holds them"
+                raise InputError(path, f"line {line}", problem, "Add them to theta, or remove that line")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:

@@ -194,7 +194,7 @@ def _calls(code: Code) -> list[Grid]:
     if "Frame::DH(" in code.text:
         _segments(code, rows)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
-        problem = f"'{unread[0].inside[:60]}' can't be read as a link"
+        problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
         remedy = "Write its numbers there, or the matrix that they come from above it"
         raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
     if "Frame::DH(" in code.text:
@@ -227,7 +227,7 @@ def _segments(code: Code, rows: list[_Link]) -> None:
             row = next((row for row in rows if each.start < row.place < each.end), None)
             kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
             if row is None or len(kinds) != 1:
-                problem = f"the segment '{each.inside[:60]}' is no row of a table"
+                problem = f"the segment '{' '.join(each.inside.split())[:60]}' is no row of a table"
                 remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
                 raise InputError(None, f"line {code.line(each.start)}", problem, remedy)
             row.cells.update(type=_KDL[kinds[0]], convention="standard")
