@@ -494,7 +494,8 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
         windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
-        names = next(filter(_names_columns, windows), [])  # all that it names, of which the row's number is no column
+        # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
+        names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
         names = names if len(names) == width else [name for name in names if _place(name) != "joint"]
         if len(names) == width:
             found.setdefault(" ".join(map(_place, names)), names)
@@ -520,9 +521,9 @@ def _indexed(code: Code) -> Iterator[str]:
         yield ",".join(names[k] for k in sorted(names))
 
 
-def _names_columns(names: list[str]) -> bool:
-    """Whether names are those of a D-H table's columns, each once."""
-    quantities = {*quantities_of(names)}
+def _names_columns(names: list[str], *, once: bool = False) -> bool:
+    """Whether names are those of a D-H table's columns, each once; with ``once`` theta and its offset count as one."""
+    quantities = {name.replace("offset", "theta") if once else name for name in quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
 
 
