@@ -440,7 +440,7 @@ class _Table:
                 self._constants(k, own.quantity)
             elif own is None and (stem in OWN):
                 self.columns[name] = [cells[k] for _, cells in self.rows]
-            elif own is None and name:
+            elif own is None and name not in ("", "-"):
                 unused.append(name)
                 if {cells[k].strip() for _, cells in self.rows} == {"0", "1"} and "type" not in {
                     *self.column,
@@ -548,8 +548,9 @@ class _Table:
         numbers = [re.search(r"\d+$", self._variable(row)[0]) for row in moving]
         variables = [int(number[0]) if number else None for number in numbers]
         start = 0 if variables[:1] == [0] else 1
+        of_rows = all(number in (None, row + start) for row, number in zip(moving, variables))
         for joint, (row, number) in enumerate(zip(moving, variables), start):
-            if number not in (None, joint):
+            if number not in (None, joint) and not of_rows:
                 problem = f"the variable is number {number} where that of joint {joint} belongs"
                 raise InputError(
                     self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"

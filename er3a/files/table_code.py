@@ -160,10 +160,10 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     grids : of each its headings and rows, with their lines
     """
     code = Code(text)
-    matrices = [grid for each in code.groups if (grid := _matrix(code, each))]
+    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, _listed(code)) if grid and grid[0][1]]
+    named = [grid for grid in matrices if grid[0][1]]
     return _calls(code) or _records(code) or named or _vectors(code)
 
 
