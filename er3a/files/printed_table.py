@@ -358,10 +358,10 @@ class _Table:
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
-        for found in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
-            if len(re.split(r"[,;\s]+", found[2].strip(" ,;\n"))) == len(self.rows):
-                line = self.text.count("\n", 0, found.start()) + 1
-                problem = f"'{found[1]}' may be offsets of the table's joints, and no column holds them"
+        for listed in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
+            if len(re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))) == len(self.rows):
+                line = self.text.count("\n", 0, listed.start()) + 1
+                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
                 raise InputError(path, f"line {line}", problem, "Add them to theta, or remove that line")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 

@@ -41,7 +41,7 @@ _ANGLES = re.compile(r"(?:q|θ|th|t)_?\d*|(?:q_|theta)\w*")
 _ASSIGNED = re.compile(r"(?:(?:const|double|float|auto)\s+)*([^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*=(?!=)\s*(.+)", re.S)
 
 
-class Program:
+class StraightCode:
     """A program whose loop over a table's rows is written out.
 
     Parameters

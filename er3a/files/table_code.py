@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from er3a.errors import InputError
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
-from er3a.files.straight_code import Program
+from er3a.files.straight_code import StraightCode
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
 
@@ -69,7 +69,7 @@ class Code:
             return found[1] or ""
 
         self._take(_COMMENT.sub(kept, text))
-        if (written := Program(self.text, _arrays(self)).written_out()) != self.text:
+        if (written := StraightCode(self.text, _arrays(self)).written_out()) != self.text:
             self._take(written)
 
     def _take(self, text: str) -> None:
@@ -129,16 +129,16 @@ def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
                 dict(zip(map(str, range(9)), cells)) | (_pairs(cells) or dict(zip(fields, cells))) for cells in rows
             ]
             found.setdefault(name[1], []).append(made)
-    for name, cells, *_ in _named_lists(code):
-        found.setdefault(name, []).append([{"0": cell} for cell in cells or ("",)])
+    for each, cells, *_ in _named_lists(code):
+        found.setdefault(each, []).append([{"0": cell} for cell in cells or ("",)])
     flat = code.text
     while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
         pass
     again = r"(?<![\w.\"'])(?:self\.)?{}[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{{]))"
     return {
-        name: same[0]
-        for name, same in found.items()
-        if same.count(same[0]) == len(same) >= len(re.findall(again.format(name), flat))
+        each: same[0]
+        for each, same in found.items()
+        if same.count(same[0]) == len(same) >= len(re.findall(again.format(each), flat))
     }
 
 
