@@ -54,6 +54,9 @@ class StraightCode:
         self.text, self.arrays = text, arrays
         self.first = {"(": 1, "[": int(bool(re.search(r"(?m)^\s*for\s+\w+\s+in\s+1:", text)))}
         self.used: dict[str, set[int]] = {}
+        self.numbers: dict[str, set[int]] = {}
+        for name, number in re.findall(r"\b([^\W\d]\w*)\[(\d{1,3})\](?!\s*=)", text):
+            self.numbers.setdefault(name, set()).add(int(number))
 
     def written_out(self) -> str:
         """The text with the loop's runs, in as many lines, and with the elements of matrices that are used whole.
@@ -76,13 +79,9 @@ class StraightCode:
         known = {name for name in self.used.keys() - partly if name in wide or self._counted(name)}
         return _ELEMENT.sub(lambda found: self._element(found) if found[1] in known else found[0], text)
 
-    def _numbers(self, name: str) -> set[int]:
-        """The numbers of the elements of a list that are used in square brackets."""
-        return {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", self.text)}
-
     def _counted(self, name: str) -> bool:
         """Whether it is known where a list's numbers begin; values of joints are a pose and are left out."""
-        used = self._numbers(name)
+        used = self.numbers.get(name, set())
         return not re.fullmatch(_ANGLES, name) and (not used or bool(used & {0, len(self.arrays[name])}))
 
     def _loops(self) -> Iterator[tuple[re.Match[str], str, int, int]]:
@@ -147,7 +146,7 @@ class StraightCode:
     def _element(self, found: re.Match[str]) -> str:
         """A row, a cell or a named part of an array, as it is written in a program; unchanged if it has none."""
         rows = self.arrays.get(found[1], [])
-        numbers = self._numbers(found[1]) if found[2] == "[" else set[int]()
+        numbers = self.numbers.get(found[1], set()) if found[2] == "[" else set()
         first = self.first[found[2]] or int(0 not in numbers and len(rows) in numbers)  # Julia's begin at 1
         k = sum(int(each.replace(" ", "")) for each in re.findall(r"[-+]?\s*\d+", found[3])) - first
         row = rows[k] if 0 <= k < len(rows) else {}

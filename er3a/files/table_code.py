@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -134,12 +135,9 @@ def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
     flat = code.text
     while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
         pass
-    again = r"(?<![\w.\"'])(?:self\.)?{}[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{{]))"
-    return {
-        each: same[0]
-        for each, same in found.items()
-        if same.count(same[0]) == len(same) >= len(re.findall(again.format(each), flat))
-    }
+    again = r"(?<![\w.\"'])(?:self\.)?([^\W\d]\w*)[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{]))"
+    times = Counter(re.findall(again, flat))
+    return {each: same[0] for each, same in found.items() if same.count(same[0]) == len(same) >= times[each]}
 
 
 def _pairs(texts: Iterable[str]) -> dict[str, str]:
