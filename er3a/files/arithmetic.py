@@ -45,7 +45,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"
 )
-_PI = re.compile(r"π|(?:m_|frac_)?pi(?:_([24]))?")
+_PI = re.compile(r"π|(?:(?:m|frac|eigen|math|const)_)?pi(?:_([24]))?")
 _INDEX = re.compile(r"[(\[]\s*(\d+)\s*[)\]]\s*")
 _NONE = "is not a number or an expression"
 _SIGNS = str.maketrans("−–—﹣∗⋅·×∕÷º˚∘◦⍺", "----****//°°°°α")

@@ -22,7 +22,7 @@ from er3a.errors import InputError, given_bytes
 from er3a.files.arithmetic import TWO_VALUES, UNITS, CellAmount, amount_of, name_of, plain
 from er3a.files.csv_file import Lines
 from er3a.files.table_cells import Grid, html_grids, latex_grids, line_grids, without_latex
-from er3a.files.table_code import LIBRARIES, Code, code_grids, elements
+from er3a.files.table_code import LIBRARIES, Code, code_grids
 from er3a.files.table_headings import Heading, heading_of, quantities_of
 from er3a.formats.mesh_file import text_of
 from er3a.numerics.si_units import RADIANS_BELOW_DEG
@@ -58,6 +58,8 @@ _KIND_ELSEWHERE = re.compile(
     re.I,
 )
 """A joint that slides, said outside the table."""
+_OFFSETS = re.compile(r"\b(\w*offsets?)\s*(?:\[\d*\])?\s*=\s*[\w.(]*[\[{]([^\[\]{}]*[1-9][^\[\]{}]*)[\]}]", re.I)
+"""A list of offsets."""
 SIGNS = {
     "modified": re.compile(
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
@@ -198,7 +200,8 @@ def nearest_headings(text: str) -> str:
     line, cells = max(rows, key=lambda row: len({*quantities_of(row[1])}), default=(0, []))
     found = quantities_of(cells)
     missing = ", ".join(sorted(NEEDED.difference(found)))
-    return f"line {line} has headings of {', '.join(found)}, and none of {missing}" if len({*found}) > 1 else ""
+    rest = f"none of {missing}" if missing else "no rows of a table follow"
+    return f"line {line} has headings of {', '.join(found)}, and {rest}" if len({*found}) > 1 else ""
 
 
 # Where the table is ---------------------------------------------------------------------------------------------------
@@ -349,12 +352,17 @@ class _Table:
             self.notes.append("base and tool of the program are not read")
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
-        self.given = (elements(self.text) if from_code else {}) | self._given()
+        self.given = self._given()
         self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
             raise InputError(path, "types of joints", problem, "Add a column of types")
+        for listed in _OFFSETS.finditer(self.text) if from_code and "offset" not in self.column else ():
+            if len(re.split(r"[,;\s]+", listed[2].strip(" ,;\n"))) == len(self.rows):
+                line = self.text.count("\n", 0, listed.start()) + 1
+                problem = f"'{listed[1]}' may be offsets of the table's joints, and no column holds them"
+                raise InputError(path, f"line {line}", problem, "Add them to theta, or remove that line")
         self.columns: dict[str, list[str]] = {"joint": self._joints()}
 
     def _refuse(self, row: int | None, k: int, problem: str, remedy: str) -> NoReturn:
@@ -432,7 +440,7 @@ class _Table:
                 self._constants(k, own.quantity)
             elif own is None and (stem in OWN):
                 self.columns[name] = [cells[k] for _, cells in self.rows]
-            elif own is None and name:
+            elif own is None and name not in ("", "-"):
                 unused.append(name)
                 if {cells[k].strip() for _, cells in self.rows} == {"0", "1"} and "type" not in {
                     *self.column,
@@ -540,8 +548,9 @@ class _Table:
         numbers = [re.search(r"\d+$", self._variable(row)[0]) for row in moving]
         variables = [int(number[0]) if number else None for number in numbers]
         start = 0 if variables[:1] == [0] else 1
+        of_rows = all(number in (None, row + start) for row, number in zip(moving, variables))
         for joint, (row, number) in enumerate(zip(moving, variables), start):
-            if number not in (None, joint):
+            if number not in (None, joint) and not of_rows:
                 problem = f"the variable is number {number} where that of joint {joint} belongs"
                 raise InputError(
                     self.path, f"row {self.rows[row][0]}", problem, "Give the rows of one arm, in their order"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
+from er3a.files.code_brackets import CodeGroup, groups_of, parts
+from er3a.files.straight_code import StraightCode
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
 
@@ -45,20 +48,7 @@ _UNPACKED = re.compile(
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
-_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])}]")
-LONGEST_GROUP = 30_000  # characters between two brackets
-_CLOSING = {"(": ")", "[": "]", "{": "}"}
-
-
-@dataclass(frozen=True)
-class CodeGroup:
-    """A pair of brackets: where they are, what is in them and what is written before them."""
-
-    start: int
-    end: int
-    bracket: str
-    inside: str
-    before: str
+_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])},]")
 
 
 class Code:
@@ -79,47 +69,19 @@ class Code:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
-        self.text = _COMMENT.sub(kept, text)
+        self._take(_COMMENT.sub(kept, text))
+        if (written := StraightCode(self.text, _arrays(self)).written_out()) != self.text:
+            self._take(written)
+
+    def _take(self, text: str) -> None:
+        self.text = text
         self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
         self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
-        self.lists = {name: cells for name, cells, _, _ in _named_lists(self)}
         self.orders = _signatures(self)
 
     def line(self, place: int) -> int:
         """The number of the line of a place in the text."""
         return self.text.count("\n", 0, place) + 1
-
-
-def groups_of(text: str) -> list[CodeGroup]:
-    """All pairs of brackets, in the order of their ends."""
-    found, open_ones = list[CodeGroup](), list[int]()
-    for bracket in re.finditer(r"[()\[\]{}]", text):
-        place = bracket.start()
-        if bracket[0] in _CLOSING:
-            open_ones.append(place)
-        elif open_ones and _CLOSING[text[open_ones[-1]]] == bracket[0]:
-            start = open_ones.pop()
-            if place - start > LONGEST_GROUP:
-                continue
-            before = text[max(0, start - 120) : start]
-            found.append(CodeGroup(start, place, text[start], text[start + 1 : place], before))
-    return found
-
-
-def parts(text: str, mark: str = ",") -> list[str]:
-    """A text cut at marks that are in no brackets and no quotes."""
-    cut, depth, quote, start = list[str](), 0, "", 0
-    for place, sign in enumerate(text):
-        if quote:
-            quote = "" if sign == quote else quote
-        elif sign in "\"'" and not re.match(r"[\w\])}.]", text[max(place - 1, 0) : place]):
-            quote = sign
-        else:
-            depth += (sign in "([{") - (sign in ")]}")
-            if sign == mark and depth == 0:
-                cut.append(text[start:place])
-                start = place + 1
-    return [each.strip() for each in [*cut, text[start:]]]
 
 
 def row_cells(text: str) -> list[str]:
@@ -136,6 +98,8 @@ def row_cells(text: str) -> list[str]:
 def _rows(code: Code, group: CodeGroup) -> Grid:
     """The rows of a matrix with their lines; [] if the group is none."""
     texts = [each for each in parts(group.inside) if each]
+    if re.match(r"[)\s]*(?:'|\.T\b|\.?[*/])(?![*/'])", code.text[group.end + 1 :]):  # transposed, or in other units
+        return Grid()
     if len(texts) > 1 and all(each[0] in "[({" and each[-1] in "])}" for each in texts):
         texts = [each[1:-1] for each in texts]
     else:
@@ -153,6 +117,35 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
     return grid
 
 
+def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
+    """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of what is
+    assigned twice, or in part."""
+    found: dict[str, list[list[dict[str, str]]]] = {}
+    for group in code.groups:
+        name = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)?$", group.before)
+        rows = [cells for _, cells in _rows(code, group)] if name else []
+        if name and len(rows) > 1:
+            fields = next((names for each, names in code.fields.items() if each and each in group.before), [])
+            made = [
+                dict(zip(map(str, range(9)), cells)) | (_pairs(cells) or dict(zip(fields, cells))) for cells in rows
+            ]
+            found.setdefault(name[1], []).append(made)
+    for each, cells, *_ in _named_lists(code):
+        found.setdefault(each, []).append([{"0": cell} for cell in cells or ("",)])
+    flat = code.text
+    while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
+        pass
+    again = r"(?<![\w.\"'])(?:self\.)?([^\W\d]\w*)[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{]))"
+    times = Counter(re.findall(again, flat))
+    return {each: same[0] for each, same in found.items() if same.count(same[0]) == len(same) >= times[each]}
+
+
+def _pairs(texts: Iterable[str]) -> dict[str, str]:
+    """Values by their keys, of texts such as ``"a": 0`` and ``.a = 0``."""
+    pairs = [re.split("[:=]", part, maxsplit=1) for part in texts if re.search("[:=]", part)]
+    return {key.strip(" .\"'\n").lower(): value.strip(" \"'\n") for key, value in pairs}
+
+
 def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     """The tables in a program or in data.
 
@@ -165,10 +158,10 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     grids : of each its headings and rows, with their lines
     """
     code = Code(text)
-    matrices = [grid for each in code.groups if (grid := _matrix(code, each))]
+    matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    named = [grid for grid in (*matrices, _listed(code)) if grid and grid[0][1]]
+    named = [grid for grid in matrices if grid[0][1]]
     return _calls(code) or _records(code) or named or _vectors(code)
 
 
@@ -177,37 +170,39 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 def _calls(code: Code) -> list[Grid]:
     """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread = list[_Link](), list[int]()
+    rows, unread = list[_Link](), list[CodeGroup]()
     for each in code.groups:
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
-        cells = _arguments(named[2], each.inside) or _of_signature(code.orders.get(named[2], []), each.inside)
-        toolbox = _TOOLBOX.fullmatch(named[2])
-        if cells and not (toolbox or _says_numbers(code, cells)):
-            continue
-        index = re.fullmatch(r"\s*\w*\s*", each.inside)  # of a list of links
-        if not cells and toolbox and not (index or named[2] in code.orders):
-            unread.append(code.line(each.start))
-        elif cells:
-            target = "" if named[1] is None or (named[1].isidentifier() and cells.get("type") is None) else named[1]
+        order, toolbox = code.orders.get(named[2], []), _TOOLBOX.fullmatch(named[2])
+        cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
+        if cells and (toolbox or _says_numbers(code, cells)):
+            target = re.sub(r"\s", "", named[1] or "")
+            if target.isidentifier() and "type" not in cells:
+                target = ""
             added = re.search(
                 r".*\b(\w+)(?:\.|->)(?:addSegment|append|push_back)\([^;\n]*\n?[^;\n]*$", each.before, re.S
             )
             if added and named[1] is None:
                 target = f"{added[1]}[{each.start}"
-            rows.append(_Link(code.line(each.start), re.sub(r"\s", "", target), each.start, cells))
+            rows.append(_Link(code.line(each.start), target, each.start, cells))
+        elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
+            unread.append(each)
+    if "Frame::DH(" in code.text:
+        _segments(code, rows)
+    if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
+        problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
+        remedy = "Write its numbers there, or the matrix that they come from above it"
+        raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
+    if "Frame::DH(" in code.text:
+        _segments(code, rows)
     if unread and (rows or "Link([" in code.text):
         raise InputError(
             None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
         )
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    plain = "0", "revolute", "standard", "modified"
-    if len(rows) == 1 and all(
-        _INDEXED.search(cell) or cell in (*plain, *code.lists) for cell in texts
-    ):  # made of lists in a loop
-        return []
     looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))
     if rows and (".extend(" in code.text or looped):
         problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
@@ -221,10 +216,28 @@ def _calls(code: Code) -> list[Grid]:
     return [_grid([(row.line, row.cells) for row in each]) for each in held]
 
 
+def _segments(code: Code, rows: list[_Link]) -> None:
+    """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
+    joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
+    for each in code.groups:
+        if re.search(r"\bSegment\s*$", each.before):
+            said = " ".join(joints.get(part, part) for part in parts(each.inside))
+            row = next((row for row in rows if each.start < row.place < each.end), None)
+            kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
+            if row is None or len(kinds) != 1:
+                problem = f"the segment '{' '.join(each.inside.split())[:60]}' is no row of a table"
+                remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
+                raise InputError(None, f"line {code.line(each.start)}", problem, remedy)
+            row.cells.update(type=_KDL[kinds[0]], convention="standard")
+
+
+_KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
+
+
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
-    orders = {"DH": ["a", "alpha", "d", "theta"]} if "KDL::" in code.text and "::None" not in code.text else {}
+    orders = {"DH": ["a", "alpha", "d", "theta"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
@@ -365,10 +378,9 @@ def _records(code: Code) -> list[Grid]:
     rows = list[tuple[int, dict[str, str]]]()
     for each in code.groups:
         if each.bracket == "{":
-            pairs = [re.split("[:=]", part, maxsplit=1) for part in parts(each.inside) if re.search("[:=]", part)]
             label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
-            named = [(key.strip(" .\"'\n").lower(), value.strip(" \"'\n")) for key, value in pairs]
-            cells = {key: value for key, value in named if not re.match(r"[(\[].*,", value)}  # no colour, no column
+            pairs = _pairs(parts(each.inside)).items()
+            cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
             rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
     if full := [row for row in rows if _is_row(row[1])]:
         return [_grid(full)]
@@ -434,6 +446,10 @@ def _titled(code: Code, rows: Grid, labels: list[str], before: str = "") -> Grid
     """A matrix below the names of its columns, [] if it has none; with the names of its rows, if each has one."""
     symbols = [re.sub(r"\d+$", "", cell) for cell in rows[0][1]]  # theta1 d1 a1 alpha1
     header = _order(code, rows, before) or (symbols if _names_columns(symbols) else [])
+    firsts = [cells[0] for _, cells in rows]
+    if not header and len(rows[0][1]) > 3 and all(re.fullmatch(r"[A-Za-z][\w -]*", first) for first in firsts):
+        rows, labels = [(line, cells[1:]) for line, cells in rows], firsts  # names of the joints
+        header = _order(code, rows, before)
     labelled = all(re.search(r"[^\W\d_]|^\d+$", each) and not heading_of(each) for each in labels)
     if header and "joint" not in header and labelled:
         return [(0, ["joint", *header]), *((line, [label, *cells]) for label, (line, cells) in zip(labels, rows))]
@@ -472,10 +488,14 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     """The names of columns that texts hold one after the other; [] if they hold several orders."""
     found: dict[str, list[str]] = {}
     for text in texts:
+        text = re.sub(r"\b(?:joint_?)?type\b", "sigma", text)
         text = re.sub(r"\s*\(\s*i\s*(-\s*1)?\s*\)", lambda found: "_i-1" if found[1] else "_i", text)
         words = [word for word in re.split(r"(?:[\s,;|\[\]()→]|->)+", text) if word]
-        windows = (words[start : start + width] for start in range(len(words) - width + 1))
-        if names := next(filter(_names_columns, windows), []):
+        windows = (words[k : k + size] for size in range(9, width - 1, -1) for k in range(len(words) - size + 1))
+        # All that it names, of which the row's number is no column; theta and its offset are two mentions of one.
+        names = next((each for each in windows if _names_columns(each, once=len(each) > width)), [])
+        names = names if len(names) == width else [name for name in names if _place(name) != "joint"]
+        if len(names) == width:
             found.setdefault(" ".join(map(_place, names)), names)
     return next(iter(found.values())) if len(found) == 1 else []
 
@@ -499,24 +519,10 @@ def _indexed(code: Code) -> Iterator[str]:
         yield ",".join(names[k] for k in sorted(names))
 
 
-def _names_columns(names: list[str]) -> bool:
-    """Whether names are those of a D-H table's columns, each once."""
-    quantities = {*quantities_of(names)}
+def _names_columns(names: list[str], *, once: bool = False) -> bool:
+    """Whether names are those of a D-H table's columns, each once; with ``once`` theta and its offset count as one."""
+    quantities = {name.replace("offset", "theta") if once else name for name in quantities_of(names)}
     return len(quantities) == len(names) and {"a", "alpha", "d"} <= quantities
-
-
-def elements(text: str) -> dict[str, str]:
-    """The elements of a program's lists by name: ``d(1)`` of MATLAB and ``d[0]`` of Python are ``d1`` and ``d0``.
-
-    In square brackets numbers begin at 0 if a 0 is used, at 1 if the list's length is (Julia); else no element has a
-    value.
-    """
-    found = dict[str, str]()
-    for name, cells in Code(text).lists.items():
-        used = {int(number) for number in re.findall(rf"\b{name}\[(\d+)\](?!\s*=)", text)}
-        if not used or used & {0, len(cells)}:
-            found |= {f"{name}{k}": cell for k, cell in enumerate(cells, 0 if 0 in used else 1)}
-    return found
 
 
 def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
@@ -548,6 +554,8 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
         heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
+        if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
+            continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
         if quantity == "theta" and mark == "=":
             text = re.sub(r"(?<![a-z])(?:\w+[._])?pi\b", "1", " ".join(cells), flags=re.I)

@@ -585,3 +585,106 @@ def test_a_study_names_a_table_as_it_is_found(tmp_path):
     with pytest.warns(er3a.InputWarning):
         robot = study.model_copy(update={"robots": {"mine": entry}}).robot("mine")
     np.testing.assert_allclose(robot.a, [row[0] / 1000 for row in IRB120])
+
+
+LINES = "a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\n"
+LISTS = LINES + "off = [0, -pi/2]\n"
+RECORDS = "dh = [{'d': 0.29, 'a': 0, 'alpha': -pi/2, 'theta': 0}, {'d': 0, 'a': 0.27, 'alpha': 0, 'theta': -pi/2}]\n"
+MATRIX = "DH = [[0, 0.29, 0, -pi/2], [-pi/2, 0, 0.27, 0]]\n"
+IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{LISTS}links = []\nfor i in range(2):\n    one = RevoluteDH(d=d[i], a=a[i], alpha=alpha[i],\n"
+        "                     offset=off[i])\n    links.append(one)\n",
+        f"{LISTS}L = [RevoluteDH(d=x, a=y, alpha=z, offset=w) for x, y, z, w in zip(d, a, alpha, off)]\n",
+        f"{RECORDS}for p in dh:\n    L.append(RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha'], offset=p['theta']))\n",
+        f"{MATRIX}for i in range(len(DH)):\n    theta, d, a, alpha = DH[i]\n"
+        "    L.append(RevoluteDH(d=d, a=a, alpha=alpha, offset=theta))\n",
+        f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]) for i, r in enumerate(DH)]\n",
+        f"{IN_MATLAB}for i = 1:size(DH, 1)\n  L(end+1) = Link([DH(i,:)], 'standard');\nend\n",
+        f"{IN_MATLAB}L(1) = Link([DH(1,:)]);\nL(2) = Link([DH(2,:)]);\n",
+        f"{IN_MATLAB}N = 2;\nfor k = 1:N\n  L(k) = Link('d', DH(k,2), 'a', DH(k,3), 'alpha', DH(k,4), 'offset', "
+        "DH(k,6));\nend\n",
+        "double a[2] = {0, 0.27}, b = 1;\ndouble al[2] = {-M_PI_2, 0};\ndouble d[2] = {0.29, 0};\n"
+        "double th[2] = {0, -M_PI_2};\nfor (int i = 0; i < 2; i++) {\n"
+        "  c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(a[i], al[i], d[i], th[i])));\n}\n",
+        "# name, theta, d, a, alpha\ndh = [\n['shoulder', 0, 0.29, 0, -pi/2],\n['elbow', -pi/2, 0, 0.27, 0]]\n",
+        "# | i | theta | d | a | alpha |\n# |---|---|---|---|---|\n# | 1 | q1 | 0.29 | 0 | -pi/2 |\n"
+        "# | 2 | q2-pi/2 | 0 | 0.27 | 0 |\nimport x\n",
+        "% DH: [a, d, alpha, theta]\nM = [0, 0.29, -pi/2, 0;\n 0.27, 0, 0, -pi/2];\nC = [0, 0.1, 0;\n 0.2, 0, 0];\n",
+        "A = np.array([0, 0.27])\nD = np.array([0.29, 0])\nALPHA = np.array([-np.pi/2, 0])\n"
+        "OFFSET = [0, -np.pi/2]\nQ_MIN = np.array([-2.9, -1.7])\nq_goal = [0.1, 0.2]\n",
+    ],
+)
+def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    assert content.dh.convention == "standard"
+
+
+def test_joints_of_kdl_slide_or_are_fixed_as_their_segments_say(tmp_path):
+    text = (
+        "KDL::Joint slide(KDL::Joint::TransZ);\nc.addSegment(Segment(Joint(Joint::None), Frame::DH(0, 0, 0.1, 0)));\n"
+    )
+    text += "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0.3, M_PI, 0, 0)));\n"
+    content, _ = read(tmp_path, text + "c.addSegment(Segment(slide, Frame::DH(0, 0, 0.05, 0)));\n")
+    assert [(row.type, row.a_mm, row.d_mm) for row in content.dh.rows] == [("revolute", 300, 0), ("prismatic", 0, 50)]
+    assert content.base.xyz_mm[2] == pytest.approx(100)
+
+
+LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (f"{LINES}L = []\nfor i in range(1):\n    L.append({LINK})\n", "of a loop"),
+        (f"{LINES}L = [RevoluteDH(d=1)]\nfor i in range(1, 2):\n    L.append({LINK})\n", "of a loop"),
+        (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
+        (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
+        (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
+        (f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "of a loop"),
+        (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
+        (
+            f"{MATRIX}for i in range(1):\n    L.append(RevoluteDH(d=DH[i][1], a=DH[i][2], alpha=DH[i][3]))\n"
+            "L.append(RevoluteDH(d=DH[1][1], a=DH[1][2], alpha=DH[1][3]))\n",
+            "of a loop",
+        ),
+        (f"{IN_MATLAB}DH(:,4) = DH(:,4)*pi/180;\nfor i=1:2\nL(i) = Link([DH(i,:)]);\nend\n", "line 5: .*can't be read"),
+        (
+            "N = 1;\nd=[0.29 0];\na=[0 0.27];\nal=[0 1];\nfor j=1:N\n L(j)=Link('d', d(j), 'a', a(j),"
+            " 'alpha', al(j));\nend",
+            "loop",
+        ),
+        ("DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -pi/2];\n", "line 4: 'offset' may be"),
+        ("% theta d a alpha\nDH=[0 0.29 0 -90;\n 0 0 0.27 0] .* [1 1 1 pi/180];\n", "row 2|line"),
+        ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
+        (
+            "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0, 0, 1, 0)));\nc.addSegment(Segment(fixed, H));",
+            "fixed, H",
+        ),
+    ],
+)
+def test_a_loop_that_may_leave_rows_out_is_asked_back(tmp_path, text, names):
+    with pytest.raises(InputError, match=names):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("text", "columns"),
+    [
+        ("dh:\n  - [0.0, 0.29, 0.0, -1.5708]\n  - [-1.5708, 0.0, 0.27, 0.0]\n", "theta d a alpha"),
+        (
+            "i,theta (rad),d (m),a (m),alpha (rad),t\n1,0,0.29,0,-1.5708,1\n2,-1.5708,0,0.27,0,0\n",
+            "- theta d a alpha -",
+        ),
+    ],
+)
+def test_the_remedy_of_a_refusal_works(tmp_path, text, columns):
+    with pytest.raises(InputError, match="--column"):
+        read(tmp_path, text)
+    content, _ = read(tmp_path, text, columns=columns.split(), length_unit="m", angle_unit="rad")
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-2)
