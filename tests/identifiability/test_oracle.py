@@ -147,7 +147,7 @@ def found_elsewhere() -> list[oracle.Rows]:
     extents = Extents(asked, table, free, speaking, gauge_of(robot, free), ToolRange(robot, table))
     assert extents.met
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(continuous, "SPREAD", 48)
+        patch.setattr(continuous, "SPREAD", 24)
         patch.setattr(continuous, "ROUNDS", 0)
         found = extents.elsewhere
     arms = [extents.region.tables(direction[None], amounts[None]) for direction, amounts in found]
