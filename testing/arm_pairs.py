@@ -34,28 +34,29 @@ class Arm:
     flange: np.ndarray
 
 
-def rot(axis: int, angle: float) -> np.ndarray:
-    """A turn about x, y or z (0, 1, 2)."""
-    T = np.eye(4)
+def rot(axis: int, angle: float | np.ndarray) -> np.ndarray:
+    """Turns (..., 4, 4) about x, y or z (0, 1, 2)."""
+    T = np.broadcast_to(np.eye(4), (*np.shape(angle), 4, 4)).copy()
     i, j = (axis + 1) % 3, (axis + 2) % 3
-    T[i, i] = T[j, j] = np.cos(angle)
-    T[j, i] = np.sin(angle)
-    T[i, j] = -T[j, i]
+    T[..., i, i] = T[..., j, j] = np.cos(angle)
+    T[..., j, i] = np.sin(angle)
+    T[..., i, j] = -T[..., j, i]
     return T
 
 
-def shift(x: float, y: float, z: float) -> np.ndarray:
-    """A shift in m."""
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
+def shift(x: float, y: float, z: float | np.ndarray) -> np.ndarray:
+    """Shifts (..., 4, 4) in m."""
+    T = np.broadcast_to(np.eye(4), (*np.shape(z), 4, 4)).copy()
+    T[..., :2, 3] = x, y
+    T[..., 2, 3] = z
     return T
 
 
 def flange_at(arm: Arm, q: np.ndarray) -> np.ndarray:
-    """The flange's frame (4, 4)."""
+    """The flange's frames (..., 4, 4) at joint values (..., n)."""
     T = arm.base
     for k in range(len(arm.a)):
-        x = arm.direction[k] * q[k]
+        x = arm.direction[k] * q[..., k]
         theta, d = (arm.offset[k], arm.d[k] + x) if arm.sliding[k] else (arm.offset[k] + x, arm.d[k])
         T = T @ rot(2, theta) @ shift(0, 0, d) @ shift(arm.a[k], 0, 0) @ rot(0, arm.alpha[k])
     return np.asarray(T @ arm.flange)
@@ -139,7 +140,7 @@ def effects(arm: Arm, entries: Sequence[tuple[str, int]]) -> np.ndarray:
     q = np.where(arm.sliding, random.uniform(0, 0.5, (POSES, n)), random.uniform(-3, 3, (POSES, n)))
 
     def seen(changed_arm: Arm) -> np.ndarray:
-        return np.concatenate([flange_at(changed_arm, row)[:3].ravel() for row in q])
+        return flange_at(changed_arm, q)[:, :3].ravel()
 
     def twist(place: str, k: int) -> Arm:
         move = np.eye(4)

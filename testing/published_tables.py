@@ -240,7 +240,7 @@ def best_alignment_mm(arm: Arm, frames: np.ndarray, q: np.ndarray) -> float:
         return replace(arm, base=base, flange=flange, offset=arm.offset + x[12:])
 
     def off(x: np.ndarray) -> np.ndarray:
-        own = np.stack([flange_at(moved(x), row) for row in q])
+        own = flange_at(moved(x), q)
         return np.concatenate([(own - frames)[:, :3, 3].ravel(), 0.3 * (own - frames)[:, :3, :3].ravel()])
 
     found = least_squares(off, np.zeros(12 + n), x_scale=0.1)

@@ -19,6 +19,20 @@ LEAST = {"samples": 5000, "cloud_points": 500, "proof_cells": 200, "directions":
 LEAST |= {"round_trips": 20, "reach_starts": 4}
 
 
+CALLS = """
+import json, sys
+from er3a.pipeline.cli import main
+for words in json.loads(sys.argv.pop()):
+    sys.argv[1:] = words
+    try:
+        main()
+    except SystemExit as ended:
+        if ended.code:
+            raise
+"""
+"""Code for ``python -c``: calls er3a with each list of words of a JSON list, in one process that loads once."""
+
+
 def on_least_budgets(study: str) -> str:
     """The text of a study with budgets so small that a run shows only that all of it works."""
     for name, budget in LEAST.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,22 +30,29 @@ TEMPLATE = """{% extends "base.html.j2" %}
 ROWS = [["b, long", "−1\u202f234.5"], ["a", "20"], ['"c"', "–"], ["d", "3"], ["e", "5.0·10⁻³"]]
 
 
-@pytest.fixture
-def page(browser, tmp_path):
-    """A page with one table and one figure, open in the browser."""
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    """A page with one table and one figure."""
     figure, axes = new_figure()
     axes.plot([0, 1], [0, 1])
-    template = tmp_path / "page.html.j2"
+    folder = tmp_path_factory.mktemp("written")
+    template = folder / "page.html.j2"
     template.write_text(TEMPLATE, encoding="utf-8")
     render(
         template,
-        tmp_path / "page.html",
+        folder / "page.html",
         command="make run",
         provenance=Provenance(inputs=(), code="0" * 64),
         rows=ROWS,
         picture=Picture(figure, "A line", "It rises."),
     )
-    browser.get((tmp_path / "page.html").as_uri())
+    return folder / "page.html"
+
+
+@pytest.fixture
+def page(browser, written):
+    """The page with one table and one figure, open in the browser."""
+    browser.get(written.as_uri())
     return browser
 
 
@@ -144,9 +152,10 @@ def test_figure_is_offered_for_download(page):
     assert link.get_attribute("href").startswith("data:image/svg+xml")
 
 
-@pytest.fixture
-def plots(browser, tmp_path):
+@pytest.fixture(scope="module")
+def plots(browser, tmp_path_factory):
     """A page with a curve, bars, a map with its colour bar and a drawing to scale, and what each shows."""
+    folder = tmp_path_factory.mktemp("plots")
     figure, (curve, bars, shades, drawing) = new_figure(1, 4, width=16.0)
     curve.plot(np.linspace(0, 4, 41), np.linspace(0, 4, 41) ** 2, label="square")
     curve.set(xlabel="time (s)", ylabel="way (m)", ylim=(-4, 20))
@@ -157,7 +166,7 @@ def plots(browser, tmp_path):
     shades.set(xlabel="x (mm)", ylabel="y (mm)")
     drawing.plot([0, 100, 100], [0, 0, 100], label="border")
     drawing.set(xlabel="x (mm)", ylabel="z (mm)", aspect=1.0, xlim=(-50, 150), ylim=(-50, 150))
-    template = tmp_path / "plots.html.j2"
+    template = folder / "plots.html.j2"
     template.write_text(
         '{% extends "base.html.j2" %}{% block title %}Test{% endblock %}{% block header %}<h1>Test</h1>{% endblock %}'
         "{% block content %}{{ ui.picture(picture) }}{% endblock %}",
@@ -165,13 +174,13 @@ def plots(browser, tmp_path):
     )
     render(
         template,
-        tmp_path / "plots.html",
+        folder / "plots.html",
         command="make run",
         provenance=Provenance(inputs=(), code="0" * 64),
         picture=Picture(figure, "Plots", "They answer."),
     )
     browser.set_window_size(1400, 900)
-    browser.get((tmp_path / "plots.html").as_uri())
+    browser.get((folder / "plots.html").as_uri())
     return browser
 
 

@@ -137,8 +137,8 @@ def test_tables_with_other_values_meet_all_that_the_drawing_says(entry):
 
 
 @cache
-def found_elsewhere(seed: int = continuous.SEED) -> list[oracle.Rows]:
-    """Tables that a short search from a seed finds about the ER3-600's, with its directions."""
+def found_elsewhere() -> list[oracle.Rows]:
+    """Tables that a short search finds about the ER3-600's, with its directions."""
     robot, references = load_robot("er3_600"), load_references("er3_600")
     stated = [each for each in references.references if each.document == "drawing_v1_1"]
     free, table = continuous_of(robot), tables_of(robot)
@@ -147,9 +147,8 @@ def found_elsewhere(seed: int = continuous.SEED) -> list[oracle.Rows]:
     extents = Extents(asked, table, free, speaking, gauge_of(robot, free), ToolRange(robot, table))
     assert extents.met
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(continuous, "SPREAD", 48)
+        patch.setattr(continuous, "SPREAD", 24)
         patch.setattr(continuous, "ROUNDS", 0)
-        patch.setattr(continuous, "SEED", seed)
         found = extents.elsewhere
     arms = [extents.region.tables(direction[None], amounts[None]) for direction, amounts in found]
     return [{name: getattr(arm, name) for name in oracle.COLUMNS} for arm in arms]
@@ -171,12 +170,10 @@ def test_the_drawing_settles_no_entry_of_the_er3_600():
     assert settled("er3_600") == []
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [continuous.SEED, 2, 5])
-def test_tables_far_away_meet_the_drawing(seed):
+def test_tables_far_away_meet_the_drawing():
     """Tables that evidence finds far from the er3_600's, with some joints reversed, are put to the oracle."""
-    assert found_elsewhere(seed)
-    for rows in found_elsewhere(seed):
+    assert len(found_elsewhere()) > 3
+    for rows in found_elsewhere():
         assert oracle.worst(rows, independent("er3_600"))[0] <= FEASIBLE
 
 

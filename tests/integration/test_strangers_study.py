@@ -13,7 +13,7 @@ import pytest
 
 from er3a.errors import InputError
 from er3a.files.hand_eye_file import grey_image
-from er3a.pipeline.working_folder import CODE_OF_LIBRARIES
+from er3a.pipeline.working_folder import CODE_OF_LIBRARIES, STATE
 from testing.processes import run
 from testing.small_study import on_least_budgets
 from tests.conftest import ROOT
@@ -125,12 +125,7 @@ def test_the_poison_works(tmp_path, words):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "code"),
-    [
-        (("check", "p.src", "config/study.yaml"), 0),
-        (("check-program", "p.src", "--robot", "er3_600"), 0),
-        (("compare", "data/a.csv", "er3_600"), 1),
-        (("run", "--study", "config/study.yaml", "--", "-n"), 0),
-    ],
+    [(("check-program", "p.src", "--robot", "er3_600"), 0), (("compare", "data/a.csv", "er3_600"), 1)],
     ids=lambda words: words[0] if isinstance(words, tuple) else "",
 )
 def test_commands_run_nothing_of_the_folder(stranger, words, code):
@@ -144,19 +139,20 @@ def test_a_folder_in_the_path_of_python_is_taken_out_of_it(stranger, path, words
     folder, call = stranger
     for name in BEFORE_ER3A:
         (folder / f"{name}.py").unlink()
-    call(*words, "check", "config/study.yaml", PYTHONPATH=path)
+    call(*words, "check", "p.src", "config/study.yaml", PYTHONPATH=path)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("place", [".snakemake", "results", "reports/er3_600", "logs"])
-def test_a_folder_written_into_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path, place):
+def test_a_folder_written_into_that_links_elsewhere_is_refused_and_nothing_there_is_deleted(tmp_path, call, place):
     foreign = tmp_path / "foreign"
     (foreign / "locks").mkdir(parents=True)
     (foreign / "locks/precious").touch()
     study = tmp_path / "study"
     (study / place).parent.mkdir(parents=True)
     (study / place).symlink_to(foreign)
-    done = run([sys.executable, "-P", "-m", "er3a", "run"], cwd=study)
+    at_start = [sys.executable, "-P", "-m", "er3a", "run"]  # looks at STATE before anything else is loaded
+    done = run(at_start, cwd=study) if place == STATE else call("run", folder=study)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert done.stderr.startswith(f"error: {place}: ")
     assert (foreign / "locks/precious").exists()
@@ -181,9 +177,12 @@ def test_a_folder_with_code_of_libraries_is_refused_by_jobs_too(stranger, place)
         (("--workflow-profile", "slurm"), {}, 0),
     ],
 )
-def test_a_name_means_no_profile_of_the_folder(stranger, words, environment, code):
-    _, call = stranger
-    call("er3a", "run", "--study", "config/study.yaml", "--", "-n", *words, code=code, **environment)
+def test_a_name_means_no_profile_of_the_folder(stranger, call, monkeypatch, words, environment, code):
+    """In this process, which Snakemake would evaluate a profile in."""
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    done = call("run", "--study", "config/study.yaml", "--", "-n", *words, folder=stranger[0])
+    assert done.returncode == code, done.stderr
 
 
 @pytest.mark.long

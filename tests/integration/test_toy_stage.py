@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from testing.small_study import STUDY
+from testing.small_study import CALLS, STUDY
 
 pytestmark = pytest.mark.long
 
@@ -113,19 +113,6 @@ def with_toy(fresh_project, small_study):
     jobs = [job for robot in project.robots for job in (("compute", "toy", robot), ("views", robot, "toy"))]
     er3a(project, *jobs, ("index",))
     return project
-
-
-CALLS = """
-import json, sys
-from er3a.pipeline.cli import main
-for words in json.loads(sys.argv.pop()):
-    sys.argv[1:] = words
-    try:
-        main()
-    except SystemExit as ended:
-        if ended.code:
-            raise
-"""
 
 
 def er3a(project, *commands: tuple[str, ...]) -> str:
