@@ -99,13 +99,8 @@ def _process_number() -> int:
     return int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--no-long tests/vision``, which may be given again: CI names rooms whose code nobody has touched (.ci/run)."""
-    parser.addoption("--no-long", action="append", default=[], metavar="PATH", help="leave out long tests of a room")
-
-
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests of the small study or of a stage's results of it are long; time limits of long ones and of Snakemake's.
 
     Processes are given one file after the other (pyproject.toml): the longest first, then those that need none of the
@@ -120,11 +115,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.long)
         if "shared_folder" in fixtures or item.get_closest_marker("long"):
             item.add_marker(pytest.mark.timeout(LONGEST_S))
-    rooms_left = tuple(str(ROOT / path) for path in config.getoption("no_long"))
-    left = [item for item in items if item.get_closest_marker("long") and str(item.path).startswith(rooms_left)]
-    if left:
-        config.hook.pytest_deselected(items=left)
-        items[:] = [item for item in items if item not in left]
 
 
 @pytest.hookimpl(wrapper=True)
