@@ -12,7 +12,7 @@ from babel.messages.pofile import read_po
 from er3a.pipeline import messages
 from er3a.pipeline.messages import say
 from er3a.pipeline.messages.planning import STRATEGIES
-from er3a.pipeline.messages.programs import NOT_FOLLOWED, REMEDIES, SINGULAR
+from er3a.pipeline.messages.programs import LATER, NOT_FOLLOWED, REMEDIES, SINGULAR
 
 for module in pkgutil.iter_modules(messages.__path__):
     importlib.import_module(f"{messages.__name__}.{module.name}")
@@ -28,7 +28,7 @@ MARKS = re.compile(r"[\[\]]|\{\w+:[?!]\}")  # of optional parts
 OF_PROGRAMS = "test_a_program_that_is_mended_as_advised_passes"
 OF_SETS = "test_a_set_that_is_mended_as_advised_gives_the_camera_and_no_warning"
 AT_PLACES = "test_the_clearance_of_a_place_is_that_of_the_nearest_arm_on_its_lattice"
-MEASURED = "test_the_proposed_measurement_settles_or_contradicts"
+MEASURED = "test_the_proposed_measurement_contradicts_another_arm"
 CARRIED_OUT = {
     **dict.fromkeys(REMEDIES, OF_PROGRAMS),
     **{f"singular.{kind}": OF_PROGRAMS for kind in ("wrist", "elbow", "shoulder")},
@@ -120,7 +120,7 @@ def test_texts_of_pages_advise_no_move_that_no_test_carries_out():
     with (Path(messages.__path__[0]) / "locale/zh/LC_MESSAGES/er3a.po").open("rb") as file:
         texts = [each.id if isinstance(each.id, str) else each.id[0] for each in read_po(file) if each.context != "key"]
     found = {text for text in texts if MOVES_ARM_OR_PART.search(text)} - {*REMEDIES.values(), *SINGULAR.values()}
-    found -= {*NOT_FOLLOWED.values()}
+    found -= {*NOT_FOLLOWED.values(), LATER}  # test_a_loop_that_drifts_is_mended_as_advised
     assert [text for text in sorted(found) if not text.startswith(tuple(ON_PAGES))] == []
     assert [each for each in ON_PAGES if not any(text.startswith(each) for text in found)] == []
 

@@ -195,12 +195,6 @@ def _calls(code: Code) -> list[Grid]:
         problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
         remedy = "Write its numbers there, or the matrix that they come from above it"
         raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
-    if "Frame::DH(" in code.text:
-        _segments(code, rows)
-    if unread and (rows or "Link([" in code.text):
-        raise InputError(
-            None, f"line {unread[0]}", "a link with arguments that can't be read", "Write its four numbers"
-        )
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))

@@ -220,6 +220,19 @@ def test_each_reason_why_something_is_not_followed_that_has_a_remedy_is_mended()
     assert asked <= MENDED.keys()
 
 
+@pytest.mark.long
+def test_a_loop_that_drifts_is_mended_as_advised(tmp_path):
+    """It ends before the passes that are out of reach, or comes back to a set target."""
+
+    def checked(passes, *lines):
+        (tmp_path / "a.src").write_text(krl("INT N", f"FOR N=1 TO {passes}", *lines, "LIN_REL {X 60}", "ENDFOR"))
+        return check_program(read_program(tmp_path / "a.src"), ROBOT, CheckOptions(start=HOME))
+
+    drifts, *mended = checked(9), checked(1), checked(9, AT_HOME)
+    assert "way_out_of_reach" in keys(drifts), keys(drifts)
+    assert all("way_out_of_reach" not in keys(each) for each in mended)
+
+
 @pytest.mark.parametrize(("times", "drifts"), [(3, False), (5, True), (0, False)])
 def test_what_is_out_of_reach_in_later_rounds_alone_is_no_target_to_be_moved(times, drifts):
     """A line that was carried out more often than it was out of reach is in a loop that drifts."""
