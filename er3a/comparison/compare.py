@@ -357,7 +357,7 @@ def best_of(
 
     Parameters
     ----------
-    others : at least one, by name
+    others : by name
     tolerance_mm, tolerance_deg : by how much lengths (mm) and angles (deg) may differ and still agree
 
     Returns
@@ -367,8 +367,9 @@ def best_of(
     tolerances = mechanism.Tolerances(tolerance_mm / 1000, math.radians(tolerance_deg))
     found = [(name, _compared(robot, other, tolerances, explained=False)) for name, other in others.items()]
     found.sort(key=lambda pair: _misfit(pair[1]))
-    best = found[0][0]
-    return [(best, compare(robot, others[best], tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)), *found[1:]]
+    for best, _ in found[:1]:
+        found[0] = best, compare(robot, others[best], tolerance_mm=tolerance_mm, tolerance_deg=tolerance_deg)
+    return found
 
 
 def _misfit(found: Comparison) -> tuple[float, ...]:

@@ -55,11 +55,11 @@ def likely(robot: Robot, others: Mapping[str, Robot]) -> list[str]:
     Returns
     -------
     names : at most ``MOST``, and all whose numbers are as near as the best one's; those alone that have as many rows,
-        of the same kinds. If there are none, the first of ``others``
+        of the same kinds
     """
     alike = [name for name, other in others.items() if np.array_equal(other.sliding, robot.sliding)]
     if not alike:
-        return list(others)[:1]
+        return []
     pairs = [invariants(others[name]) for name in alike]
     lengths, angles = (np.array([pair[k] for pair in pairs]) for k in (0, 1))
     misfit = np.min([_misfits(robot, way, lengths, angles) for way in CONVENTIONS], axis=0)

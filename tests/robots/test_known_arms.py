@@ -10,10 +10,12 @@ import pytest
 from typer.testing import CliRunner
 
 import er3a
+from er3a.comparison.compare import best_of
 from er3a.comparison.nearest import likely
 from er3a.errors import InputError
 from er3a.files.arm_catalogue import known_arms
 from er3a.files.robot_file import NAME_PATTERN
+from er3a.files.robot_library import load_robot
 from er3a.files.robot_writer import robot_file
 from er3a.pipeline.cli import app
 from er3a.pipeline.new_study.arms import arm_of
@@ -99,6 +101,13 @@ def test_a_far_table_is_not_named(tmp_path):
     assert found["arm"] is None
     assert found["nearest"]
     assert min(each["different_entries"] for each in found["nearest"]) > 1
+
+
+def test_no_arm_is_near_whose_joints_are_of_other_kinds():
+    """The Stanford arm's third joint slides, as that of no known arm does."""
+    stanford = load_robot("er3a_c60").replace(sliding=np.arange(6) == 2)
+    assert likely(stanford, {name: arm.robot for name, arm in known_arms().items()}) == []
+    assert best_of(stanford, {}) == []
 
 
 @pytest.mark.long

@@ -196,14 +196,15 @@ def identify(source: str, asked: CompareRequest) -> None:
     robots = {name: arm.robot for name, arm in known.items()}
     tolerances = {"tolerance_mm": asked.tolerance_mm, "tolerance_deg": asked.tolerance_deg}
     ranked = best_of(robot, {name: robots[name] for name in likely(robot, robots)}, **tolerances)
-    name, best = ranked[0]
-    if best.different_entries > NEAR or (best.geometry and best.geometry.unexplained_mm):
+    near = ranked and ranked[0][1].different_entries <= NEAR
+    if not near or (ranked[0][1].geometry and ranked[0][1].geometry.unexplained_mm):
         if asked.as_json:
             nearest = [{"arm": each, "different_entries": found.different_entries} for each, found in ranked]
             print_json({"arm": None, "nearest": nearest})
         else:
             print("\n".join(not_near_lines([(known[each], found) for each, found in ranked[:NEAREST_SHOWN]])))
         raise typer.Exit(1)
+    name, best = ranked[0]
     alike = of_equal_geometry(name, robots, asked.tolerances)
     others = {each for each, found in ranked if found.different_entries == best.different_entries} - {name, *alike}
     groups = [[known[each] for each in names] for names in (alike, sorted(others))]

@@ -117,8 +117,8 @@ def _nearest(corrected: Robot, own: str) -> str:
     arms = {name: arm.robot for name, arm in known_arms().items()}
     arms |= {name: load_robot(name) for name in names("data/robots", "*.yaml")}
     arms.pop(own, None)
-    name, found = best_of(corrected, {each: arms[each] for each in likely(corrected, arms)})[0]
-    return name if found.verdict in ("equal", "same_arm") else ""
+    ranked = best_of(corrected, {each: arms[each] for each in likely(corrected, arms)})
+    return next((name for name, found in ranked[:1] if found.verdict in ("equal", "same_arm")), "")
 
 
 def _write(found: Confirmation, output: Path) -> None:

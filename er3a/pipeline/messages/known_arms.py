@@ -51,10 +51,9 @@ def provenance_lines(arm: KnownArm) -> list[str]:
 
 def not_near_lines(nearest: Sequence[tuple[KnownArm, Comparison]]) -> list[str]:
     """That no known arm is near, and which are nearest."""
-    shown = [f"{_named(arm)}, {say(found.geometry)}" for arm, found in nearest if found.geometry is not None]
-    if not shown:
+    if not nearest:
         return ["nothing here is near: no known arm has joints of these kinds"]
-    return ["nothing here is near; nearest:", *(f"  {each}" for each in shown)]
+    return ["nothing here is near; nearest:", *(f"  {_named(arm)}, {say(found.geometry)}" for arm, found in nearest)]
 
 
 def matrix_rows(names: Sequence[str], pairs: Pairs) -> list[list[str]]:
