@@ -20,7 +20,7 @@ from tests.conftest import ROBOT, leave_one_robot
 
 pytestmark = pytest.mark.long
 
-QUICK_STAGES = ("inverse", "programs", "dynamics")
+QUICK_STAGES = ("inverse", "programs", "dynamics", "validation")  # two jobs: validation has its own
 
 
 def finished_results(run) -> list[Path]:

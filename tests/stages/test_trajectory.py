@@ -29,6 +29,7 @@ from er3a.kinematics.singularity import characteristic_length, conditioning
 from er3a.pipeline.messages.say import say
 from er3a.pipeline.messages.trajectory import KEY_FIGURES, path_text, repair_text, strategy_word
 from er3a.pipeline.overview.index import write_index
+from er3a.pipeline.overview.tiles import FEW
 from er3a.pipeline.results import AbsentResults, Stored, Summary, Verdict, read_results, write_results
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages import run
@@ -404,7 +405,7 @@ def test_the_index_says_first_what_validation_came_to(study, folders, stored, tm
     rows = index.xpath("//*[contains(@class, 'tile')]//*[contains(@class, 'runs')]//li")
     played = [parse_qs(urlsplit(row.find("a").get("href")).query) for row in rows]
     names = [each["play"][0] for each in played]
-    assert len({*names}) == len(names) == min(4, len(paths))  # how many more is said below
+    assert len({*names}) == len(names) == min(FEW, len(paths))  # how many more is said below
     assert all(0 <= float(each["t"][0]) <= paths[each["play"][0]].duration_s for each in played)
     marks = {each["play"][0]: row.get("class") for each, row in zip(played, rows)}
     assert {name for name, mark in marks.items() if mark == "pass"} == {*names} - {fault.name for fault in wrong}

@@ -29,7 +29,7 @@ CHECKS: Mapping[Check, str] = words(
 )
 GAP_WORDS: Mapping[str, str] = words(
     {
-        "unsettled": "entries that documents settle only up to signs, or not at all",
+        "unsettled": "documents leave entries open, or settle them but for signs",
         "not_run": "the check was not made",
         "limits_assumed": "the robot's file assumes the limits",
         "not_followed": "paths not followed",

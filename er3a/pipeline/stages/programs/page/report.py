@@ -195,6 +195,6 @@ def _facts(rows: model.Instructions, here: list[int]) -> str:
     parts = []
     if np.isfinite(times).any():
         parts.append(tr("{time} s", time=fixed(float(np.nanmax(times)), 2)))
-    if np.isfinite(clear).any():
-        parts.append(tr("{far} mm clear", far=fixed(float(np.nanmin(clear)), 0)))
+    if (least := float(np.fmin.reduce(clear, initial=np.inf))) < np.inf and least >= 0:  # else a finding says how deep
+        parts.append(tr("{far} mm clear", far=fixed(least, 0)))
     return " · ".join(parts)
