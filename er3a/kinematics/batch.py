@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from er3a.errors import PoseError, ShapeError
 from er3a.finding import fact
 from er3a.geometry.transforms import check_poses
+from er3a.geometry.vectors import TURN
 from er3a.kinematics.block_inverse import BLOCK, solve_blocks
 from er3a.kinematics.by_class import arm_solver, checked_parameters, meets_poses, misses, slots_of_class
 from er3a.kinematics.classes.chain_solvers import Unsolved
@@ -23,9 +24,10 @@ from er3a.kinematics.singularity import determinant_factors
 from er3a.kinematics.solutions import Method, Solutions, in_doubt, slot_labels
 from er3a.kinematics.wrist_partitioned import constants_for_blocks, solve_slots, wrist_partition_missing
 from er3a.numerics.arrays import Flags, Integers, Reals, as_floats
-from er3a.numerics.jit import parallel_for
+from er3a.numerics.jit import kernel, parallel_for
 from er3a.robots.joint_limits import nearest_equivalent, turn_bounds, within
 from er3a.robots.robot import Robot
+from er3a.robots.whole_turns import LIMIT_TOLERANCE, whole_turns
 
 SMALLEST_PART = 8 * BLOCK  # poses that are worth a thread's start
 NEARLY_OWN = 1e-5  # rad
@@ -199,6 +201,20 @@ def _checked_reference(robot: Robot, q_ref: Reals | None, count: int) -> Reals:
 def _turn_range(robot: Robot, q: Reals) -> NDArray[np.int8]:
     """Smallest and largest number of whole turns (N, S, n, 2) within the limits; 0 and -1 in empty slots."""
     turns = np.empty((*q.shape, 2), dtype=np.int8)
+    if whole_turns(robot).alone.all() and not robot.continuous.any():
+        _count_turns(q.reshape(-1, robot.joints), robot.lower, robot.upper, turns.reshape(-1, robot.joints, 2))
+        return turns
     low, high = turn_bounds(robot, q)
     turns[..., 0], turns[..., 1] = np.nan_to_num(low), np.nan_to_num(high, nan=-1.0)
     return turns
+
+
+@kernel
+def _count_turns(q: Reals, lower: Reals, upper: Reals, turns: NDArray[np.int8]) -> None:
+    """What ``turn_bounds`` finds for rows (N, n) of joints that turn and have limits, in turns (N, n, 2)."""
+    for n in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            turns[n, j, 0], turns[n, j, 1] = 0, -1
+            if not np.isnan(q[n, j]):
+                turns[n, j, 0] = np.int8(np.ceil((lower[j] - LIMIT_TOLERANCE - q[n, j]) / TURN))
+                turns[n, j, 1] = np.int8(np.floor((upper[j] + LIMIT_TOLERANCE - q[n, j]) / TURN))

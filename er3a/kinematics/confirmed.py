@@ -110,23 +110,21 @@ def to_be_confirmed(robot: Robot, T: Reals, q: Reals, threads: int) -> Integers:
         for start in range(part.start, part.stop, AT_A_TIME):
             own = slice(start, min(start + AT_A_TIME, part.stop))
             rows = q[own].reshape(-1, q.shape[2])
-            _look(T[own], rows[:, 0], forward(robot, rows, out=back[: len(rows)]), CONFIRMS / 3, far[own])
+            filled = np.flatnonzero(~np.isnan(rows[:, 0]))  # NaN would make the forward kinematics of its block slow
+            reached = forward(robot, rows[filled], out=back[: len(filled)])
+            _look(T[own], filled // slots, reached, CONFIRMS / 3, far[own])
 
     parallel_for(len(T), threads, AT_A_TIME, look)
     return np.flatnonzero(far)
 
 
 @kernel
-def _look(T: Reals, first: Reals, back: Reals, most: float, far: Flags) -> None:
-    """Which poses (N, 4, 4) have a row, its first joint (N * S,) not NaN, with a pose (N * S, 4, 4) that is off."""
-    slots = len(first) // max(len(T), 1)
-    for n in range(len(T)):
-        for k in range(n * slots, (n + 1) * slots):
-            if np.isnan(first[k]):
-                continue
-            off = 0.0
-            for i in range(3):
-                for j in range(4):
-                    off = max(off, abs(back[k, i, j] - T[n, i, j]))
-            if not off <= most:
-                far[n] = True
+def _look(T: Reals, of: Integers, back: Reals, most: float, far: Flags) -> None:
+    """Which poses (N, 4, 4) have a row that is off: its pose (K, 4, 4), of the pose of number ``of`` (K,)."""
+    for k in range(len(of)):
+        off = 0.0
+        for i in range(3):
+            for j in range(4):
+                off = max(off, abs(back[k, i, j] - T[of[k], i, j]))
+        if not off <= most:
+            far[of[k]] = True
