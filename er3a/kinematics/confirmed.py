@@ -110,8 +110,10 @@ def to_be_confirmed(robot: Robot, T: Reals, q: Reals, threads: int) -> Integers:
         for start in range(part.start, part.stop, AT_A_TIME):
             own = slice(start, min(start + AT_A_TIME, part.stop))
             rows = q[own].reshape(-1, q.shape[2])
-            filled = np.flatnonzero(~np.isnan(rows[:, 0]))  # NaN would make the forward kinematics of its block slow
-            reached = forward(robot, rows[filled], out=back[: len(filled)])
+            filled = np.flatnonzero(~np.isnan(rows[:, 0]))
+            if len(filled) < len(rows):  # NaN would make the forward kinematics of its block slow
+                rows = rows[filled]
+            reached = forward(robot, rows, out=back[: len(rows)])
             _look(T[own], filled // slots, reached, CONFIRMS / 3, far[own])
 
     parallel_for(len(T), threads, AT_A_TIME, look)
