@@ -197,5 +197,5 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
             text = re.sub(
                 r"(?<=\d) (?=(mm|s|deg|%))", "\u00a0", first_sentence(fault.to_do)[0]
             )  # units stay with values
-            return Fix(joined((fault.name, text), ": "), place)
+            return Fix(joined((fault.name, text), ": "), place, fault.status != "caution")
     return None

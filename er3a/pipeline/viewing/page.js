@@ -752,7 +752,7 @@ for (const link of document.querySelectorAll("nav [data-stage]")) {
 
 // The row of the list whose moment or picture is shown.
 const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
-const fix = rows.length && document.querySelector(".hero .fix[data-follows]");
+const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
   if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
