@@ -32,10 +32,10 @@ def _cut(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
             count -= 1
             arcs[n, 0], arcs[n, 1] = arcs[count, 0], arcs[count, 1]
         elif low > a and high < b:
-            if count == MAX_ARCS and not more:
+            if count == len(arcs) and not more:
                 return count
             arcs[n, 1] = low
-            if count == MAX_ARCS:
+            if count == len(arcs):
                 return count
             arcs[count, 0], arcs[count, 1] = high, b
             count += 1
@@ -55,7 +55,7 @@ def remove(arcs: Reals, count: int, low: float, high: float, more: bool) -> int:
 
     Parameters
     ----------
-    arcs : (MAX_ARCS, 2), rad in [0, 2 pi], changed in place
+    arcs : (most, 2), rad in [0, 2 pi], changed in place
     count : how many of them count
     low, high : rad, of any turn; nothing happens if high is not above low
     more : where the list is full, whether to take out too much (True) or too little

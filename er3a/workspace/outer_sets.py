@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from er3a.geometry.vectors import TURN
-from er3a.numerics.arrays import Flags, Integers, Reals
+from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inner_kernel, kernel
 from er3a.workspace.arcs import FULL_TURN, ROUND_OFF, Cell, remove
 from er3a.workspace.general_arm import GeneralArm
@@ -24,6 +24,7 @@ from er3a.workspace.general_arm import GeneralArm
 Four = tuple[float, float, float, float]
 _PIECES, _LEVELS = 64, 6  # of a turn that is searched, and how often a piece is halved at most
 _ARCS = 6  # of azimuth that are kept for a ring
+_BLOCK = 8  # rings along each side of a block
 
 
 class Rings(NamedTuple):
@@ -153,13 +154,13 @@ def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
 
 
 @inner_kernel
-def _room() -> tuple[Flags, Reals]:
+def _room() -> tuple[Integers, Reals]:
     """Working memory of :func:`exclude`, and the pieces of a turn at each level: those of a level with n pieces begin
     at row n, and the halves of piece i are 2 i and 2 i + 1.
 
     Returns
     -------
-    flags : (2, longest) bool, not initialised
+    runs : (n, 2), of pieces, not initialised
     turns : (pieces, 6): the middle's angle (rad), its cosine and sine, half the width (rad), how far an arc of that
         half falls back from its tangent, in parts of the radius, and how far it runs along it
     """
@@ -173,7 +174,7 @@ def _room() -> tuple[Flags, Reals]:
             row[0], row[1], row[2] = angle, np.cos(angle), np.sin(angle)
             row[3], row[4], row[5] = width, 1.0 - np.cos(width), np.sin(width)
         pieces *= 2
-    return np.empty((2, longest), dtype=np.bool_), turns
+    return np.empty((_PIECES, 2), dtype=np.int64), turns
 
 
 @inner_kernel
@@ -263,7 +264,7 @@ def exclude(  # noqa: C901, PLR0912
     outer: Rings,
     arcs: Reals,
     count: int,
-    flags: Flags,
+    runs: Integers,
     turns: Reals,
 ) -> int:
     """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.
@@ -275,7 +276,7 @@ def exclude(  # noqa: C901, PLR0912
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     outer : the largest reach of the joints after it
     arcs, count : the arcs that are empty so far; changed in place
-    flags, turns : of :func:`_room`
+    runs, turns : of :func:`_room`
 
     Returns
     -------
@@ -288,57 +289,55 @@ def exclude(  # noqa: C901, PLR0912
         levels, pieces = levels + 1, 2 * pieces
     if high - low >= FULL_TURN:
         return 0 if _meets_anywhere(L, cell, turns, outer, levels) else count
-    now, finer = flags[0], flags[1]
-    pieces, found = _PIECES, False
+    pieces, found = _PIECES, 0
     for i in range(pieces):
-        now[i] = _meets(L, cell, turns, pieces + i, outer, bar)
-        found = found or now[i]
-    if not found:
-        return count
-    for _ in range(levels):
-        # Only ends of what is left are looked at again: its inside is taken to be reached.
-        for i in range(pieces):
-            finer[2 * i], finer[2 * i + 1] = now[i], now[i]
-        pieces *= 2
-        for sense in (1, -1):
-            for start in range(pieces):
-                i = start if sense > 0 else pieces - 1 - start
-                # Follow each end inwards until a piece stays.
-                if finer[i] or not finer[(i + sense) % pieces]:
-                    continue
-                m = (i + sense) % pieces
-                while finer[m] and not _meets(L, cell, turns, pieces + m, outer, bar):
-                    finer[m] = False
-                    m = (m + sense) % pieces
-        now, finer = finer, now
-    i = 0
-    while i < pieces:
-        if not now[i]:
-            i += 1
+        if not _meets(L, cell, turns, pieces + i, outer, bar):
             continue
-        first = i
-        while i < pieces and now[i]:
-            i += 1
-        a, b = TURN * first / pieces - 1e-9, TURN * i / pieces + 1e-9
-        count = remove(arcs, count, a + low, b + high, True)
+        if found and runs[found - 1, 1] == i:
+            runs[found - 1, 1] += 1
+        else:
+            runs[found, 0], runs[found, 1], found = i, i + 1, found + 1
+    if found > 1 and runs[0, 0] == 0 and runs[found - 1, 1] == pieces:
+        found -= 1  # one run, through angle 0
+        runs[0, 0] = runs[found, 0] - pieces
+    for n in range(found):
+        start, stop = runs[n, 0], runs[n, 1]
+        whole = stop - start == pieces
+        parts = pieces
+        # Only ends of what is left are looked at again: its inside is taken to be reached.
+        for _ in range(0 if whole else levels):
+            start, stop, parts = 2 * start, 2 * stop, 2 * parts
+            while start < stop and not _meets(L, cell, turns, parts + start % parts, outer, bar):
+                start += 1
+            while start < stop and not _meets(L, cell, turns, parts + (stop - 1) % parts, outer, bar):
+                stop -= 1
+        if start < stop:
+            count = remove(arcs, count, TURN * start / parts - 1e-9 + low, TURN * stop / parts + 1e-9 + high, True)
     return count
 
 
 @kernel
 def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> None:
-    """Fill in what one more joint in front may reach."""
+    """Fill in what one more joint in front may reach; blocks of rings that nothing meets stay empty as a whole."""
     n_rho, n_z = rings.counts.shape
-    flags, turns = _room()
-    for i in range(n_rho):
-        for j in range(n_z):
-            cell = (
-                i * rings.size[0],
-                (i + 1) * rings.size[0],
-                rings.low + j * rings.size[1],
-                rings.low + (j + 1) * rings.size[1],
-            )
-            count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
-            rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, flags, turns)
+    runs, turns = _room()
+    for block in range(-(-n_rho // _BLOCK) * -(-n_z // _BLOCK)):
+        i_0, j_0 = _BLOCK * (block // -(-n_z // _BLOCK)), _BLOCK * (block % -(-n_z // _BLOCK))
+        i_1, j_1 = min(i_0 + _BLOCK, n_rho), min(j_0 + _BLOCK, n_z)
+        if not _meets_anywhere(L, _cell(rings, i_0, i_1, j_0, j_1), turns, outer, 0):
+            continue
+        for i in range(i_0, i_1):
+            for j in range(j_0, j_1):
+                cell = _cell(rings, i, i + 1, j, j + 1)
+                count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
+                rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, runs, turns)
+
+
+@inner_kernel
+def _cell(rings: Rings, i_0: int, i_1: int, j_0: int, j_1: int) -> Cell:
+    """The rectangle (m) of rings from i_0 to before i_1 in radius, and from j_0 to before j_1 in height."""
+    low, (width, height) = rings.low, (rings.size[0], rings.size[1])
+    return i_0 * width, i_1 * width, low + j_0 * height, low + j_1 * height
 
 
 @kernel
@@ -385,8 +384,8 @@ def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, cou
     cells : (N, 4), m
     empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; changed in place
     """
-    flags, turns = _room()
+    runs, turns = _room()
     for n in range(cells.shape[0]):
         cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         ends = arm.lower[0], arm.upper[0], arm.bar
-        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], flags, turns)
+        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], runs, turns)
