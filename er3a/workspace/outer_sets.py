@@ -154,13 +154,12 @@ def _within(arcs: Reals, count: int, low: float, high: float) -> bool:
 
 
 @inner_kernel
-def _room() -> tuple[Integers, Reals]:
-    """Working memory of :func:`exclude`, and the pieces of a turn at each level: those of a level with n pieces begin
-    at row n, and the halves of piece i are 2 i and 2 i + 1.
+def _pieces() -> Reals:
+    """The pieces of a turn at each level: those of a level with n pieces begin at row n, and the halves of piece i are
+    2 i and 2 i + 1.
 
     Returns
     -------
-    runs : (n, 2), of pieces, not initialised
     turns : (pieces, 6): the middle's angle (rad), its cosine and sine, half the width (rad), how far an arc of that
         half falls back from its tangent, in parts of the radius, and how far it runs along it
     """
@@ -174,7 +173,7 @@ def _room() -> tuple[Integers, Reals]:
             row[0], row[1], row[2] = angle, np.cos(angle), np.sin(angle)
             row[3], row[4], row[5] = width, 1.0 - np.cos(width), np.sin(width)
         pieces *= 2
-    return np.empty((_PIECES, 2), dtype=np.int64), turns
+    return turns
 
 
 @inner_kernel
@@ -257,14 +256,13 @@ def _meets_anywhere(L: Reals, cell: Cell, turns: Reals, outer: Rings, levels: in
 
 
 @inner_kernel
-def exclude(  # noqa: C901, PLR0912
+def exclude(
     L: Reals,
     cell: Cell,
     ends: tuple[float, float, float],
     outer: Rings,
     arcs: Reals,
     count: int,
-    runs: Integers,
     turns: Reals,
 ) -> int:
     """Take the azimuths that a joint's range brings a ring or bar to out of its arcs; what is left is empty. Kernel.
@@ -276,7 +274,7 @@ def exclude(  # noqa: C901, PLR0912
     ends : the joint's range, rad, and the length of bars, m (0 for rings)
     outer : the largest reach of the joints after it
     arcs, count : the arcs that are empty so far; changed in place
-    runs, turns : of :func:`_room`
+    turns : of :func:`_pieces`
 
     Returns
     -------
@@ -289,7 +287,7 @@ def exclude(  # noqa: C901, PLR0912
         levels, pieces = levels + 1, 2 * pieces
     if high - low >= FULL_TURN:
         return 0 if _meets_anywhere(L, cell, turns, outer, levels) else count
-    pieces, found = _PIECES, 0
+    pieces, found, runs = _PIECES, 0, np.empty((_PIECES, 2), dtype=np.int64)
     for i in range(pieces):
         if not _meets(L, cell, turns, pieces + i, outer, bar):
             continue
@@ -302,10 +300,9 @@ def exclude(  # noqa: C901, PLR0912
         runs[0, 0] = runs[found, 0] - pieces
     for n in range(found):
         start, stop = runs[n, 0], runs[n, 1]
-        whole = stop - start == pieces
         parts = pieces
         # Only ends of what is left are looked at again: its inside is taken to be reached.
-        for _ in range(0 if whole else levels):
+        for _ in range(levels if stop - start < pieces else 0):
             start, stop, parts = 2 * start, 2 * stop, 2 * parts
             while start < stop and not _meets(L, cell, turns, parts + start % parts, outer, bar):
                 start += 1
@@ -320,24 +317,23 @@ def exclude(  # noqa: C901, PLR0912
 def _carry(L: Reals, low: float, high: float, outer: Rings, rings: Rings) -> None:
     """Fill in what one more joint in front may reach; blocks of rings that nothing meets stay empty as a whole."""
     n_rho, n_z = rings.counts.shape
-    runs, turns = _room()
-    for block in range(-(-n_rho // _BLOCK) * -(-n_z // _BLOCK)):
-        i_0, j_0 = _BLOCK * (block // -(-n_z // _BLOCK)), _BLOCK * (block % -(-n_z // _BLOCK))
-        i_1, j_1 = min(i_0 + _BLOCK, n_rho), min(j_0 + _BLOCK, n_z)
-        if not _meets_anywhere(L, _cell(rings, i_0, i_1, j_0, j_1), turns, outer, 0):
-            continue
-        for i in range(i_0, i_1):
-            for j in range(j_0, j_1):
-                cell = _cell(rings, i, i + 1, j, j + 1)
-                count = int(1)  # noqa: RUF046, UP018  (see inner_kernel)
-                rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, runs, turns)
+    turns = _pieces()
+    for i_0 in range(0, n_rho, _BLOCK):
+        for j_0 in range(0, n_z, _BLOCK):
+            i_1, j_1 = min(i_0 + _BLOCK, n_rho), min(j_0 + _BLOCK, n_z)
+            if not _meets_anywhere(L, _cell(rings, i_0, i_1, j_0, j_1), turns, outer, 0):
+                continue
+            for i in range(i_0, i_1):
+                for j in range(j_0, j_1):
+                    cell, count = _cell(rings, i, i + 1, j, j + 1), int(1)  # noqa: RUF046, UP018  (see inner_kernel)
+                    rings.counts[i, j] = exclude(L, cell, (low, high, 0.0), outer, rings.empty[i, j], count, turns)
 
 
 @inner_kernel
 def _cell(rings: Rings, i_0: int, i_1: int, j_0: int, j_1: int) -> Cell:
     """The rectangle (m) of rings from i_0 to before i_1 in radius, and from j_0 to before j_1 in height."""
-    low, (width, height) = rings.low, (rings.size[0], rings.size[1])
-    return i_0 * width, i_1 * width, low + j_0 * height, low + j_1 * height
+    width, height = rings.size
+    return i_0 * width, i_1 * width, rings.low + j_0 * height, rings.low + j_1 * height
 
 
 @kernel
@@ -384,8 +380,8 @@ def exclude_cells(arm: GeneralArm, outer: Rings, cells: Reals, empty: Reals, cou
     cells : (N, 4), m
     empty : (N, MAX_ARCS, 2), rad, and counts (N,): arcs of the whole turn at first; changed in place
     """
-    runs, turns = _room()
+    turns = _pieces()
     for n in range(cells.shape[0]):
         cell = cells[n, 0], cells[n, 1], cells[n, 2], cells[n, 3]
         ends = arm.lower[0], arm.upper[0], arm.bar
-        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], runs, turns)
+        counts[n] = exclude(arm.links[1], cell, ends, outer, empty[n], counts[n], turns)
