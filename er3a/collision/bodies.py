@@ -113,7 +113,7 @@ class Bodies:
         points : (..., bodies, k, 3), m, world frame
         """
         T = link_frames(self.robot, q)[..., [body.link for body in self.capsules], :, :]
-        placed: Reals = np.einsum("...nij,nkj->...nki", T[..., :3, :3], self._padded) + T[..., None, :3, 3]
+        placed: Reals = self._padded @ T[..., :3, :3].swapaxes(-1, -2) + T[..., None, :3, 3]
         return placed
 
     def distances(self, q: Reals, pairs: Integers) -> Reals:
