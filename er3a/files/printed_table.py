@@ -65,7 +65,8 @@ SIGNS = {
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
         r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
-        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
+        r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
         re.I,
     ),
     "standard": re.compile(
@@ -77,7 +78,7 @@ SIGNS = {
     ),
 }
 """What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
-``d sin(alpha)`` and the other alone ``a cos(theta)``."""
+``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
     r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
@@ -512,6 +513,10 @@ class _Table:
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         moving = any(turns) or any(starred)
+        zeros = [bool(each and not each.number) for each in self._of("theta")]
+        if not moving and any(blank) and any(zeros):
+            problem = "0 among blank cells may be a joint, or a row where nothing moves"
+            self._refuse(zeros.index(True), self.column["theta"], problem, "Write q1, q2, ... where a joint turns")
         names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
         ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name.lower()}
         ends = ends if ends <= {0, len(names) - 1} and len(ends) < len(names) else set()

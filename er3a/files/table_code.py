@@ -37,7 +37,7 @@ LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
     r"setFixedTransform\([^\n]*[\"']dh[\"']": ("a,alpha,d,theta", "standard"),
     r"setFixedTransform\([^\n]*[\"']mdh[\"']": ("a,alpha,d,theta", "modified"),
-    "pybotics": ("alpha,a,theta,d", "modified"),
+    r"\bpybotics": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
@@ -231,7 +231,8 @@ _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
-    orders = {"DH": ["a", "alpha", "d", "theta"]} if "Frame::DH(" in code.text else {}
+    # KDL's joint comes before the frame, whose theta is a constant, whatever its name.
+    orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)

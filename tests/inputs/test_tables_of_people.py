@@ -350,6 +350,7 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "".join(f"{arm}.append(RevoluteDH(a=0.1, d={d}))\n" for d, arm in enumerate(["one"] * 2 + ["two"] * 2)),
             "one of them",
         ),
+        ("i,a (m),α (deg),d (m),θ\n1,0,-90,0.29,\n2,0.27,0,0,-90°\n3,0,0,0.1,0\n", "nothing moves"),  # 0 among blanks
         ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
     ],
 )
@@ -469,6 +470,16 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
         ("% each row is [a alpha d theta]\n" + 9 * "x = 1;\n" + ROWS_OF_TWO, "standard"),
         (f"% Modified DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [cos(theta), a*cos(theta)];", "standard"),
         (f"% standard DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [-sin(alpha), -sin(alpha)*d];", "modified"),
+        (  # Craig's transform, of columns by their numbers
+            f"% [a alpha d theta]\n{ROWS_OF_TWO}T = [sin(M(i,4))*cos(M(i,2)), cos(M(i,4))*cos(M(i,2)), -sin(M(i,2)),"
+            " -sin(M(i,2))*M(i, 3)];",
+            "modified",
+        ),
+        ("syms q1 q2\n% d v a alpha\nR = [0.29 q1 0 -pi/2;\n 0 q2-pi/2 0.27 0];", "standard"),
+        (
+            "r = sympybotics.RobotDef('x', [('-pi/2', 0, 0.29, 'q'), ('0', 0.27, 0, 'q-pi/2')])\ndh_convention='standard'",
+            "standard",
+        ),
         (
             f"{LISTS_OF_TWO}links = [RevoluteMDH(d=d[i], a=a[i], alpha=alpha[i], offset=offset[i]) for i in n]",
             "modified",
@@ -623,6 +634,14 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
     content, _ = read(tmp_path, text)
     np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
     assert content.dh.convention == "standard"
+
+
+def test_theta_of_kdl_is_a_constant_whatever_its_name(tmp_path):
+    text = KDL.replace("-M_PI_2", "theta2")
+    content, _ = read(tmp_path, "double theta2 = -pi/2;\n" + text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    with pytest.raises(InputError, match="theta2 = "):
+        read(tmp_path, text)
 
 
 def test_joints_of_kdl_slide_or_are_fixed_as_their_segments_say(tmp_path):
