@@ -354,7 +354,7 @@ class _Table:
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = self._given()
-        self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
+        self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
@@ -466,8 +466,6 @@ class _Table:
     def _amounts(self, k: int) -> list[CellAmount | None]:
         """The amounts of a column's cells; None for an empty one."""
         cells = [cells[k] for _, cells in self.rows]
-        if self.headings[k].quantity == "type":
-            return []
         commas = [found for cell in cells if (found := _COMMA.fullmatch(cell.strip()))]
         thousands = [found[0] for found in commas if len(found[2]) == 3 and found[1].strip("+-") != "0"]
         if thousands and len(thousands) == len(commas):

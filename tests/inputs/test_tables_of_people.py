@@ -477,7 +477,8 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
         ),
         ("syms q1 q2\n% d v a alpha\nR = [0.29 q1 0 -pi/2;\n 0 q2-pi/2 0.27 0];", "standard"),
         (
-            "r = sympybotics.RobotDef('x', [('-pi/2', 0, 0.29, 'q'), ('0', 0.27, 0, 'q-pi/2')])\ndh_convention='standard'",
+            "r = sympybotics.RobotDef('x', [('-pi/2', 0, 0.29, 'q'), ('0', 0.27, 0, 'q-pi/2')])\n"
+            "dh_convention='standard'",
             "standard",
         ),
         (
