@@ -139,6 +139,8 @@ def _in_python(text: str, given: Mapping[str, str], depth: int, values: dict[str
             low = (word or "").rpartition(".")[2].lower()
             calls = text[place : place + 1] in ("(", "[") and low in _RADIANS | _DEGREES | {*_FUNCTIONS}
             value: CellAmount | str = low
+            if number and follows:  # 1 070, 0..90: no product
+                raise ValueError(_NONE)
             if number or is_unit:
                 value = CellAmount(float(number)) if number else CellAmount(1.0, UNITS[word.lower()])
             elif not calls:

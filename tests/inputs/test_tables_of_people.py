@@ -351,6 +351,8 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "one of them",
         ),
         ("i,a (m),α (deg),d (m),θ\n1,0,-90,0.29,\n2,0.27,0,0,-90°\n3,0,0,0.1,0\n", "nothing moves"),  # 0 among blanks
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,1 070,q1\n2,270,0,0,q2\n", "is not a number"),
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,300,0..170\n2,270,0,0,0..90\n", "is not a number"),
         ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
     ],
 )
@@ -637,6 +639,21 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
     assert content.dh.convention == "standard"
 
 
+@pytest.mark.parametrize(
+    "put_in",
+    [
+        "DH(:,1) = DH(:,1) + q_deg(:);",
+        "DH(:,4) = DH(:,4)*180/pi;",
+        "DH(i,1) = q(i);",
+        "DH(:,1) = theta';",
+        "H(1,4) = 1;",
+    ],
+)
+def test_values_of_joints_and_factors_of_units_may_be_put_into_a_matrix(tmp_path, put_in):
+    content, _ = read(tmp_path, f"% theta d a alpha sigma offset\n{IN_MATLAB}{put_in}\n")
+    assert len(content.dh.rows) == 2
+
+
 def test_theta_of_kdl_is_a_constant_whatever_its_name(tmp_path):
     text = KDL.replace("-M_PI_2", "theta2")
     content, _ = read(tmp_path, "double theta2 = -pi/2;\n" + text)
@@ -681,6 +698,14 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ),
         ("DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -pi/2];\n", "line 4: 'offset' may be"),
         ("% theta d a alpha\nDH=[0 0.29 0 -90;\n 0 0 0.27 0] .* [1 1 1 pi/180];\n", "row 2|line"),
+        (f"# theta d a alpha\n{MATRIX}DH[1][2] = -0.5\n", "DH"),
+        (f"# theta d a alpha\n{MATRIX}DH = np.vstack([DH, [0, 0, 0.1, 0]])\n", "changes 'DH'"),
+        (f"# theta d a alpha\n{MATRIX}DH = DH.T\n", "changes 'DH'"),
+        (f"% theta d a alpha sigma offset\n{IN_MATLAB}DH(:,4) = -DH(:,4);\n", "changes 'DH'"),
+        ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
+        ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
+        ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
+        ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
         ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
         (
             "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0, 0, 1, 0)));\nc.addSegment(Segment(fixed, H));",
