@@ -168,7 +168,7 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     named = [grid for grid in matrices if grid[0][1]]
     written = named or _vectors(code)
     for group in code.groups if written else ():
-        _check_kept(code, group)
+        _check_kept(code, group, bool(named))
     return written
 
 
@@ -184,13 +184,13 @@ put into it."""
 _CONSTANT = {"a", "alpha", "d", "offset"}
 
 
-def _check_kept(code: Code, group: CodeGroup) -> None:
+def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
-    named = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
-    if not named or not ({*quantities_of(named[1].split("_"))} & _CONSTANT or _matrix(code, group)):
-        return
-    if changed := re.search(_CHANGED.replace("NAME", named[1]), code.text):
-        problem = f"'{changed[0].strip(' ;')[:60]}' changes '{named[1]}'"
+    found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
+    name = found[1] if found else ""
+    in_table = _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of(name.split("_")))
+    if name and in_table and (changed := re.search(_CHANGED.replace("NAME", name), code.text)):
+        problem = f"'{changed[0].strip(' ;')[:60]}' changes '{name}'"
         raise InputError(None, f"line {code.line(changed.end())}", problem, "Write what the program makes of it")
 
 

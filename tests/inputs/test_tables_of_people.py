@@ -650,6 +650,7 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
         "DH(i,1) = q(i);",
         "DH(:,1) = theta';",
         "H(1,4) = 1;",
+        "x_d = [0 1]; x_d(1) = 0.5;",
     ],
 )
 def test_values_of_joints_and_factors_of_units_may_be_put_into_a_matrix(tmp_path, put_in):
