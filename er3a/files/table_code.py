@@ -174,10 +174,10 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
 
 _CHANGED = (
     r"(?m)(?:^|;)[ \t]*(?:del\s+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop)\(|"
-    r"(?:[\[(][^\n=\])]*[\])])+\s*[-+]?=(?!=)(?!\s*(?:\w+\.)*NAME\b[^\n;*/]*[*/])\s*"
+    r"(?:[\[({][^\n=\])}]*[\])}])+\s*[-+]?=(?!=)(?!\s*(?:\w+\.)*NAME\b[^\n;*/]*[*/])[ \t]*"
     r"(?:[\[{]|-\s*NAME\b|(?:[^\n;(\[]|\([\w:,+ -]*\)|\[[\w:,+ -]*\])*?(?<![\w.])\d)|"
-    r"\s*=\s*(?:-\s*NAME\b|NAME\.T\b|[^\n]*(?:[\[;,]|append\(|insert\(|delete\()\s*NAME\b|"
-    r"[^\n]*(?:transpose|flip\w*|roll|cumsum)\(\s*(?:NAME\b|[\[(]))))"
+    r"[ \t]*=[ \t]*(?:-[ \t]*NAME\b|NAME\.T\b|[^\n]*(?:[\[;,]|append\(|insert\(|delete\()[ \t]*NAME\b|"
+    r"[^\n]*(?:transpose|flip\w*|roll|cumsum)\([ \t]*(?:NAME\b|[\[(]))))"
 )
 """Statements that change what NAME was written as; joints' values, which have no numbers, and factors of units may be
 put into it."""

@@ -706,6 +706,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         (f"# theta d a alpha\n{MATRIX}DH = np.vstack([DH, [0, 0, 0.1, 0]])\n", "changes 'DH'"),
         (f"# theta d a alpha\n{MATRIX}DH = DH.T\n", "changes 'DH'"),
         (f"% theta d a alpha sigma offset\n{IN_MATLAB}DH(:,4) = -DH(:,4);\n", "changes 'DH'"),
+        ("d={0.29,0};\na={0,0.27};\nalfa={-pi/2,0};\n\nd{1}=0.29+0.061;\n", "line 5: .* changes 'd'"),
         ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
         ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
         ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
