@@ -45,6 +45,8 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 _TOKEN = re.compile(
     r"\s*(?:(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?)|([^\W\d][\w.]*'?|°)|(\*\*|[-+*/^(),\[\]]))\s*"
 )
+_NOTED = re.compile(r"(?<![\w.])\d[\d.]*\s*[(\[]|^\s*[-+]?(?!10\^)[\d.]+\s*\^\s*\d+\s*$")
+"""A number with a footnote or its last digits' error, ``72²`` or ``72.5(2)``: neither a power nor a product."""
 _PI = re.compile(r"π|(?:(?:m|frac|eigen|math|const)_)?pi(?:_([24]))?")
 _INDEX = re.compile(r"[(\[]\s*(\d+)\s*[)\]]\s*")
 _NONE = "is not a number or an expression"
@@ -73,6 +75,7 @@ def plain(text: str) -> str:
     text : with ``-``, ``*``, ``/`` and ``°`` for all their forms; nothing else is changed
     """
     text = re.sub("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺]+", lambda found: "^" + found[0].translate(_RAISED), text.translate(_SIGNS))
+    text = re.sub(r"(\d)(?=[¼-¾⅐-⅞])", r"\1 ", text)  # 23½ is no 231/2
     return unicodedata.normalize("NFKC", text).translate(_SIGNS).replace("\u200b", "").replace("⁄", "/")
 
 
@@ -105,6 +108,8 @@ def _amount(text: str, given: Mapping[str, str], depth: int) -> CellAmount:
     """The amount of an expression; ``depth`` counts names that led here."""
     if len(text) > LONGEST or text.count("(") + text.count("[") > DEEPEST or depth > DEEPEST:
         raise ValueError("is too long or too deep")
+    if _NOTED.search(text):
+        raise ValueError(_NONE)
     values: dict[str, CellAmount | str] = {}
     expression = _in_python(re.sub(r"\^\s*°", "°", text), given, depth, values)
     try:
@@ -139,6 +144,8 @@ def _in_python(text: str, given: Mapping[str, str], depth: int, values: dict[str
             low = (word or "").rpartition(".")[2].lower()
             calls = text[place : place + 1] in ("(", "[") and low in _RADIANS | _DEGREES | {*_FUNCTIONS}
             value: CellAmount | str = low
+            if number and follows:  # 1 070, 0..90: no product
+                raise ValueError(_NONE)
             if number or is_unit:
                 value = CellAmount(float(number)) if number else CellAmount(1.0, UNITS[word.lower()])
             elif not calls:

@@ -90,13 +90,9 @@ class BoardEntry(StrictModel):
     dictionary: Text = "DICT_4X4_50"
 
     @model_validator(mode="after")
-    def _in_mm(self) -> Self:
+    def _markers_fit(self) -> Self:
         if self.square_mm < MIN_SQUARE_MM:
             raise ValueError(f"square_mm: {self.square_mm:g} mm can only be metres | Multiply by 1000")
-        return self
-
-    @model_validator(mode="after")
-    def _markers_fit(self) -> Self:
         if self.pattern == "chessboard":
             return self
         if self.marker_mm is None:

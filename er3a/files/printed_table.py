@@ -65,7 +65,8 @@ SIGNS = {
         r"modified[\s_-]*(?:d-?h\b|denavit)|convention\W*[:=]\W*modified|(?:alpha|α)[\s_({\[]*i\s*-\s*1|"
         r"(?<![a-z])(?:revolute)?(?:mdh|moddh)(?![a-z])|改进|\bcraig(?:'?s)?\b|[\"']modified[\"']|"
         r"(?:sin\([^\n,;*]{0,30}(?:al\w*|α)[^\n,;*]{0,9}\)|\bsa)\s*\*\s*(?:[\w\]]+\.)*d(?:_?i)?\b|"
-        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)",
+        r"\bd(?:_?i|isp\w*)?\s*\*\s*(?:\w+\.)*(?:sin\([^\n,;*]{0,30}(?:al|α)|sa\b)|"
+        r"cos\((?P<twist>[^\n;]{1,40}?)\)[\s,;]+-(?:\w+\.)*sin\((?P=twist)\)[\s,;]+-[^,;\n]{0,40}sin\((?P=twist)\)",
         re.I,
     ),
     "standard": re.compile(
@@ -77,7 +78,7 @@ SIGNS = {
     ),
 }
 """What a text says of its convention: words, a toolbox's option, or the transform of a row, of which Craig's alone has
-``d sin(alpha)`` and the other alone ``a cos(theta)``."""
+``d sin(alpha)``, whatever its names (``cos(x), -sin(x), -sin(x)*y``), and the other alone ``a cos(theta)``."""
 _GIVEN = re.compile(
     r"(?<![\w.\])}])(?:\w+\.)*([^\W\d]\w*(?:[_({\[]*\d+[)}\]]*)?)[ \t]*=(?!=)[ \t]*((?:\([^()\n]*\)|[^=\n()])+?)"
     r"(?=[),;，；。%#≈`\n]|\s+(?:and|und|et|y)\b|(?<=[\w.°])\s+\([^\W\d]{3,}[\s)]|\s+[^\W\d][\w{}]*[ \t]*=|$)"
@@ -353,7 +354,7 @@ class _Table:
         text = re.sub(r"\*\*([\w ]+)\*\*", r"\1", text)
         self.text = re.sub(r"(?m)^[ \t]*[%#].*$", "", text) if from_code else without_latex(plain(text))
         self.given = self._given()
-        self.amounts = {own.quantity: self._amounts(k) for k, own in self.headings.items() if own.quantity != "joint"}
+        self.amounts = {name: self._amounts(k) for name, k in self.column.items() if name not in ("joint", "type")}
         self.kinds = self._kinds()
         if from_code and "type" not in {*self.column, *self.header} and (kind := _KIND_ELSEWHERE.search(self.text)):
             problem = f"'{kind[0]}' is no column of the table"
@@ -465,8 +466,6 @@ class _Table:
     def _amounts(self, k: int) -> list[CellAmount | None]:
         """The amounts of a column's cells; None for an empty one."""
         cells = [cells[k] for _, cells in self.rows]
-        if self.headings[k].quantity == "type":
-            return []
         commas = [found for cell in cells if (found := _COMMA.fullmatch(cell.strip()))]
         thousands = [found[0] for found in commas if len(found[2]) == 3 and found[1].strip("+-") != "0"]
         if thousands and len(thousands) == len(commas):
@@ -512,6 +511,10 @@ class _Table:
         blank = [each is None for each in self._of("theta")]  # which says nothing of what moves
         starred = [bool(_STARRED.search(cells[self.column["d"]].strip())) for _, cells in self.rows]
         moving = any(turns) or any(starred)
+        zeros = [bool(each and not each.number) for each in self._of("theta")]
+        if not moving and any(blank) and any(zeros):
+            problem = "0 among blank cells may be a joint, or a row where nothing moves"
+            self._refuse(zeros.index(True), self.column["theta"], problem, "Write q1, q2, ... where a joint turns")
         names = [cells[self.column["joint"]].strip() if "joint" in self.column else "" for _, cells in self.rows]
         ends = {row for row, name in enumerate(names) if not _NUMBERED.search(name) or "fixed" in name.lower()}
         ends = ends if ends <= {0, len(names) - 1} and len(ends) < len(names) else set()

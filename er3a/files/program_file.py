@@ -52,12 +52,8 @@ class ProgramsFile(InputFile):
     programs: list[ProgramEntry] = []
 
     @model_validator(mode="after")
-    def _names_differ(self) -> Self:
+    def _own_names_and_plausible_frames(self) -> Self:
         check_own_names("programs", [entry.name for entry in self.programs])
-        return self
-
-    @model_validator(mode="after")
-    def _frames_plausible(self) -> Self:
         for name, placement in self.frames.items():
             check_placement(f"frames.{name}", placement)
         return self

@@ -732,13 +732,6 @@ class RobotFile(InputFile):
             _check_limit(f"limits.combined[{i}]", combined, all(slides[joint - 1] for joint in combined.joints))
         return self
 
-    @model_validator(mode="after")
-    def _masses_of_this_arm(self):
-        check_masses(self.drives, self.wrist_load, self.slides)
-        if self.inertia and max(row.link for row in self.inertia.links) > len(self.dh.rows):
-            raise ValueError(f"inertia.links: the arm has {len(self.dh.rows)} links | Link 0 is the base")
-        return self
-
     @property
     def slides(self) -> list[bool]:
         """Whether each joint is a distance; see :attr:`er3a.robots.robot.Robot.slides`."""
@@ -748,8 +741,11 @@ class RobotFile(InputFile):
         return [bool(each) for each in slides_of(sliding, coupling)]
 
     @model_validator(mode="after")
-    def _check_links(self):
+    def _masses_and_shapes_of_this_arm(self):
         count = len(self.dh.rows)
+        check_masses(self.drives, self.wrist_load, self.slides)
+        if self.inertia and max(row.link for row in self.inertia.links) > count:
+            raise ValueError(f"inertia.links: the arm has {count} links | Link 0 is the base")
         given = {f"envelopes.{key}": getattr(self.envelopes, key, []) for key in SHAPES}
         for key, shapes in {**given, "visuals": self.visuals}.items():
             for i, shape in enumerate(shapes):

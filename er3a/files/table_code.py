@@ -37,7 +37,7 @@ LIBRARIES = {
     "SerialLink": ("theta,d,a,alpha,type,offset", ""),
     r"setFixedTransform\([^\n]*[\"']dh[\"']": ("a,alpha,d,theta", "standard"),
     r"setFixedTransform\([^\n]*[\"']mdh[\"']": ("a,alpha,d,theta", "modified"),
-    "pybotics": ("alpha,a,theta,d", "modified"),
+    r"\bpybotics": ("alpha,a,theta,d", "modified"),
     "visual_kinematics": ("d,a,alpha,theta", "standard"),
     "sympybotics": ("alpha,a,d,theta", ""),
 }
@@ -47,6 +47,8 @@ _UNPACKED = re.compile(
     r"(?:\bin\s+(?:enumerate\(\s*)?[\w.]+\b(?!\()|=\s*[\w.]+(?:\[[^\]\n]*\])*[ \t]*(?=[\n;]|$))"
 )
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
+_ADDED = r"(?m)\.extend\(|\)\s*\]\s*\*\s*\d|^\s*(\w+)[\[({]\d+[\])}]\s*=\s*\1[\[({]\d+[\])}]\s*(?:;|$)"
+"""Links that no call makes: of another list, ``[...] * 2``, ``L(2) = L(1)``."""
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
 _INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])},]")
 
@@ -161,8 +163,35 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
+    if links := _calls(code) or _records(code):
+        return links
     named = [grid for grid in matrices if grid[0][1]]
-    return _calls(code) or _records(code) or named or _vectors(code)
+    written = named or _vectors(code)
+    for group in code.groups if written else ():
+        _check_kept(code, group, bool(named))
+    return written
+
+
+_CHANGED = (
+    r"(?m)(?:^|;)[ \t]*(?:del\s+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop)\(|"
+    r"(?:[\[({][^\n=\])}]*[\])}])+\s*[-+]?=(?!=)(?!\s*(?:\w+\.)*NAME\b[^\n;*/]*[*/])[ \t]*"
+    r"(?:[\[{]|-\s*NAME\b|(?:[^\n;(\[]|\([\w:,+ -]*\)|\[[\w:,+ -]*\])*?(?<![\w.])\d)|"
+    r"[ \t]*=[ \t]*(?:-[ \t]*NAME\b|NAME\.T\b|[^\n]*(?:[\[;,]|append\(|insert\(|delete\()[ \t]*NAME\b|"
+    r"[^\n]*(?:transpose|flip\w*|roll|cumsum)\([ \t]*(?:NAME\b|[\[(]))))"
+)
+"""Statements that change what NAME was written as; joints' values, which have no numbers, and factors of units may be
+put into it."""
+_CONSTANT = {"a", "alpha", "d", "offset"}
+
+
+def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
+    """Refuse a matrix, or the list of a column, that its program changes."""
+    found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
+    name = found[1] if found else ""
+    in_table = _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of(name.split("_")))
+    if name and in_table and (changed := re.search(_CHANGED.replace("NAME", name), code.text)):
+        problem = f"'{changed[0].strip(' ;')[:60]}' changes '{name}'"
+        raise InputError(None, f"line {code.line(changed.end())}", problem, "Write what the program makes of it")
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
@@ -198,7 +227,7 @@ def _calls(code: Code) -> list[Grid]:
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
     looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))
-    if rows and (".extend(" in code.text or looped):
+    if rows and (re.search(_ADDED, code.text) or looped):
         problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
@@ -231,7 +260,8 @@ _KDL = {"RotZ": "revolute", "TransZ": "prismatic", "None": "fixed"}
 def _signatures(code: Code) -> dict[str, list[str]]:
     """The order of the four numbers of a function ``dh(theta, d, a, alpha)``, where it is defined or called so, or of a
     type."""
-    orders = {"DH": ["a", "alpha", "d", "theta"]} if "Frame::DH(" in code.text else {}
+    # KDL's joint comes before the frame, whose theta is a constant, whatever its name.
+    orders = {"DH": ["a", "alpha", "d", "offset"]} if "Frame::DH(" in code.text else {}
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)

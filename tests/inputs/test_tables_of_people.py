@@ -350,6 +350,12 @@ def test_a_table_in_any_form_is_read_back_or_refused(tmp_path, rows, form, order
             "".join(f"{arm}.append(RevoluteDH(a=0.1, d={d}))\n" for d, arm in enumerate(["one"] * 2 + ["two"] * 2)),
             "one of them",
         ),
+        ("i,a (m),α (deg),d (m),θ\n1,0,-90,0.29,\n2,0.27,0,0,-90°\n3,0,0,0.1,0\n", "nothing moves"),  # 0 among blanks
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,1 070,q1\n2,270,0,0,q2\n", "is not a number"),
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,300,0..170\n2,270,0,0,0..90\n", "is not a number"),
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72²,q1\n2,270,0,0,q2\n", "is not a number"),
+        ("i,a (mm),α (deg),d (mm),θ\n1,0,-90,72.5(2),q1\n2,270,0,0,q2\n", "is not a number"),
+        ("i,a (in),α (deg),d (in),θ\n1,0,-90,23½,q1\n2,27,0,0,q2\n", "is not a number"),
         ("L = [PrismaticDH(alpha=pi/2)]\nfor i in n:\n    L.append(RevoluteDH(d=d[i], a=a[i]))\n", "of a loop"),
     ],
 )
@@ -469,6 +475,17 @@ $L_1 = 0.29$ m (base) y $L_2 = 0.27$ m
         ("% each row is [a alpha d theta]\n" + 9 * "x = 1;\n" + ROWS_OF_TWO, "standard"),
         (f"% Modified DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [cos(theta), a*cos(theta)];", "standard"),
         (f"% standard DH: [a alpha d theta]\n{ROWS_OF_TWO}T = [-sin(alpha), -sin(alpha)*d];", "modified"),
+        (  # Craig's transform, of columns by their numbers
+            f"% [a alpha d theta]\n{ROWS_OF_TWO}T = [sin(M(i,4))*cos(M(i,2)), cos(M(i,4))*cos(M(i,2)), -sin(M(i,2)),"
+            " -sin(M(i,2))*M(i, 3)];",
+            "modified",
+        ),
+        ("syms q1 q2\n% d v a alpha\nR = [0.29 q1 0 -pi/2;\n 0 q2-pi/2 0.27 0];", "standard"),
+        (
+            "r = sympybotics.RobotDef('x', [('-pi/2', 0, 0.29, 'q'), ('0', 0.27, 0, 'q-pi/2')])\n"
+            "dh_convention='standard'",
+            "standard",
+        ),
         (
             f"{LISTS_OF_TWO}links = [RevoluteMDH(d=d[i], a=a[i], alpha=alpha[i], offset=offset[i]) for i in n]",
             "modified",
@@ -625,6 +642,30 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
     assert content.dh.convention == "standard"
 
 
+@pytest.mark.parametrize(
+    "put_in",
+    [
+        "DH(:,1) = DH(:,1) + q_deg(:);",
+        "DH(:,4) = DH(:,4)*180/pi;",
+        "DH(i,1) = q(i);",
+        "DH(:,1) = theta';",
+        "H(1,4) = 1;",
+        "x_d = [0 1]; x_d(1) = 0.5;",
+    ],
+)
+def test_values_of_joints_and_factors_of_units_may_be_put_into_a_matrix(tmp_path, put_in):
+    content, _ = read(tmp_path, f"% theta d a alpha sigma offset\n{IN_MATLAB}{put_in}\n")
+    assert len(content.dh.rows) == 2
+
+
+def test_theta_of_kdl_is_a_constant_whatever_its_name(tmp_path):
+    text = KDL.replace("-M_PI_2", "theta2")
+    content, _ = read(tmp_path, "double theta2 = -pi/2;\n" + text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+    with pytest.raises(InputError, match="theta2 = "):
+        read(tmp_path, text)
+
+
 def test_joints_of_kdl_slide_or_are_fixed_as_their_segments_say(tmp_path):
     text = (
         "KDL::Joint slide(KDL::Joint::TransZ);\nc.addSegment(Segment(Joint(Joint::None), Frame::DH(0, 0, 0.1, 0)));\n"
@@ -661,6 +702,15 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         ),
         ("DH=[0 0.29 0 -1.57 0;\n 0 0 0.27 0 0];\nR=SerialLink(DH);\nR.offset=[0 -pi/2];\n", "line 4: 'offset' may be"),
         ("% theta d a alpha\nDH=[0 0.29 0 -90;\n 0 0 0.27 0] .* [1 1 1 pi/180];\n", "row 2|line"),
+        (f"# theta d a alpha\n{MATRIX}DH[1][2] = -0.5\n", "DH"),
+        (f"# theta d a alpha\n{MATRIX}DH = np.vstack([DH, [0, 0, 0.1, 0]])\n", "changes 'DH'"),
+        (f"# theta d a alpha\n{MATRIX}DH = DH.T\n", "changes 'DH'"),
+        (f"% theta d a alpha sigma offset\n{IN_MATLAB}DH(:,4) = -DH(:,4);\n", "changes 'DH'"),
+        ("d={0.29,0};\na={0,0.27};\nalfa={-pi/2,0};\n\nd{1}=0.29+0.061;\n", "line 5: .* changes 'd'"),
+        ("a = [0, 0.27]\nalpha = np.flip([0, -pi/2])\nd = [0.29, 0]\n", "changes 'alpha'"),
+        ("a = [0, 0.27]\nalpha = [-pi/2, 0]\nd = [0.29, 0]\na.append(0.1)\n", "changes 'a'"),
+        ("L(1)=Link('d',0.29,'a',0,'alpha',0);\nL(2)=L(1);\nL(3)=Link('d',0,'a',1,'alpha',0);", "of a loop"),
+        ("L = [RevoluteDH(d=0.29, alpha=pi/2)] * 2 + [RevoluteDH(a=0.3)]\n", "of a loop"),
         ("c.addSegment(Segment(Joint(Joint::RotX), Frame::DH(0, 0, 0.29, 0)));\n", "RotX.*RotZ, TransZ or None"),
         (
             "c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(0, 0, 1, 0)));\nc.addSegment(Segment(fixed, H));",
