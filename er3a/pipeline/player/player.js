@@ -36,7 +36,7 @@ const arms = [data, ...data.others].map((arm, k) => ({
   table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
 }));
 const surroundings = space.add(data.scene);
-if (arms.length > 1) space.turn(data.turned, 0); // arms that stand beside each other along y
+space.turn(data.turned, 0);
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -117,7 +117,8 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  others.forEach((own, k) => sticks(own, others.length > 1 && motion.events[k]?.status === "fail" ? page.touching : page.accent, poses[0]));
+  const shades = { fail: page.touching, caution: page.doubtful };
+  others.forEach((own, k) => sticks(own, shades[motion.events[k]?.status] ?? page.accent, poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -154,8 +155,8 @@ function draw() {
 function sticks(poses, css, shown) {
   const joints = poses.map((T) => column(T, 3));
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
-  if (off.length) space.line(joints, css, 3);
-  off.forEach((joint) => space.dot(joint, css, 3.5));
+  if (off.length) space.line(joints, css, 4);
+  off.forEach((joint) => space.dot(joint, css, 4.5));
 }
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */

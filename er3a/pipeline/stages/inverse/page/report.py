@@ -56,10 +56,15 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached and should be, or else one that the most solutions serve: of these the farthest
-    from axis 1, where they differ most."""
+    """A target that is not reached and should be, or else one that the most solutions serve, none of them chosen for
+    want of one that is not singular: of these the farthest from axis 1, where they differ most."""
     ranks = {
-        each.name: (each.outcome in ("reached", each.expect), -each.within_limits, -np.hypot(*each.xyz_mm[:2]))
+        each.name: (
+            each.outcome in ("reached", each.expect),
+            is_one(each.reason, "nearest_regular") or _singular(each),
+            -each.within_limits,
+            -np.hypot(*each.xyz_mm[:2]),
+        )
         for each in shown
     }
     return min(ranks, key=ranks.__getitem__), 0.0
@@ -88,10 +93,15 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
         keys,
         (
             Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
-            Group(tr("Reached"), [row for row in rows if row.mark == "pass"]),
+            Group(tr("Reached"), [row for row in rows if row.mark != "fail"]),
         ),
         next((row.fix for row in rows if row.fix), None),
     )
+
+
+def _singular(target: model.TargetResult) -> bool:
+    """Whether nothing but a singular pose serves a target."""
+    return any(is_one(each, "at_singularity") for each in target.advice)
 
 
 def _row(target: model.TargetResult) -> ListRow:
@@ -101,9 +111,11 @@ def _row(target: model.TargetResult) -> ListRow:
         if target.outcome == "reached"
         else outcome_word(target.outcome)
     )
-    mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
+    mark: Literal["pass", "caution", "fail"] = "fail"
+    if target.outcome == "reached":
+        mark = "caution" if _singular(target) else "pass"
     parts = (
-        [Part(target.within_limits / target.solutions, 1.0, "rest" if mark == "pass" else "fail")]
+        [Part(target.within_limits / target.solutions, 1.0, "fail" if mark == "fail" else "rest")]
         if target.solutions > target.within_limits
         else ()
     )
@@ -143,9 +155,10 @@ def _solutions_listed(
 ) -> list[tuple[str, Markup, Markup, str, list[tuple[Any, ...]]]]:
     """The branches as they are listed by the player: mark, where it shows each, its name, what came of it, and its
     joint values."""
+    singular = np.asarray(branches.singular.any(axis=1))
     return [
         (
-            "fail" if branches.refusal[k] else "caution" if branches.singular[k].any() else "",
+            "fail" if branches.refusal[k] else "caution" if singular[k] else "pass" if branches.rank[k] == 1 else "",
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             cells[k][-1],
