@@ -11,7 +11,7 @@ import { constantLinks } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
-const FAINT = 0.15; // of a body that hides the arm
+const FAINT = 0.15; // of a body that hides the arm, or is larger
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
@@ -120,7 +120,7 @@ function draw() {
   const shades = { fail: page.touching, caution: page.doubtful };
   others.forEach((own, k) => sticks(own, shades[motion.events[k]?.status] ?? page.accent, poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
-  space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
+  space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {

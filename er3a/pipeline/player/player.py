@@ -6,6 +6,7 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from itertools import combinations
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -145,7 +146,7 @@ def _data(
 
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[PlayedMotion]) -> None:
     """Has the picture hold the arms on their ways and what is around them, as far as that is near."""
-    bodies = [shape for shape in data["scene"] if "pale" not in shape or "own" in shape]
+    bodies = [each for each in data["scene"] if not each.get("large") and ("pale" not in each or "own" in each)]
     placed = [(triangles_of(shape)[0], np.array(shape["T"])) for shape in bodies]
     points = [corners @ T[:3, :3].T + T[:3, 3] for corners, T in placed]
     for robot, *ways in zip(robots, *((motion.q, *motion.beside) for motion in motions)):
@@ -167,13 +168,14 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[Play
 
 def _turned(robot: Robot, motion: PlayedMotion) -> float:
     """By how much (rad) the eye is turned so that the two solutions drawn that look most alike differ most."""
-    points = np.array([poses_at(robot, q)[:, :3, 3] for q in motion.ghosts]).reshape(len(motion.ghosts), -1, 3)
-    one, other = np.triu_indices(len(points), 1)
-    between = points[one] - points[other]
-    between = between[np.linalg.norm(between, axis=2).max(axis=1, initial=0.0) > ALIKE * drawn_size(robot)]
+    poses = [poses_at(robot, q)[:, :3, 3] for q in motion.ghosts]
+    between = np.array([one - other for one, other in combinations(poses, 2)])
+    if len(between):
+        between = between[np.linalg.norm(between, axis=2).max(axis=1) > ALIKE * drawn_size(robot)]
+    if not len(between):
+        return 0.0
     seen = np.array([between @ axes_of(AZIMUTH + turn, ELEVATION)[:2].T for turn in TURNS])
-    least = np.linalg.norm(seen, axis=-1).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
-    return float(TURNS[least.argmax()])
+    return float(TURNS[np.linalg.norm(seen, axis=-1).max(axis=2).min(axis=1).argmax()])
 
 
 def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:

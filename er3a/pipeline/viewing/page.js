@@ -566,8 +566,9 @@ function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
   const idOf = (part) => part.querySelector("h2").id;
+  const motionOf = (part) => idOf(part).replace(/-(solutions|clearance)$/, "");
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(idOf(part).replace(/-solutions$/, ""), idOf(part))));
+  chooser.append(...parts.map((part) => new Option(motionOf(part), idOf(part))));
   const choose = (part) => {
     chooser.value = idOf(part);
     for (const other of parts) other === part ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
@@ -591,7 +592,7 @@ function showOneOf(group) {
     aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
-  addEventListener("picked", ({ detail }) => parts.filter((part) => idOf(part).replace(/-solutions$/, "") === detail).forEach((part) => choose(part)));
+  addEventListener("picked", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach((part) => choose(part)));
   choose(parts[0]);
   follow();
 }
@@ -761,18 +762,23 @@ const mark = (shown) => {
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
-const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
+const pick = (name) => dispatchEvent(new CustomEvent("picked", { detail: name }));
+const pickRow = (row) => pick(decodeURIComponent(row.hash.slice(1)));
 for (const row of rows) {
   row.addEventListener("click", () => {
     mark(row);
-    pick(row);
+    pickRow(row);
   });
 }
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
+document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => {
+  mark(playing(target.value));
+  pick(target.value);
+});
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
 mark(first);
-if (first && location.hash.length < 2) pick(first);
+if (first && location.hash.length < 2) pickRow(first);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

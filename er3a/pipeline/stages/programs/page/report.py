@@ -33,7 +33,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -70,17 +70,12 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    bad = {each.name: row_of(each, shown[each.name], 0.0, 1.0, notes[each.name]) for each in wrong}
+    times = {name: float(motion.t[-1]) for name, motion in shown.items()}
+    shares = dict(zip(times, lengths(times.values())))  # all bars have one scale of time
+    bad = {each.name: row_of(each, shown[each.name], 0.0, shares[each.name], notes[each.name]) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
     sound = [
-        ListRow(
-            "pass",
-            each.name,
-            tr("{passed} of {count} motions", passed=each.passed, count=each.motions),
-            f"#{each.name}",
-            (each.name, 0.0),
-            1.0,
-        )
+        ListRow("pass", each.name, _cost(each, times[each.name]), f"#{each.name}", (each.name, 0.0), shares[each.name])
         for each in good
     ]
     caught = sum(fault.meant for fault in wrong)
@@ -89,6 +84,13 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))
+
+
+def _cost(program: model.ProgramSummary, time_s: float) -> str:
+    """How long a program that passes takes, and how near it comes to anything."""
+    clear = program.least_clearance_mm
+    near = [tr("{far} mm clear", far=fixed(clear, 0))] if clear is not None else []
+    return " · ".join([tr("{time} s", time=fixed(time_s, 1)), *near])
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:

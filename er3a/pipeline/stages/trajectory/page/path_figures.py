@@ -14,12 +14,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label
+from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -61,6 +64,52 @@ def path_picture(
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
     figure.legend(handles=_legend(path), loc="upper center", bbox_to_anchor=(0.5, 1.0), ncols=9, fontsize=FONT)
     return Picture(figure, alt, caption, [(ax, path.name) for ax in figure.axes])
+
+
+def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Finding | None) -> Picture:
+    """How near the arm comes to anything, over the time of its motion, with what it must not come below.
+
+    Parameters
+    ----------
+    rows : of the path
+    shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
+    """
+    figure, ax = new_figure(width=5.2, height=2.3)
+    ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
+    ax.fill_between(rows.t_s, np.minimum(rows.clearance_mm, 0.0), 0.0, color=palette.TOUCHING, alpha=0.5, linewidth=0)
+    ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
+    if shapes:
+        margin = shapes.margin_mm
+        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.2, linewidth=0)
+        ax.plot(
+            [],
+            [],
+            color=palette.DOUBTFUL,
+            alpha=0.4,
+            linewidth=7,
+            label=tr("assumed shapes may be off by {mm:g} mm", mm=margin),
+        )
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
+    if path.clearance:
+        ax.plot(path.clearance.t_s, path.clearance.least_mm, "o", color=palette.INK, markersize=5)
+    for part in path.unreachable:
+        ax.axvspan(part.t0_s, part.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
+    ax.set_xlim(0.0, path.duration_s)
+    ax.set_xlabel(axis_label(rows, "t_s"))
+    ax.set_ylabel(axis_label(rows, "clearance_mm"))
+    least = path.clearance
+    caption = (
+        tr(
+            "Nearest at {t} s: {far} mm, {pair}.",
+            t=fixed(least.t_s, 2),
+            far=fixed(least.least_mm, 1),
+            pair=say(least.between),
+        )
+        if least
+        else ""
+    )
+    alt = tr("Clearance over time for {path}", path=path.name)
+    return Picture(figure, alt, caption, [(ax, path.name)])
 
 
 def _axes(figure: Figure, column: int, row: int) -> Axes:
