@@ -70,13 +70,12 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    times = {name: float(motion.t[-1]) for name, motion in shown.items()}
-    shares = dict(zip(times, lengths(times.values())))  # all bars have one scale of time
-    bad = {each.name: row_of(each, shown[each.name], 0.0, shares[each.name], notes[each.name]) for each in wrong}
+    bad = {each.name: row_of(each, shown[each.name], 0.0, 1.0, notes[each.name]) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
+    times = [float(shown[each.name].t[-1]) for each in good]
     sound = [
-        ListRow("pass", each.name, _cost(each, times[each.name]), f"#{each.name}", (each.name, 0.0), shares[each.name])
-        for each in good
+        ListRow("pass", each.name, _cost(each, time), f"#{each.name}", (each.name, 0.0), length)
+        for each, time, length in zip(good, times, lengths(times))
     ]
     caught = sum(fault.meant for fault in wrong)
     headline, rest = may_run(len(sound), len(summary.programs) - caught, caught, tr("programs"))

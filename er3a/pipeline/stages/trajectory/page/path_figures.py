@@ -80,15 +80,8 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
     ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
     if shapes:
         margin = shapes.margin_mm
-        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.2, linewidth=0)
-        ax.plot(
-            [],
-            [],
-            color=palette.DOUBTFUL,
-            alpha=0.4,
-            linewidth=7,
-            label=tr("assumed shapes may be off by {mm:g} mm", mm=margin),
-        )
+        text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
+        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
         ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
     if path.clearance:
         ax.plot(path.clearance.t_s, path.clearance.least_mm, "o", color=palette.INK, markersize=5)
@@ -100,7 +93,7 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
     least = path.clearance
     caption = (
         tr(
-            "Nearest at {t} s: {far} mm, {pair}.",
+            "Least: {far} mm at {t} s, {pair}.",
             t=fixed(least.t_s, 2),
             far=fixed(least.least_mm, 1),
             pair=say(least.between),
