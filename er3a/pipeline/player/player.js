@@ -117,8 +117,7 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  const shades = { fail: page.touching, caution: page.doubtful };
-  others.forEach((own, k) => sticks(own, shades[motion.events[k]?.status] ?? page.accent, poses[0]));
+  others.forEach((own, k) => sticks(own, { fail: page.touching, caution: page.doubtful }[motion.events[k]?.status] ?? page.accent, poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));

@@ -762,23 +762,17 @@ const mark = (shown) => {
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
-const pick = (name) => dispatchEvent(new CustomEvent("picked", { detail: name }));
-const pickRow = (row) => pick(decodeURIComponent(row.hash.slice(1)));
-for (const row of rows) {
-  row.addEventListener("click", () => {
-    mark(row);
-    pickRow(row);
-  });
-}
+const pick = (row, name = decodeURIComponent(row.hash.slice(1))) => {
+  mark(row);
+  dispatchEvent(new CustomEvent("picked", { detail: name }));
+};
+for (const row of rows) row.addEventListener("click", () => pick(row));
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
-document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => {
-  mark(playing(target.value));
-  pick(target.value);
-});
+document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => pick(playing(target.value), target.value));
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
 mark(first);
-if (first && location.hash.length < 2) pickRow(first);
+if (first && location.hash.length < 2) pick(first);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

@@ -22,7 +22,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import GRID, INK, JOINTS, MUTED, VERDICTS
+from er3a.pipeline.viewing.palette import INK, JOINTS, LINK, MUTED, VERDICTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -36,9 +36,9 @@ STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    """Torques of all joints with their intervals, and the parts of the most loaded one."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.2, sharex=True)
+    figure, (torque, parts) = new_figure(2, 1, 5.2, 4.0, sharex=True)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
@@ -46,7 +46,6 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
-        power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
@@ -61,38 +60,33 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
-    power.axhline(0.0, color=MUTED, linewidth=0.8)
-    power.set_ylabel(axis_label(rows, "power_w"))
-    power.set_xlabel(axis_label(rows, "t_s"))
+    parts.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
+    alt = tr("Panels over time for {path}: torques, their contributions.", path=path.name)
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts)])
 
 
 def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> Picture:
-    """What each joint holds at most, that of the pose shown in its colour, with what paths ask and what it may."""
+    """What each joint holds at most, that of the pose shown in its colour, beside its limit where that is known."""
     figure, ax = new_figure(width=5.2, height=3.5)
     places = np.arange(len(summary.holding))
     torques = np.array([abs(each.torque) for each in summary.holding])
     spread = [each.tolerance for each in summary.holding]
-    colours = [JOINTS[each.joint - 1] if each is shown else GRID for each in summary.holding]
+    colours = [JOINTS[each.joint - 1] if each is shown else LINK for each in summary.holding]
     ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED, label=tr("holding"))
-    peaks = [motor.peak for motor in summary.motors]
-    ax.plot(peaks, places[: len(peaks)], "|", color=INK, markersize=13, markeredgewidth=2, label=tr("moving"))
     limits = [(motor.peak_limit, k) for k, motor in enumerate(summary.motors) if motor.peak_limit is not None]
     if limits:
         ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("limit"))
     for k, each in enumerate(summary.holding):
-        end = max(torques[k] + spread[k], *peaks[k : k + 1])
-        ax.annotate(_sized(torques[k], each.unit), (end, k), xytext=(7, 0), textcoords="offset points", va="center")
+        ax.text(torques[k] + spread[k], k, "  " + _sized(torques[k], each.unit), va="center")
     ax.set_yticks(places, [f"J{each.joint}" for each in summary.holding])
     ax.invert_yaxis()
     ax.margins(x=0.22)
     ax.set_xlim(left=0.0)
     ax.set_xlabel(bracketed(tr("torque"), model.shared_unit(each.unit for each in summary.holding)))
     ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    caption = tr("Greatest torque of each joint, in any pose and on the paths. Lines: tolerance of the masses.")
+    caption = tr("Greatest torque of each joint in any pose. Lines: tolerance of the masses.")
     return Picture(figure, tr("Bars of the greatest torque that each joint holds"), caption)
 
 

@@ -20,7 +20,7 @@ from er3a.pipeline.viewing.drawn import poses_at
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
 
-SPECK_M = 1e-3  # length of the stroke that a number is written at
+SPECK_MM = 1.0  # length of the stroke that a number is written at
 SHOWN_S = 0.9  # how long the player shows a solution, before it moves to the next one for a tenth of a second
 Position = tuple[float, float, float]
 MAX_GHOSTS = 8  # solutions that are drawn at a time: more hide each other
@@ -54,11 +54,11 @@ def _numbers(robot: Robot, q: Reals) -> list[Mark]:
     """The numbers of solutions (N, n), rad or m, each at the joint that they differ at most; one for those that share
     its place."""
     points = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
-    places = np.round(points[:, points.var(axis=0).sum(axis=1).argmax()], 2)
+    places = 10 * np.round(100 * points[:, points.var(axis=0).sum(axis=1).argmax()])
     numbers: dict[Position, list[str]] = {}
     for k, (x, y, z) in enumerate(places.tolist()):
         numbers.setdefault((x, y, z), []).append(str(k + 1))
-    return [Mark(0.0, len(q), at, (*at[:2], at[2] + SPECK_M), ", ".join(own)) for at, own in numbers.items()]
+    return [_line((x, y, z), (x, y, z + SPECK_MM), ", ".join(own), len(q)) for (x, y, z), own in numbers.items()]
 
 
 def _solution_event(rows: SolutionRows, k: int) -> PlayedEvent:

@@ -83,24 +83,14 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
         text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
         ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
         ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
-    if path.clearance:
-        ax.plot(path.clearance.t_s, path.clearance.least_mm, "o", color=palette.INK, markersize=5)
-    for part in path.unreachable:
-        ax.axvspan(part.t0_s, part.t1_s, color=palette.MUTED, alpha=0.25, linewidth=0)
+    caption = ""
+    if least := path.clearance:
+        far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
+        ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
+        caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
     ax.set_xlim(0.0, path.duration_s)
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
-    least = path.clearance
-    caption = (
-        tr(
-            "Least: {far} mm at {t} s, {pair}.",
-            t=fixed(least.t_s, 2),
-            far=fixed(least.least_mm, 1),
-            pair=say(least.between),
-        )
-        if least
-        else ""
-    )
     alt = tr("Clearance over time for {path}", path=path.name)
     return Picture(figure, alt, caption, [(ax, path.name)])
 
