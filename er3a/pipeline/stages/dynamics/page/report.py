@@ -79,7 +79,8 @@ def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> P
     if limits:
         ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("limit"))
     for k, each in enumerate(summary.holding):
-        ax.text(torques[k] + spread[k], k, "  " + _sized(torques[k], each.unit), va="center")
+        end = torques[k] + spread[k], k
+        ax.annotate(_sized(torques[k], each.unit), end, (7, 0), textcoords="offset points", va="center")
     ax.set_yticks(places, [f"J{each.joint}" for each in summary.holding])
     ax.invert_yaxis()
     ax.margins(x=0.22)

@@ -51,12 +51,13 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
 
 
 def _numbers(robot: Robot, q: Reals) -> list[Mark]:
-    """The numbers of solutions (N, n), rad or m, each at the joint that they differ at most; one for those that share
-    its place."""
+    """The numbers of solutions (N, n), rad or m, each at the joint that tells most of them apart; one mark for those that
+    share its place."""
     points = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
-    places = 10 * np.round(100 * points[:, points.var(axis=0).sum(axis=1).argmax()])
+    places = 10 * np.round(100 * points)  # mm, to a centimetre
+    parted = [len(np.unique(own, axis=0)) for own in places.swapaxes(0, 1)]
     numbers: dict[Position, list[str]] = {}
-    for k, (x, y, z) in enumerate(places.tolist()):
+    for k, (x, y, z) in enumerate(places[:, np.argmax(parted)].tolist()):
         numbers.setdefault((x, y, z), []).append(str(k + 1))
     return [_line((x, y, z), (x, y, z + SPECK_MM), ", ".join(own), len(q)) for (x, y, z), own in numbers.items()]
 
