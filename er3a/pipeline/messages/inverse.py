@@ -5,7 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, tr, with_unit, words
-from er3a.pipeline.messages.kinematics import SINGULAR_POSES, limited
+from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, texts
 
 KEY_FIGURES = words(
@@ -23,7 +23,6 @@ NEAREST_RULE = N_(
     "Between equals (to 1e-9 rad) the smaller root of the summed squares of all joint motions decides, then the lower "
     "branch number."
 )
-FREE_AT = SINGULAR_POSES | words({"elbow": "arm folded onto itself", "curve": "self-motion"})
 TEXTS = texts(
     {
         "inverse.not_reproduced": (

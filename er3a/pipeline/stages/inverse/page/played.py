@@ -51,7 +51,7 @@ def solutions_played(robot: Robot, target: TargetResult, rows: SolutionRows) -> 
 
 
 def _numbers(robot: Robot, q: Reals) -> list[Mark]:
-    """The numbers of solutions (N, n), rad or m, each at the joint that tells most of them apart; one mark for those that
+    """The numbers of solutions (N, n), rad or m, each at the joint that parts most of them; one mark for those that
     share its place."""
     points = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
     places = 10 * np.round(100 * points)  # mm, to a centimetre

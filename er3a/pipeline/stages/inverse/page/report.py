@@ -13,10 +13,10 @@ from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
+from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
@@ -29,7 +29,6 @@ from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
-MAX_SELF_MOTIONS = 6
 
 
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
@@ -142,7 +141,6 @@ def _section(
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if is_one(target.method, "closed_form") else say(target.method),
-        families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(robot, target.name, branches, cells),
@@ -191,27 +189,6 @@ def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
     """The best row of each branch of a target, by its place in the ranking, refused ones last."""
     best = rows.take(rows.first_of_branch)
     return best.take(np.lexsort((best.branch, best.rank, best.rank == 0)))
-
-
-def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
-    """The nearest self-motions, and how many more there are."""
-    texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
-    if len(families) > MAX_SELF_MOTIONS:
-        texts.append(tr("{count} more in summary.json", count=len(families) - MAX_SELF_MOTIONS))
-    return texts
-
-
-def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
-    low, high = (fixed(end, 1) for end in family.range_deg)
-    return tr(
-        "{where}: the arm can move about ({joints}) {units} with the tool at rest, {room}",
-        where=word("self_motion", FREE_AT, family.kind),
-        joints=_listed(family.q0_deg),
-        units=_units(robot),
-        room=tr("for {low} to {high} deg", low=low, high=high)
-        if family.within_limits
-        else tr("but every member leaves the limits"),
-    )
 
 
 def _clearance(target: model.TargetResult) -> str:

@@ -74,7 +74,14 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     good = [each for each in summary.programs if each.name not in bad]
     times = [float(shown[each.name].t[-1]) for each in good]
     sound = [
-        ListRow("pass", each.name, _cost(each, time), f"#{each.name}", (each.name, 0.0), length)
+        ListRow(
+            "pass",
+            each.name,
+            _cost(time, each.least_clearance_mm if each.least_clearance_mm is not None else np.inf),
+            f"#{each.name}",
+            (each.name, 0.0),
+            length,
+        )
         for each, time, length in zip(good, times, lengths(times))
     ]
     caught = sum(fault.meant for fault in wrong)
@@ -85,11 +92,12 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))
 
 
-def _cost(program: model.ProgramSummary, time_s: float) -> str:
-    """How long a program that passes takes, and how near it comes to anything."""
-    clear = program.least_clearance_mm
-    near = [tr("{far} mm clear", far=fixed(clear, 0))] if clear is not None else []
-    return " · ".join([tr("{time} s", time=fixed(time_s, 1)), *near])
+def _cost(time_s: float, clear_mm: float) -> str:
+    """How long something takes, and how near it comes to anything; infinite where that is not known."""
+    parts = [tr("{time} s", time=fixed(time_s, 2))] if np.isfinite(time_s) else []
+    if 0 <= clear_mm < np.inf:  # else a finding says how deep
+        parts.append(tr("{far} mm clear", far=fixed(clear_mm, 0)))
+    return " · ".join(parts)
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
@@ -193,9 +201,4 @@ def _listing(
 def _facts(rows: model.Instructions, here: list[int]) -> str:
     """Duration and clearance of the motions of a line."""
     times, clear = rows.duration_s[here], rows.clearance_mm[here]
-    parts = []
-    if np.isfinite(times).any():
-        parts.append(tr("{time} s", time=fixed(float(np.nanmax(times)), 2)))
-    if (least := float(np.fmin.reduce(clear, initial=np.inf))) < np.inf and least >= 0:  # else a finding says how deep
-        parts.append(tr("{far} mm clear", far=fixed(least, 0)))
-    return " · ".join(parts)
+    return _cost(np.fmax.reduce(times, initial=-np.inf), np.fmin.reduce(clear, initial=np.inf))

@@ -31,7 +31,7 @@ WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves th
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
-ROWS = 3, 2  # of axes, on the left and on the right
+ROWS = 3, 1  # of axes, on the left and on the right
 LEFT, BOTTOM, TOP = 0.07, 0.07, 0.925
 WIDTH, GAP = 0.41, 0.09  # of a column, and between the two
 FONT = 9.0
@@ -55,10 +55,6 @@ def path_picture(
         column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
     _joint_curves(joints, robot, path, rows)
     _distances(measures[0], rows, near)
-    condition = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
-    measures[1].plot(rows.t_s, condition, color=palette.MODEL)
-    _logarithmic(measures[1], 1.0, min(1e6, 2 * np.nanmax(np.append(condition, 50.0))))
-    measures[1].set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
     for ax in figure.axes:
         _mark(ax, path)
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -76,7 +72,7 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
     """
     figure, ax = new_figure(width=5.2, height=2.3)
     ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
-    ax.fill_between(rows.t_s, np.minimum(rows.clearance_mm, 0.0), 0.0, color=palette.TOUCHING, alpha=0.5, linewidth=0)
+    _mark(ax, path)
     ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
     if shapes:
         margin = shapes.margin_mm

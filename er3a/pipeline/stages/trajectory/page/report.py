@@ -209,8 +209,8 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
 def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
     text = path_text(path)
     alt = tr(
-        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
-        "condition number. {finding}.",
+        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets. "
+        "{finding}.",
         path=path.name,
         finding=text,
     )
