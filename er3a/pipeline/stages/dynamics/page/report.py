@@ -70,14 +70,15 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
 def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> Picture:
     """What each joint holds at most, that of the pose shown in its colour, beside its limit where that is known."""
     figure, ax = new_figure(width=5.2, height=3.5)
-    places = np.arange(len(summary.holding))
+    places, unit = np.arange(len(summary.holding)), model.shared_unit(each.unit for each in summary.holding)
     torques = np.array([abs(each.torque) for each in summary.holding])
     spread = [each.tolerance for each in summary.holding]
     colours = [JOINTS[each.joint - 1] if each is shown else LINK for each in summary.holding]
-    ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED, label=tr("holding"))
+    ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED)
     limits = [(motor.peak_limit, k) for k, motor in enumerate(summary.motors) if motor.peak_limit is not None]
     if limits:
-        ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("limit"))
+        ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("peak limit ({unit})", unit=unit))
+        ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     for k, each in enumerate(summary.holding):
         end = torques[k] + spread[k], k
         ax.annotate(_sized(torques[k], each.unit), end, (7, 0), textcoords="offset points", va="center")
@@ -85,10 +86,9 @@ def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> P
     ax.invert_yaxis()
     ax.margins(x=0.22)
     ax.set_xlim(left=0.0)
-    ax.set_xlabel(bracketed(tr("torque"), model.shared_unit(each.unit for each in summary.holding)))
-    ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
+    ax.set_xlabel(axis_label(model.TorqueRows, "torque", unit))
     caption = tr("Greatest torque of each joint in any pose. Lines: tolerance of the masses.")
-    return Picture(figure, tr("Bars of the greatest torque that each joint holds"), caption)
+    return Picture(figure, caption, caption)
 
 
 MAX_USES = 12
@@ -166,7 +166,6 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     else:
         headline = tr("Within all limits.") if limited else tr("Cannot judge: motor limits missing.")
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
-    power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
@@ -183,7 +182,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     return Answer(
         headline,
         "",
-        tr("Greatest power of a joint: {power}.", power=power),
+        "",
         [
             (moving, tr("J{joint} moving", joint=worst.joint)),
             (holding, tr("J{joint} holding", joint=worst.joint)),

@@ -87,8 +87,7 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
     ax.set_xlim(0.0, path.duration_s)
     ax.set_xlabel(axis_label(rows, "t_s"))
     ax.set_ylabel(axis_label(rows, "clearance_mm"))
-    alt = tr("Clearance over time for {path}", path=path.name)
-    return Picture(figure, alt, caption, [(ax, path.name)])
+    return Picture(figure, tr("{path}: how near it comes", path=path.name), caption, [(ax, path.name)])
 
 
 def _axes(figure: Figure, column: int, row: int) -> Axes:
