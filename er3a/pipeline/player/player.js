@@ -362,5 +362,6 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
 });
 if (!answer(asked) && location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
+dispatchEvent(new Event("player")); // the page has its length now
 refresh();
 performance.mark("player");

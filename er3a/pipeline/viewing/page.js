@@ -676,9 +676,7 @@ function explain(text, meaning) {
 }
 
 document.querySelectorAll("main[data-panel]").forEach(linkJoints);
-if (!document.querySelector("main[data-panel]")) {
-  for (const link of document.querySelectorAll('a[href^="teach.html#q="]')) link.replaceWith(...link.childNodes);
-}
+if (!document.querySelector("main[data-panel]")) document.querySelectorAll('a[href^="teach.html#q="]').forEach((link) => link.replaceWith(...link.childNodes));
 addEventListener("hashchange", unfoldTarget);
 unfoldTarget();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
@@ -781,4 +779,5 @@ addEventListener("keydown", ({ key }) => key === "Escape" && menus.forEach((menu
 
 addFinder();
 addEventListener("click", keepPlace, true);
+addEventListener("player", returnToPlace);
 returnToPlace();

@@ -70,17 +70,17 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
 def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> Picture:
     """What each joint holds at most, that of the pose shown in its colour, beside its limit where that is known."""
     figure, ax = new_figure(width=5.2, height=3.5)
-    places, unit = np.arange(len(summary.holding)), model.shared_unit(each.unit for each in summary.holding)
+    places, unit = [each.joint for each in summary.holding], model.shared_unit(each.unit for each in summary.holding)
     torques = np.array([abs(each.torque) for each in summary.holding])
     spread = [each.tolerance for each in summary.holding]
-    colours = [JOINTS[each.joint - 1] if each is shown else LINK for each in summary.holding]
+    colours = [JOINTS[(each.joint - 1) % len(JOINTS)] if each is shown else LINK for each in summary.holding]
     ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED)
-    limits = [(motor.peak_limit, k) for k, motor in enumerate(summary.motors) if motor.peak_limit is not None]
+    limits = [(motor.peak_limit, motor.joint) for motor in summary.motors if motor.peak_limit is not None]
     if limits:
         ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("peak limit ({unit})", unit=unit))
         ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     for k, each in enumerate(summary.holding):
-        end = torques[k] + spread[k], k
+        end = torques[k] + spread[k], each.joint
         ax.annotate(_sized(torques[k], each.unit), end, (7, 0), textcoords="offset points", va="center")
     ax.set_yticks(places, [f"J{each.joint}" for each in summary.holding])
     ax.invert_yaxis()

@@ -31,30 +31,28 @@ WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves th
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
-ROWS = 3, 1  # of axes, on the left and on the right
-LEFT, BOTTOM, TOP = 0.07, 0.07, 0.925
-WIDTH, GAP = 0.41, 0.09  # of a column, and between the two
+ROWS = 4  # of axes, below one another
+LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.925, 0.89
 FONT = 9.0
 
 
 def path_picture(
     robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds, alt: str, caption: str
 ) -> Picture:
-    """Joint curves of a path on the left, measures on the right, all over the time of its motion.
+    """Joint curves of a path, below them its distances from singular poses, all over one time.
 
     Parameters
     ----------
     rows : of the path, as many as its curves need
     near : from where on a pose counts as near a singular one
     """
-    figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-    joints, measures = ([_axes(figure, column, row) for row in range(count)] for column, count in enumerate(ROWS))
-    for column in (joints, measures):
-        for ax in column[:-1]:
-            ax.tick_params(labelbottom=False)
-        column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
+    figure = Figure(figsize=(9.6, 8.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
+    *joints, distances = (_axes(figure, row) for row in range(ROWS))
+    for ax in joints:
+        ax.tick_params(labelbottom=False)
+    distances.set_xlabel(axis_label(rows, "t_s"), fontsize=FONT)
     _joint_curves(joints, robot, path, rows)
-    _distances(measures[0], rows, near)
+    _distances(distances, rows, near)
     for ax in figure.axes:
         _mark(ax, path)
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -90,10 +88,9 @@ def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Fi
     return Picture(figure, tr("{path}: how near it comes", path=path.name), caption, [(ax, path.name)])
 
 
-def _axes(figure: Figure, column: int, row: int) -> Axes:
-    height = (TOP - BOTTOM) / ROWS[column]
-    x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (ROWS[column] - 1 - row) * height
-    ax = figure.add_axes((x, y, WIDTH, height - 0.03))
+def _axes(figure: Figure, row: int) -> Axes:
+    height = (TOP - BOTTOM) / ROWS
+    ax = figure.add_axes((LEFT, BOTTOM + (ROWS - 1 - row) * height, WIDTH, height - 0.03))
     ax.tick_params(labelsize=FONT, length=2)
     ax.xaxis.set_major_locator(MaxNLocator(5))
     ax.yaxis.set_major_locator(MaxNLocator(4))

@@ -165,7 +165,7 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} within reach.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} reachable.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
