@@ -94,7 +94,7 @@ def _axes(figure: Figure, row: int) -> Axes:
     ax.tick_params(labelsize=FONT, length=2)
     ax.xaxis.set_major_locator(MaxNLocator(5))
     ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_label_coords(-0.1, 0.5)
+    ax.yaxis.set_label_coords(-0.065, 0.5)
     return ax
 
 
