@@ -32,7 +32,7 @@ NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
 ROWS = 4  # of axes, below one another
-LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.925, 0.89
+LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.95, 0.89
 FONT = 9.0
 
 
