@@ -770,7 +770,7 @@ const playing = (name) => rows.find((row) => name && row.dataset.play === name);
 document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => pick(playing(target.value), target.value));
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
 mark(first);
-if (first && location.hash.length < 2) pick(first);
+if (first && (location.hash.length < 2 || first.hash === location.hash)) pick(first);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");

@@ -186,7 +186,7 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
         groups.append(Group(tr("Doubts"), rows))
     wrist = robot.masses.wrist
     unrated = bool(summary.objects) and (wrist is None or not np.isfinite(wrist.payload))
-    below = [tr("Payload is not known: mount nothing yet.")] if unrated else []
+    below = [tr("Payload unknown.")] if unrated else []
     below += [tr("The camera is simulated.")] if found and found.simulated else []
     return Answer(headline, rest, joined(below, " "), keys, groups)
 
