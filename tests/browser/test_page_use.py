@@ -118,7 +118,7 @@ return [silent, count];
 
 SHOWN_PARTS = """
 const shown = [...document.querySelectorAll("[data-one-of] > :not([hidden]) h2")];
-return [...new Set(shown.map((heading) => heading.id.replace(/-solutions$/, "")))];
+return [...new Set(shown.map((heading) => heading.id.replace(/-(solutions|clearance)$/, "")))];
 """
 
 

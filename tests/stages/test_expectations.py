@@ -62,8 +62,7 @@ def test_what_comes_otherwise_is_named_with_both_outcomes():
     assert found is not None
     assert [each.name for each in found.unmet] == ["out", "line"]
     assert say(found) == (
-        "Expectations not met: 2 of 2: out (safe in the model; expected: unreachable); "
-        "line (too fast; expected: safe in the model)."
+        "Expectations not met: 2 of 2: out (pass; expected: unreachable); line (too fast; expected: pass)."
     )
     assert demonstrations([Came("out", "safe", "unreachable")], "safe") == ()
 

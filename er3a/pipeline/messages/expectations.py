@@ -17,7 +17,7 @@ OUTCOMES: dict[Outcome, str] = words(
         "too fast for the assumed limits": "too fast for the assumed limits",
         "undecided": "undecided",
         "near-singular": "near-singular",
-        "safe": "safe in the model",
+        "safe": "pass",
         "reached": "reached",
         "pass": "pass",
         "caution": "caution",

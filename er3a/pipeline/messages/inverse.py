@@ -5,7 +5,7 @@ from __future__ import annotations
 import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import N_, as_text, tr, with_unit, words
-from er3a.pipeline.messages.kinematics import SINGULAR_POSES, limited
+from er3a.pipeline.messages.kinematics import limited
 from er3a.pipeline.messages.say import WORDS, joined, texts
 
 KEY_FIGURES = words(
@@ -18,11 +18,11 @@ KEY_FIGURES = words(
     }
 )
 NEAREST_RULE = N_(
-    "Of the solutions within the limits, take the one with the smallest maximum joint motion from the reference: where "
-    "all joints start and stop together, that joint decides how long the move takes. Between equals (to 1e-9 rad) the "
-    "smaller root of the summed squares of all joint motions decides, then the lower branch number."
+    "Of the solutions within the limits, take the one with the smallest maximum joint motion from the reference, "
+    "singular ones last. Where all joints start and stop together, that joint decides how long the move takes. "
+    "Between equals (to 1e-9 rad) the smaller root of the summed squares of all joint motions decides, then the lower "
+    "branch number."
 )
-FREE_AT = SINGULAR_POSES | words({"elbow": "arm folded onto itself", "curve": "self-motion"})
 TEXTS = texts(
     {
         "inverse.not_reproduced": (
@@ -31,6 +31,7 @@ TEXTS = texts(
         ),
         "unsolved_target": "{name} ({obstacle})",
         "nothing_found": "no solution found",
+        "nearest_regular": "the nearest that is not singular",
         "tilt_missing": "{angle_deg:.3g} deg beyond the wrist's range",
         "branches_leave_limits": "solutions outside the limits: {count}",
         "branches_collide": "solutions that collide: {count}",

@@ -11,7 +11,7 @@ import { constantLinks } from "er3a/kinematics";
 import { alongArm, Arm, ARM, Space, WORLD } from "er3a/space";
 import { decodeValues, posesOf, valuesAt } from "er3a/values";
 
-const FAINT = 0.15; // of a body that hides the arm
+const FAINT = 0.15; // of a body that hides the arm, or is larger
 const DOT = 0.012; // of the arm's size
 const GRAVEST = ["fail", "caution", "plain"];
 const SLOW = 60; // ms between two frames: the next ones have fewer pixels
@@ -36,7 +36,7 @@ const arms = [data, ...data.others].map((arm, k) => ({
   table: arm.table, links: constantLinks(arm.table), shown: new Arm(space, arm, k === 0 ? data.carried : []),
 }));
 const surroundings = space.add(data.scene);
-if (arms.length > 1) space.turn(data.turned, 0); // arms that stand beside each other along y
+space.turn(data.turned, 0);
 const plots = [...document.querySelectorAll("figure[data-panels]")].map(withCursors);
 const cells = [...part("joints").querySelectorAll("dl > div")].map((place) => {
   return { place, value: place.querySelector(".value"), room: place.querySelector(".room") };
@@ -117,9 +117,9 @@ function draw() {
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  others.forEach((own, k) => sticks(own, others.length > 1 && motion.events[k]?.status === "fail" ? page.touching : page.accent, poses[0]));
+  others.forEach((own, k) => sticks(own, { fail: page.touching, caution: page.doubtful }[motion.events[k]?.status] ?? page.accent, poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
-  space.place(surroundings, [WORLD], colours, (mesh) => hiding.has(mesh) && FAINT);
+  space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
   for (const trail of motion.trails) space.line(trail, page.ink, 2);
   for (const { t: from, until, status } of motion.events) {
@@ -154,8 +154,8 @@ function draw() {
 function sticks(poses, css, shown) {
   const joints = poses.map((T) => column(T, 3));
   const off = joints.filter((joint, k) => Math.hypot(...subtract(joint, column(shown[k], 3))) > CLOSED * data.size);
-  if (off.length) space.line(joints, css, 3);
-  off.forEach((joint) => space.dot(joint, css, 3.5));
+  if (off.length) space.line(joints, css, 4);
+  off.forEach((joint) => space.dot(joint, css, 4.5));
 }
 
 /** The axis of row `j`, whose frame is `T`, through the whole picture. */
@@ -362,5 +362,6 @@ document.querySelector(".hero .fix a")?.addEventListener("click", (event) => {
 });
 if (!answer(asked) && location.hash.length < 2) goTo(...data.opened);
 part("controls").hidden = part("joints").hidden = false;
+dispatchEvent(new Event("player")); // the page has its length now
 refresh();
 performance.mark("player");

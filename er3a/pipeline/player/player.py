@@ -6,6 +6,7 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from itertools import combinations
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
 MARGIN = 1.08  # of the picture, of what is to be seen in it
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
+TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which solutions differ most
+ALIKE = 0.02  # of the arm's size: solutions that are nowhere farther from each other look like one
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
     *("a", "alpha", "d", "beta", "direction", "offset", "sliding"),
@@ -77,6 +80,7 @@ def player(
     data["opened"] = opened if opened and opened[0] in named else _worst(robot, shown)
     first = named[data["opened"][0]]
     robots = (robot, *beside)
+    data["turned"] = TURNED if beside else _turned(robot, first)
     _frame(data, robots, shown)
     return Markup(
         page_environment(_HERE)
@@ -132,7 +136,6 @@ def _data(
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
         "colours": {"mark": INK, "sight": REFERENCE, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
-        "turned": TURNED,
         "floor": floor_of(scene),
         "scene": drawn_scene(scene.solids if scene else (), robot),
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
@@ -143,7 +146,7 @@ def _data(
 
 def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[PlayedMotion]) -> None:
     """Has the picture hold the arms on their ways and what is around them, as far as that is near."""
-    bodies = [shape for shape in data["scene"] if "pale" not in shape or "own" in shape]
+    bodies = [each for each in data["scene"] if not each.get("large") and ("pale" not in each or "own" in each)]
     placed = [(triangles_of(shape)[0], np.array(shape["T"])) for shape in bodies]
     points = [corners @ T[:3, :3].T + T[:3, 3] for corners, T in placed]
     for robot, *ways in zip(robots, *((motion.q, *motion.beside) for motion in motions)):
@@ -151,7 +154,7 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[Play
     points += [np.array([mark.start]) for motion in motions for mark in motion.marks]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
-    axes = axes_of(AZIMUTH + (TURNED if len(robots) > 1 else 0.0), ELEVATION)
+    axes = axes_of(AZIMUTH + data["turned"], ELEVATION)
     across = seen @ axes.T
     middle = (across.min(axis=0) + across.max(axis=0)) / 2
     across -= middle
@@ -161,6 +164,18 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[Play
         width, height, _ = np.abs(across * nearer[:, None]).max(axis=0)
         length = MARGIN * 2 * FIELD / DISTANCE * max(width / WIDE, height)
     data |= {"length": float(length), "target": (middle @ axes).tolist()}
+
+
+def _turned(robot: Robot, motion: PlayedMotion) -> float:
+    """By how much (rad) the eye is turned so that the two solutions drawn that look most alike differ most."""
+    poses = [poses_at(robot, q)[:, :3, 3] for q in motion.ghosts]
+    between = np.array([one - other for one, other in combinations(poses, 2)])
+    if len(between):
+        between = between[np.linalg.norm(between, axis=2).max(axis=1) > ALIKE * drawn_size(robot)]
+    if not len(between):
+        return 0.0
+    seen = np.array([between @ axes_of(AZIMUTH + turn, ELEVATION)[:2].T for turn in TURNS])
+    return float(TURNS[np.linalg.norm(seen, axis=-1).max(axis=2).min(axis=1).argmax()])
 
 
 def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
@@ -185,7 +200,7 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     values = (motion.q, *motion.beside)
     at = [np.array([np.interp(t, motion.t, own) for own in q.T]) for q in values]
     poses = [poses_at(robot, q) for robot, q in zip(robots, at)]
-    picture = scene_still(data, poses, colours, TURNED if len(robots) > 1 else 0.0)
+    picture = scene_still(data, poses, colours, data["turned"])
     for q in motion.ghosts:
         picture.line(poses_at(robots[0], q)[:, :3, 3], AXES[2], 3.0)
     for robot, q in zip(robots, values):
@@ -206,7 +221,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     """Unit and limits of each joint in it, None where it has none."""
     ends = np.round(shown(robot, np.stack([robot.lower, robot.upper])), 6)
     return [
-        {"unit": "mm" if slides else tr("deg"), "lower": None if free else low, "upper": None if free else high}
+        {"unit": "mm" if slides else "°", "lower": None if free else low, "upper": None if free else high}
         for slides, free, low, high in zip(robot.slides.tolist(), robot.continuous.tolist(), *ends.tolist())
     ]
 

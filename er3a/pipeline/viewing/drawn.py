@@ -190,7 +190,9 @@ def _measures(solid: Solid, robot: Robot) -> Shape:
     """Kind and measures of a solid, of a mesh those of fewer triangles."""
     match solid:
         case Box():
-            return {"kind": "box", "T": np.asarray(solid.T).tolist(), "size": np.asarray(solid.size).tolist()}
+            edges = [float(edge) for edge in solid.size]
+            large = sorted(edges)[1] > drawn_size(robot)  # a wall, which would outweigh the arm
+            return {"kind": "box", "T": np.asarray(solid.T).tolist(), "size": edges, "large": large}
         case Cylinder():
             place = {"kind": "cylinder", "T": np.asarray(solid.T).tolist()}
             return {**place, "radius": solid.radius, "length": solid.length}

@@ -566,8 +566,9 @@ function showOneOf(group) {
   const parts = [...group.children];
   if (parts.length < 2) return;
   const idOf = (part) => part.querySelector("h2").id;
+  const motionOf = (part) => idOf(part).replace(/-(solutions|clearance)$/, "");
   const chooser = document.createElement("select");
-  chooser.append(...parts.map((part) => new Option(idOf(part).replace(/-solutions$/, ""), idOf(part))));
+  chooser.append(...parts.map((part) => new Option(motionOf(part), idOf(part))));
   const choose = (part) => {
     chooser.value = idOf(part);
     for (const other of parts) other === part ? other.removeAttribute("hidden") : other.setAttribute("hidden", "until-found");
@@ -591,7 +592,7 @@ function showOneOf(group) {
     aim.scrollIntoView();
   };
   addEventListener("hashchange", follow);
-  addEventListener("picked", ({ detail }) => parts.filter((part) => idOf(part).replace(/-solutions$/, "") === detail).forEach((part) => choose(part)));
+  addEventListener("picked", ({ detail }) => parts.filter((part) => motionOf(part) === detail).forEach((part) => choose(part)));
   choose(parts[0]);
   follow();
 }
@@ -675,9 +676,7 @@ function explain(text, meaning) {
 }
 
 document.querySelectorAll("main[data-panel]").forEach(linkJoints);
-if (!document.querySelector("main[data-panel]")) {
-  for (const link of document.querySelectorAll('a[href^="teach.html#q="]')) link.replaceWith(...link.childNodes);
-}
+if (!document.querySelector("main[data-panel]")) document.querySelectorAll('a[href^="teach.html#q="]').forEach((link) => link.replaceWith(...link.childNodes));
 addEventListener("hashchange", unfoldTarget);
 unfoldTarget();
 document.querySelectorAll("[data-one-of]").forEach(showOneOf);
@@ -761,18 +760,17 @@ const mark = (shown) => {
   const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
   lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
 };
-const pick = (row) => dispatchEvent(new CustomEvent("picked", { detail: decodeURIComponent(row.hash.slice(1)) }));
-for (const row of rows) {
-  row.addEventListener("click", () => {
-    mark(row);
-    pick(row);
-  });
-}
+const pick = (row, name = decodeURIComponent(row.hash.slice(1))) => {
+  mark(row);
+  dispatchEvent(new CustomEvent("picked", { detail: name }));
+};
+for (const row of rows) row.addEventListener("click", () => pick(row));
 const played = new URLSearchParams(location.search).get("play");
 const playing = (name) => rows.find((row) => name && row.dataset.play === name);
+document.querySelector(".player .motion")?.addEventListener("change", ({ target }) => pick(playing(target.value), target.value));
 const first = (played ? playing(played) : rows.find((row) => row.hash && row.hash === location.hash)) ?? playing(document.querySelector(".player")?.dataset.opened) ?? rows[0];
 mark(first);
-if (first && location.hash.length < 2) pick(first);
+if (first && (location.hash.length < 2 || first.hash === location.hash)) pick(first);
 
 // A menu closes by a click elsewhere and by Escape.
 const menus = document.querySelectorAll(".menu");
@@ -781,4 +779,5 @@ addEventListener("keydown", ({ key }) => key === "Escape" && menus.forEach((menu
 
 addFinder();
 addEventListener("click", keepPlace, true);
+addEventListener("player", returnToPlace);
 returnToPlace();

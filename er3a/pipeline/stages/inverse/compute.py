@@ -81,7 +81,7 @@ def solve_target(
     if many:
         solutions = solutions.without_turns()
     refused = refusals(robot, solutions, scene)
-    choice = nearest(robot, solutions, target.q_ref, refused)
+    choice = _regular_first(nearest(robot, solutions, target.q_ref, refused), _singular(robot, solutions))
     rows = _rows(robot, target, solutions, choice, refused)
     found, within = np.unique(rows.branch), np.unique(rows.branch[rows.within_limits])
     chosen = choice.chosen
@@ -127,6 +127,14 @@ def solve_target(
         advice=advice,
     )
     return SolvedTarget(result, rows, solutions)
+
+
+def _regular_first(choice: Choice, singular: Flags) -> Choice:
+    """The same solutions, singular ones (N, 4) last: from these the tool can't move straight in every direction."""
+    late = np.asarray(singular[choice.order].any(axis=1))
+    passed_over = late[:1].any() and not late.all()
+    reason = fact("nearest_regular") if passed_over else choice.reason
+    return replace(choice, order=choice.order[np.argsort(late, kind="stable")], reason=reason)
 
 
 def collides(rows: model.SolutionRows) -> Flags:

@@ -72,8 +72,8 @@ def within(value: float, tolerance: float, decimals: int = 2) -> str:
 
 
 def holding_name(joint: int) -> str:
-    """What the player calls the pose in which a joint holds most."""
-    return tr("J{joint}, held", joint=joint)
+    """What the player calls the pose in which a joint holds most, an address on the page as well."""
+    return tr("J{joint}, held", joint=joint).replace(" ", "\u00a0")
 
 
 def _peak(load: JointLoad) -> str:

@@ -22,7 +22,7 @@ from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import INK, JOINTS, MUTED
+from er3a.pipeline.viewing.palette import INK, JOINTS, LINK, MUTED, VERDICTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -36,9 +36,9 @@ STYLES = ("-", "--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)))
 
 
 def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
-    """Torques of all joints with their intervals, the parts of the most loaded one, and powers."""
+    """Torques of all joints with their intervals, and the parts of the most loaded one."""
     rows = rows.take(np.unique(np.linspace(0, len(rows) - 1, min(DRAWN, len(rows))).round().astype(int)))
-    figure, (torque, parts, power) = new_figure(3, 1, 5.2, 4.2, sharex=True)
+    figure, (torque, parts) = new_figure(2, 1, 5.2, 4.0, sharex=True)
     load, unit = path.hardest, model.shared_unit(load.unit for load in path.joints)
     worst = load.joint - 1
     for j in range(rows.torque.shape[1]):
@@ -46,7 +46,6 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         low, high = rows.torque[:, j] - rows.tolerance[:, j], rows.torque[:, j] + rows.tolerance[:, j]
         torque.fill_between(rows.t_s, low, high, color=colour, alpha=0.15, linewidth=0)
         torque.plot(rows.t_s, rows.torque[:, j], color=colour, label=f"J{j + 1}")
-        power.plot(rows.t_s, rows.power_w[:, j], color=colour, label=f"J{j + 1}")
     torque.legend(ncols=6, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     torque.set_ylabel(axis_label(rows, "torque", unit))
     names = dict(
@@ -61,13 +60,35 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
         parts.plot(rows.t_s, getattr(rows, part)[:, worst], color=INK, linestyle=style, label=names[part])
     parts.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
     parts.set_ylabel(tr("J{joint} ({unit})", joint=worst + 1, unit=load.unit))
-    power.axhline(0.0, color=MUTED, linewidth=0.8)
-    power.set_ylabel(axis_label(rows, "power_w"))
-    power.set_xlabel(axis_label(rows, "t_s"))
+    parts.set_xlabel(axis_label(rows, "t_s"))
     most = max(model.PARTS, key=lambda part: getattr(load, part))
     caption = tr("Largest part: {part}. Shaded: tolerance of the masses.", part=names[most])
-    alt = tr("Three panels over time for {path}: torques, their contributions, powers.", path=path.name)
-    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts, power)])
+    alt = tr("Panels over time for {path}: torques, their contributions.", path=path.name)
+    return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts)])
+
+
+def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> Picture:
+    """What each joint holds at most, that of the pose shown in its colour, beside its limit where that is known."""
+    figure, ax = new_figure(width=5.2, height=3.5)
+    places, unit = [each.joint for each in summary.holding], model.shared_unit(each.unit for each in summary.holding)
+    torques = np.array([abs(each.torque) for each in summary.holding])
+    spread = [each.tolerance for each in summary.holding]
+    colours = [JOINTS[(each.joint - 1) % len(JOINTS)] if each is shown else LINK for each in summary.holding]
+    ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED)
+    limits = [(motor.peak_limit, motor.joint) for motor in summary.motors if motor.peak_limit is not None]
+    if limits:
+        ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("peak limit ({unit})", unit=unit))
+        ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
+    for k, each in enumerate(summary.holding):
+        end = torques[k] + spread[k], each.joint
+        ax.annotate(_sized(torques[k], each.unit), end, (7, 0), textcoords="offset points", va="center")
+    ax.set_yticks(places, [f"J{each.joint}" for each in summary.holding])
+    ax.invert_yaxis()
+    ax.margins(x=0.22)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel(axis_label(model.TorqueRows, "torque", unit))
+    caption = tr("Greatest torque of each joint in any pose. Lines: tolerance of the masses.")
+    return Picture(figure, caption, caption)
 
 
 MAX_USES = 12
@@ -79,12 +100,12 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
     """Write the dynamics page of a robot."""
     robot, results = study.robot(stored.robot), stored.results
     summary = results.summary
-    hardest = _moment_of(results, _worst(summary.motors))[0] if summary.motors else ""
     figures = [
-        (path, torque_figure(path, results.torques.take(results.torques.path == path.name)))
-        for path in sorted(summary.paths, key=lambda path: path.name != hardest)  # it is shown with a held pose
+        (path.name, torque_figure(path, results.torques.take(results.torques.path == path.name)))
+        for path in summary.paths
         if path.complete
     ]
+    figures += [(holding_name(each.joint), held_figure(summary, each)) for each in summary.holding]
     render_stage(
         study,
         stored,
@@ -138,34 +159,35 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
         size = with_unit(number(abs(held.torque), 2), held.unit)
         return Answer(tr("J{joint} holds {torque} at most.", joint=held.joint, torque=size), keys=[payload])
     worst = _worst(summary.motors)
-    most = with_unit(number(worst.peak, 2), worst.unit)
     limited = all(motor.peak_limit is not None for motor in summary.motors)
     over = [f"J{motor.joint}" for motor in summary.motors if _mark(motor) == "fail"]
-    rest = (
-        tr("Too much for {joints}.", joints=joined(over, ", "))
-        if over
-        else tr("Within all limits.")
-        if limited
-        else tr("Motor limits are unknown.")
-    )
-    power = with_unit(number(max(motor.power_w for motor in summary.motors), 2), "W")
+    if over:
+        headline = tr("Too much for {joints}.", joints=joined(over, ", "))
+    else:
+        headline = tr("Within all limits.") if limited else tr("Cannot judge: motor limits missing.")
+    moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
     rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
     if idle := order[len(rows) :]:
         names = joined((f"J{motor.joint}" for motor in idle), ", ")
-        rows.append(ListRow("none", names, _sized(0.0, idle[0]), "#motors"))
+        rows.append(ListRow("none", names, _sized(0.0, idle[0].unit), "#motors"))
     still = [
-        ListRow("none", name, _sized(each.holding, each), "#rest", (name, 0.0), 1.0, _filled(each.holding / longest))
+        ListRow(
+            "none", name, _sized(each.holding, each.unit), f"#{name}", (name, 0.0), 1.0, _filled(each.holding / longest)
+        )
         for each in order
         if each.holding >= LEAST and (name := holding_name(each.joint))
     ]
-    holding = with_unit(number(worst.holding, 2), worst.unit)
     return Answer(
-        tr("J{joint} needs most: {torque} moving, {holding} holding.", joint=worst.joint, torque=most, holding=holding),
+        headline,
         "",
-        rest,
-        [payload, (power, tr("greatest power of a joint"))],
+        "",
+        [
+            (moving, tr("J{joint} moving", joint=worst.joint)),
+            (holding, tr("J{joint} holding", joint=worst.joint)),
+            payload,
+        ],
         (Group(tr("Greatest torque on the paths"), rows), Group(tr("Holding, in the worst pose"), still)),
         None if limited else Fix(tr("give the motors' peak torques in the robot's file."), "#motors", False),
     )
@@ -180,19 +202,26 @@ def _mark(motor: model.MotorNeed) -> Mark:
 
 def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> ListRow:
     """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    limit = tr("limit {value}", value=_sized(motor.peak_limit, motor)) if motor.peak_limit else ""
-    note = joined([_sized(motor.peak, motor), limit or moment[0]], ", ")
-    full = motor.peak_limit or most or 1.0
-    return ListRow(_mark(motor), f"J{motor.joint}", note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
+    note = _sized(motor.peak, motor.unit)
+    if motor.peak_limit:
+        note = tr("{value} of {limit}", value=number(motor.peak, 3), limit=_sized(motor.peak_limit, motor.unit))
+    name, full = joined([f"J{motor.joint}", moment[0]], ", "), motor.peak_limit or most or 1.0
+    return ListRow(_mark(motor), name, note, f"#{moment[0]}", moment, 1.0, _filled(motor.peak / full))
+
+
+def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
+    """A joint with what it holds in its worst pose, as a bar of the greatest of all joints."""
+    name, note = holding_name(motor.joint), _sized(motor.holding, motor.unit)
+    return ListRow("none", name, note, f"#{name}", (name, 0.0), 1.0, _filled(motor.holding / most))
 
 
 def _filled(share: float) -> list[Part]:
     return [Part(min(1.0, share), 1.0, "rest")]
 
 
-def _sized(value: float, motor: model.MotorNeed) -> str:
+def _sized(value: float, unit: model.Unit) -> str:
     """A torque or force to three digits, of less than ``LEAST`` only that."""
-    return with_unit(number(value, 3) if value >= LEAST else f"< {LEAST}", motor.unit)
+    return with_unit(number(value, 3) if value >= LEAST else f"< {LEAST}", unit)
 
 
 def _links(summary: model.DynamicsSummary) -> list[list[str]]:

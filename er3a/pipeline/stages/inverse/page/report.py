@@ -13,10 +13,10 @@ from er3a.finding import is_one
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.expectations import outcome_word
-from er3a.pipeline.messages.inverse import FREE_AT, NEAREST_RULE
+from er3a.pipeline.messages.inverse import NEAREST_RULE
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
-from er3a.pipeline.messages.say import joined, listed, say, word
+from er3a.pipeline.messages.say import joined, listed, say
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.inverse import model
@@ -29,7 +29,6 @@ from er3a.robots.robot import Robot
 
 NO_BREAK_SPACE = "\u00a0"
 SAME = 1e-6  # deg or mm
-MAX_SELF_MOTIONS = 6
 
 
 def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> None:
@@ -56,10 +55,15 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
 
 
 def _opened(shown: Sequence[model.TargetResult]) -> tuple[str, float]:
-    """A target that is not reached and should be, or else one that the most solutions serve: of these the farthest
-    from axis 1, where they differ most."""
+    """A target that is not reached and should be, or else one that the most solutions serve, none of them chosen for
+    want of one that is not singular: of these the farthest from axis 1, where they differ most."""
     ranks = {
-        each.name: (each.outcome in ("reached", each.expect), -each.within_limits, -np.hypot(*each.xyz_mm[:2]))
+        each.name: (
+            each.outcome in ("reached", each.expect),
+            is_one(each.reason, "nearest_regular") or _singular(each),
+            -each.within_limits,
+            -np.hypot(*each.xyz_mm[:2]),
+        )
         for each in shown
     }
     return min(ranks, key=ranks.__getitem__), 0.0
@@ -88,10 +92,15 @@ def _answer(summary: model.InverseSummary, shown: Sequence[model.TargetResult]) 
         keys,
         (
             Group(tr("No solution to take"), [row for row in rows if row.mark == "fail"]),
-            Group(tr("Reached"), [row for row in rows if row.mark == "pass"]),
+            Group(tr("Reached"), [row for row in rows if row.mark != "fail"]),
         ),
         next((row.fix for row in rows if row.fix), None),
     )
+
+
+def _singular(target: model.TargetResult) -> bool:
+    """Whether nothing but a singular pose serves a target."""
+    return any(is_one(each, "at_singularity") for each in target.advice)
 
 
 def _row(target: model.TargetResult) -> ListRow:
@@ -101,9 +110,11 @@ def _row(target: model.TargetResult) -> ListRow:
         if target.outcome == "reached"
         else outcome_word(target.outcome)
     )
-    mark: Literal["pass", "fail"] = "pass" if target.outcome == "reached" else "fail"
+    mark: Literal["pass", "caution", "fail"] = "fail"
+    if target.outcome == "reached":
+        mark = "caution" if _singular(target) else "pass"
     parts = (
-        [Part(target.within_limits / target.solutions, 1.0, "rest" if mark == "pass" else "fail")]
+        [Part(target.within_limits / target.solutions, 1.0, "fail" if mark == "fail" else "rest")]
         if target.solutions > target.within_limits
         else ()
     )
@@ -130,7 +141,6 @@ def _section(
         advice=listed(target.advice),
         joints=[f"J{k + 1} ({'mm' if slides else '°'})>" for k, slides in enumerate(robot.slides)],
         method="" if is_one(target.method, "closed_form") else say(target.method),
-        families=_self_motions(robot, target.families),
         unsolved=joined(listed(target.unsolved)),
         rows=cells,
         listed=_solutions_listed(robot, target.name, branches, cells),
@@ -143,9 +153,10 @@ def _solutions_listed(
 ) -> list[tuple[str, Markup, Markup, str, list[tuple[Any, ...]]]]:
     """The branches as they are listed by the player: mark, where it shows each, its name, what came of it, and its
     joint values."""
+    singular = np.asarray(branches.singular.any(axis=1))
     return [
         (
-            "fail" if branches.refusal[k] else "caution" if branches.singular[k].any() else "",
+            "fail" if branches.refusal[k] else "caution" if singular[k] else "pass" if branches.rank[k] == 1 else "",
             stretch(target, k, k + SHOWN_S),
             moment(target, k, _on_one_line(branches.label[k], int(branches.branch[k]))),
             cells[k][-1],
@@ -178,27 +189,6 @@ def best_of_branches(rows: model.SolutionRows) -> model.SolutionRows:
     """The best row of each branch of a target, by its place in the ranking, refused ones last."""
     best = rows.take(rows.first_of_branch)
     return best.take(np.lexsort((best.branch, best.rank, best.rank == 0)))
-
-
-def _self_motions(robot: Robot, families: tuple[model.SelfMotion, ...]) -> list[str]:
-    """The nearest self-motions, and how many more there are."""
-    texts = [_self_motion(robot, family) for family in families[:MAX_SELF_MOTIONS]]
-    if len(families) > MAX_SELF_MOTIONS:
-        texts.append(tr("{count} more in summary.json", count=len(families) - MAX_SELF_MOTIONS))
-    return texts
-
-
-def _self_motion(robot: Robot, family: model.SelfMotion) -> str:
-    low, high = (fixed(end, 1) for end in family.range_deg)
-    return tr(
-        "{where}: the arm can move about ({joints}) {units} with the tool at rest, {room}",
-        where=word("self_motion", FREE_AT, family.kind),
-        joints=_listed(family.q0_deg),
-        units=_units(robot),
-        room=tr("for {low} to {high} deg", low=low, high=high)
-        if family.within_limits
-        else tr("but every member leaves the limits"),
-    )
 
 
 def _clearance(target: model.TargetResult) -> str:

@@ -33,7 +33,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, may_run
+from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -72,16 +72,17 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
     bad = {each.name: row_of(each, shown[each.name], 0.0, 1.0, notes[each.name]) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
+    times = [float(shown[each.name].t[-1]) for each in good]
     sound = [
         ListRow(
             "pass",
             each.name,
-            tr("{passed} of {count} motions", passed=each.passed, count=each.motions),
+            _cost(time, each.least_clearance_mm if each.least_clearance_mm is not None else np.inf),
             f"#{each.name}",
             (each.name, 0.0),
-            1.0,
+            length,
         )
-        for each in good
+        for each, time, length in zip(good, times, lengths(times))
     ]
     caught = sum(fault.meant for fault in wrong)
     headline, rest = may_run(len(sound), len(summary.programs) - caught, caught, tr("programs"))
@@ -89,6 +90,14 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
     return Answer(headline, rest, "", keys, groups, fix_of(wrong))
+
+
+def _cost(time_s: float, clear_mm: float) -> str:
+    """How long something takes, and how near it comes to anything; infinite where that is not known."""
+    parts = [tr("{time} s", time=fixed(time_s, 2))] if np.isfinite(time_s) else []
+    if 0 <= clear_mm < np.inf:  # else a finding says how deep
+        parts.append(tr("{far} mm clear", far=fixed(clear_mm, 0)))
+    return " · ".join(parts)
 
 
 def _section(results: model.ProgramsResults, program: model.ProgramSummary) -> dict[str, Any]:
@@ -192,9 +201,4 @@ def _listing(
 def _facts(rows: model.Instructions, here: list[int]) -> str:
     """Duration and clearance of the motions of a line."""
     times, clear = rows.duration_s[here], rows.clearance_mm[here]
-    parts = []
-    if np.isfinite(times).any():
-        parts.append(tr("{time} s", time=fixed(float(np.nanmax(times)), 2)))
-    if (least := float(np.fmin.reduce(clear, initial=np.inf))) < np.inf and least >= 0:  # else a finding says how deep
-        parts.append(tr("{far} mm clear", far=fixed(least, 0)))
-    return " · ".join(parts)
+    return _cost(np.fmax.reduce(times, initial=-np.inf), np.fmin.reduce(clear, initial=np.inf))

@@ -14,12 +14,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from er3a.finding import Finding
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import singularity_word
+from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import say
 from er3a.pipeline.stages.trajectory import model
 from er3a.pipeline.viewing import palette
-from er3a.pipeline.viewing.figures import axis_label
+from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -28,34 +31,28 @@ WIDTHS = (3.2, 2.8, 2.4, 2.0, 1.6, 1.2, 1.0, 0.9, 0.8, 0.7)  # so that curves th
 NEAR_LIMIT_DEG = 20.0  # mm of a prismatic joint
 EVENT_STYLES: dict[bool, Literal["-", ":"]] = {True: "-", False: ":"}
 TYPE_COLOURS = {"wrist": palette.JOINTS[4], "elbow": palette.JOINTS[2], "shoulder": palette.JOINTS[3]}
-ROWS = 3, 2  # of axes, on the left and on the right
-LEFT, BOTTOM, TOP = 0.07, 0.07, 0.925
-WIDTH, GAP = 0.41, 0.09  # of a column, and between the two
+ROWS = 4  # of axes, below one another
+LEFT, BOTTOM, TOP, WIDTH = 0.09, 0.06, 0.95, 0.89
 FONT = 9.0
 
 
 def path_picture(
     robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds, alt: str, caption: str
 ) -> Picture:
-    """Joint curves of a path on the left, measures on the right, all over the time of its motion.
+    """Joint curves of a path, below them its distances from singular poses, all over one time.
 
     Parameters
     ----------
     rows : of the path, as many as its curves need
     near : from where on a pose counts as near a singular one
     """
-    figure = Figure(figsize=(13.2, 7.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
-    joints, measures = ([_axes(figure, column, row) for row in range(count)] for column, count in enumerate(ROWS))
-    for column in (joints, measures):
-        for ax in column[:-1]:
-            ax.tick_params(labelbottom=False)
-        column[-1].set_xlabel(axis_label(model.PathChecks, "t_s"), fontsize=FONT)
+    figure = Figure(figsize=(9.6, 8.0), layout="none")  # type: ignore[arg-type]  # the stubs lack it
+    *joints, distances = (_axes(figure, row) for row in range(ROWS))
+    for ax in joints:
+        ax.tick_params(labelbottom=False)
+    distances.set_xlabel(axis_label(rows, "t_s"), fontsize=FONT)
     _joint_curves(joints, robot, path, rows)
-    _distances(measures[0], rows, near)
-    condition = np.where(np.isinf(rows.condition_number), np.nan, rows.condition_number)
-    measures[1].plot(rows.t_s, condition, color=palette.MODEL)
-    _logarithmic(measures[1], 1.0, min(1e6, 2 * np.nanmax(np.append(condition, 50.0))))
-    measures[1].set_ylabel(axis_label(rows, "condition_number"), fontsize=FONT)
+    _distances(distances, rows, near)
     for ax in figure.axes:
         _mark(ax, path)
         ax.set_xlim(rows.t_s[0], rows.t_s[-1])
@@ -63,14 +60,41 @@ def path_picture(
     return Picture(figure, alt, caption, [(ax, path.name) for ax in figure.axes])
 
 
-def _axes(figure: Figure, column: int, row: int) -> Axes:
-    height = (TOP - BOTTOM) / ROWS[column]
-    x, y = LEFT + column * (WIDTH + GAP), BOTTOM + (ROWS[column] - 1 - row) * height
-    ax = figure.add_axes((x, y, WIDTH, height - 0.03))
+def nearness_picture(path: model.PathSummary, rows: model.Clearances, shapes: Finding | None) -> Picture:
+    """How near the arm comes to anything, over the time of its motion, with what it must not come below.
+
+    Parameters
+    ----------
+    rows : of the path
+    shapes : the assumed ones, which may be wrong by their margin; None where none are assumed
+    """
+    figure, ax = new_figure(width=5.2, height=2.3)
+    ax.plot(rows.t_s, rows.clearance_mm, color=palette.MODEL, linewidth=2.2)
+    _mark(ax, path)
+    ax.axhline(0.0, color=palette.TOUCHING, linewidth=1.2)
+    if shapes:
+        margin = shapes.margin_mm
+        text = tr("assumed shapes may be off by {mm:g} mm", mm=margin)
+        ax.axhspan(0.0, margin, color=palette.DOUBTFUL, alpha=0.25, linewidth=0, label=text)
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0.1, handlelength=1.2)
+    caption = ""
+    if least := path.clearance:
+        far, at = fixed(least.least_mm, 1), fixed(least.t_s, 2)
+        ax.plot(least.t_s, least.least_mm, "o", color=palette.INK)
+        caption = tr("Least: {far} mm at {t} s, {pair}.", far=far, t=at, pair=say(least.between))
+    ax.set_xlim(0.0, path.duration_s)
+    ax.set_xlabel(axis_label(rows, "t_s"))
+    ax.set_ylabel(axis_label(rows, "clearance_mm"))
+    return Picture(figure, tr("{path}: how near it comes", path=path.name), caption, [(ax, path.name)])
+
+
+def _axes(figure: Figure, row: int) -> Axes:
+    height = (TOP - BOTTOM) / ROWS
+    ax = figure.add_axes((LEFT, BOTTOM + (ROWS - 1 - row) * height, WIDTH, height - 0.03))
     ax.tick_params(labelsize=FONT, length=2)
     ax.xaxis.set_major_locator(MaxNLocator(5))
     ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.yaxis.set_label_coords(-0.1, 0.5)
+    ax.yaxis.set_label_coords(-0.065, 0.5)
     return ax
 
 

@@ -28,7 +28,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.settings import TrajectorySettings
 from er3a.pipeline.stages.expectations import is_met
 from er3a.pipeline.stages.trajectory import model
-from er3a.pipeline.stages.trajectory.page.path_figures import path_picture
+from er3a.pipeline.stages.trajectory.page.path_figures import nearness_picture, path_picture
 from er3a.pipeline.stages.trajectory.page.played import (
     faults,
     motions,
@@ -69,7 +69,9 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         files = results.programs.take((results.programs.path == path.name) & (i < count and not contradicted))
         links = _programs(path, files, lines, met or {})
         drawn = _figure(robot, path, rows, summary.near) if i < count else None
-        sections.append(_section(path, drawn, links, summary))
+        measured = results.clearance.take(results.clearance.path == path.name)
+        nearness = nearness_picture(path, measured, summary.verdict.shapes) if i < count and len(measured) else None
+        sections.append({**_section(path, drawn, links, summary), "near_over_time": nearness})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(
         study,
@@ -207,8 +209,8 @@ def _repairs(path: model.PathSummary, program: dict[str, Any]) -> bool:
 def _figure(robot: Robot, path: model.PathSummary, rows: model.PathChecks, near: model.NearThresholds) -> Picture:
     text = path_text(path)
     alt = tr(
-        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets, "
-        "condition number. {finding}.",
+        "Panels over time for {path}: joint angles, velocities and accelerations; distances from the singular sets. "
+        "{finding}.",
         path=path.name,
         finding=text,
     )

@@ -13,7 +13,7 @@ from er3a.files.hand_eye_file import HandEyeFile, grey_image
 from er3a.files.vision_file import load_vision
 from er3a.files.yaml_file import load
 from er3a.pipeline.language import N_, own_title, tr, with_unit
-from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed
+from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
 from er3a.pipeline.messages.vision import pose_words
 from er3a.pipeline.player.player import drawing_head, player
@@ -29,6 +29,7 @@ from er3a.pipeline.viewing.page import (
     render_stage,
 )
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+from er3a.robots.robot import Robot
 
 MAX_IMAGES = 9
 WIDEST_PX = 480
@@ -36,16 +37,23 @@ ARROW_PX = 30.0
 
 
 def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> Picture:
-    """Length of each sample's residual, position above, rotation below."""
+    """Length of each sample's residual, position above, rotation below; one that was left out is cut off, and named."""
     sizes = np.linalg.norm(rows.residual_mm, axis=1), np.linalg.norm(rows.residual_deg, axis=1)
     usual = [1.6 * found.camera_mm, 1.6 * found.camera_deg]
     figure, axes = new_figure(2, 1, 5.2, 5.1, sharex=True)
-    for ax, size, mean, label in zip(axes, sizes, usual, (tr("position (mm)"), tr("rotation (deg)"))):
-        number = np.arange(1, len(rows) + 1)
-        ax.bar(number[rows.used], size[rows.used], color=MODEL, label=tr("used"))
-        ax.bar(number[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
+    names = (tr("position (mm)"), tr("rotation (°)"))
+    for ax, size, mean, unit, label in zip(axes, sizes, usual, ("mm", "deg"), names):
+        order = np.arange(1, len(rows) + 1)
+        ax.bar(order[rows.used], size[rows.used], color=MODEL, label=tr("used"))
+        ax.bar(order[~rows.used], size[~rows.used], color=HIGHLIGHT, label=tr("left out"))
         ax.axhline(mean, color=INK, linewidth=1, linestyle="--", label=tr("expected mean"))
-        ax.set_yscale("log")
+        top = 1.3 * max(mean, size[rows.used].max(initial=0.0))
+        for k in np.flatnonzero(size > top):
+            side = "right" if 2 * k > len(rows) else "left"
+            text = tr("{name}, left out: {value}", name=rows.sample[k], value=with_unit(number(size[k], 3), unit))
+            shift = (-8 if side == "right" else 8, -4)
+            ax.annotate(text, (k + 1, top), shift, textcoords="offset points", ha=side, va="top", color=HIGHLIGHT)
+        ax.set_ylim(0.0, top)
         ax.set_ylabel(label)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[1].set_xlabel(tr("sample"))
@@ -128,7 +136,7 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         study,
         stored,
         output,
-        _answer(results),
+        _answer(robot, results),
         found=found,
         poses=_poses(found) if found else [],
         suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
@@ -151,13 +159,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
     )
 
 
-def _answer(results: model.VisionResults) -> Answer:
-    """How many objects can be grasped, and how well the camera's place is known."""
+def _answer(robot: Robot, results: model.VisionResults) -> Answer:
+    """How many objects can be grasped, what that leaves open, and how well the camera's place is known."""
     summary = results.summary
     grasped = [each for each in summary.objects if each.grasp]
     caught = [each for each in summary.objects if not each.grasp and each.outcome == each.expect]
     due, found = len(summary.objects) - len(caught), summary.calibration
-    headline = tr("{count} of {due} graspable.", count=len(grasped), due=due)
+    headline = tr("{count} of {due} reachable.", count=len(grasped), due=due)
     if not summary.objects:
         headline = tr("The camera's place is known.") if found else tr("The camera's place is not known.")
     rest = all_caught(len(caught))
@@ -170,13 +178,17 @@ def _answer(results: model.VisionResults) -> Answer:
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
         Group(tr("Not graspable"), [row for row in shown if row.mark == "fail"]),
-        Group(tr("Graspable"), [row for row in shown if row.mark == "pass"]),
+        Group(tr("Within reach"), [row for row in shown if row.mark == "pass"]),
     ]
     if found and (found.suspects or found.warnings):
         rows = [ListRow("caution", each.sample, tr("left out"), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
-    return Answer(headline, rest, tr("The camera is simulated.") if found and found.simulated else "", keys, groups)
+    wrist = robot.masses.wrist
+    unrated = bool(summary.objects) and (wrist is None or not np.isfinite(wrist.payload))
+    below = [tr("Payload unknown.")] if unrated else []
+    below += [tr("The camera is simulated.")] if found and found.simulated else []
+    return Answer(headline, rest, joined(below, " "), keys, groups)
 
 
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
