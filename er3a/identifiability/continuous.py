@@ -70,26 +70,13 @@ def same_robots(table: Tables) -> Tables:
 
     Returns
     -------
-    rows : a batch, itself first; of arms with more than eight joints the first ``MAX_ROWS`` of them
+    rows : a batch, itself first; once there are ``MAX_ROWS``, as of arms with more than eight joints, further axes
+        are turned alone
     """
     found = table
     for turn in _turns(table):
-        found = join([found, turn(found)]) if len(found) < MAX_ROWS else found
+        found = join([found, turn(found if len(found) < MAX_ROWS else table)])
     return found
-
-
-def turned_once(table: Tables) -> Tables:
-    """Rows of the same robot with one axis turned round in each.
-
-    Parameters
-    ----------
-    table : a batch
-
-    Returns
-    -------
-    rows : a batch, the given ones first
-    """
-    return join([table, *(turn(table) for turn in _turns(table))])
 
 
 def _turns(table: Tables) -> list[Callable[[Tables], Tables]]:

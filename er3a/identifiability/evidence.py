@@ -13,15 +13,15 @@ import numpy as np
 from er3a.comparison.entries import Entry, shifted, wrapped_between
 from er3a.diagnosis.defined_otherwise import described_by
 from er3a.diagnosis.ranking import usable
-from er3a.identifiability.alternatives import Alternative, alternatives_to, flips_of, gauge_flips, with_readings
-from er3a.identifiability.continuous import Extent, Extents, turned_once
-from er3a.identifiability.entries import column_of, continuous_of, document_of, entries_of, gauge_of
+from er3a.identifiability.alternatives import Alternative, alternatives_to, as_written, with_readings
+from er3a.identifiability.continuous import Extent, Extents, same_robots
+from er3a.identifiability.entries import continuous_of, document_of, entries_of, gauge_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, OtherTable, Status, Tolerance
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import LimitExcess, OfJoint, value_at
 from er3a.references.reference import Documents, Reference, conflicts
@@ -30,7 +30,8 @@ from er3a.robots.robot import Robot
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9  # in an entry's unit
-OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
+OF_SIGNS = ("direction", "offset", "alpha", "a", "d", "beta")
+MAX_REWRITTEN = 3  # entries that differ in other rows of the same robot, for these to be told
 LIMITS = ("lower", "upper", "speed")
 CORRECTED = 1e-6  # in an entry's unit, from which on a corrected value is another one
 WIDEST = 720.0
@@ -228,13 +229,13 @@ class _Judge:
         self.robot, self.documents, self.tolerance = robot, documents, tolerance
         self.references = [reference for reference in references if reference.expected is not None]
         self.table, self.entries, self.free = tables_of(robot), entries_of(robot), continuous_of(robot)
+        self.turning = [each for column in OF_SIGNS for each in self.entries if each.column == column]
         self.reacts = reactions(robot, self.references, self.entries)
         self.tool, self.gauge = ToolRange(robot, self.table), gauge_of(robot, self.free)
         self.every = tuple(range(len(self.references)))
         self.trusted = tuple(i for i in self.every if self.references[i].is_authoritative) or self.every
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
         self.conflicts = conflicts(self.references)
-        self.same = gauge_flips(self.tool, flips_of(robot, []))
         self._views: dict[tuple[int, ...], _View] = {}
         self._readings: dict[Alternative, OtherReading] = {}
 
@@ -390,11 +391,7 @@ class _Judge:
         self, entry: Entry, status: Status, extent: Extent, concerned: list[Alternative], relevant: Sequence[int]
     ) -> EntryEvidence:
         readings = [self._reading(each) for each in concerned]
-        readings += [
-            OtherReading(tuple((name, self._flipped(name)) for name in names), NOT_OFF)
-            for names in self.same
-            if entry.name in names
-        ]
+        readings += [each for each in self._same if entry.name in dict(each.entries)]
         if entry in self.free:
             readings += [self._shift(row) for row in self.gauge.directions if row[self.free.index(entry)]]
         off = reduce(ToolOff.worse, (each.off for each in concerned), extent.off)
@@ -416,10 +413,34 @@ class _Judge:
         return "settled_up_to_signs" if view.alternatives and self._rewritten & set(names) else "settled"
 
     @cached_property
+    def _otherwise(self) -> tuple[Tables, Flags]:
+        """All ways to write the robot's rows (H), and which of the k entries ``turning`` differ there, (H, k)."""
+        rows = same_robots(self.table)
+        return rows, np.array([np.abs(wrapped_between(rows, self.table, each)) > ROUNDING for each in self.turning]).T
+
+    @cached_property
     def _rewritten(self) -> set[str]:
         """Entries that have another sign or half turn in other rows of the same robot."""
-        every, turning = turned_once(self.table), [each for each in self.entries if each.column in OF_SIGNS]
-        return {each.name for each in turning if np.abs(wrapped_between(every, self.table, each)).max() > ROUNDING}
+        return {each.name for each, differs in zip(self.turning, self._otherwise[1].T) if differs.any()}
+
+    @cached_property
+    def _same(self) -> list[OtherReading]:
+        """Few entries written otherwise so that it is the same robot, without those that contain others."""
+        rows, differ = self._otherwise
+        count, kept = differ.sum(axis=1), list[int]()
+        for k in np.argsort(count, kind="stable").tolist():
+            if 0 < count[k] <= MAX_REWRITTEN and not any((differ[j] <= differ[k]).all() for j in kept):
+                kept.append(k)
+        return [
+            OtherReading(tuple(self._value_in(rows[[k]], n) for n in np.flatnonzero(differ[k]).tolist()), NOT_OFF)
+            for k in kept
+        ]
+
+    def _value_in(self, rows: Tables, place: int) -> tuple[str, float]:
+        """Name and value of one of ``turning`` in a batch of one, in its unit."""
+        entry = self.turning[place]
+        value = entry.of(rows) if entry.unit != "deg" else as_written(entry.of(rows))
+        return entry.name, float(value[0] * entry.in_unit)
 
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
@@ -471,12 +492,6 @@ class _Judge:
     @cached_property
     def _asked_by_all(self) -> Asked:
         return Asked(self.robot, requirements_of(self.references))
-
-    def _flipped(self, name: str) -> float:
-        value = self.values.get(name, 0.0)
-        if column_of(name) in ("offset", "alpha"):
-            return value + 180.0 if value <= 0 else value - 180.0
-        return -value
 
     def _shift(self, row: Reals) -> OtherReading:
         """A combination that moves no tool, with a step of 5 units for its first entry."""
