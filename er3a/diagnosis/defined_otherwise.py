@@ -29,7 +29,7 @@ from er3a.comparison.mechanism import (
     mechanism_of,
     turn_of,
 )
-from er3a.diagnosis.faults import SIDES, Fault, Faults, limit_stated, rounded, wrong_number
+from er3a.diagnosis.faults import Fault, Faults, limit_repairs, rounded, wrong_number
 from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.finding import fact
 from er3a.geometry.transforms import exp_rotation, posed, translation
@@ -233,16 +233,12 @@ def _fitted_to(
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
     """What was found, with limits as they are stated, or as wide as poses that are shown; those that the robot's file
     gives otherwise are faults."""
-    lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
-    for joint, side in itertools.product(np.flatnonzero(~given.slides).tolist(), SIDES):
-        ends = lower if side == "lower" else upper
-        own = math.degrees(ends[joint])
-        stated = limit_stated(joint, side, own, references)
-        if stated is not None:
-            ends[joint] = math.radians(stated)
-            if given.states("limits"):
-                faults.append(fact("wrong_limit", joint=joint + 1, side=side, given_deg=own, fits_deg=stated))
-    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper))
+    table = tables_of(found.corrected)
+    repairs = limit_repairs(table, references)
+    for repair in repairs:
+        table = repair.apply(table)
+    faults = [repair.fault for repair in repairs] if given.states("limits") else []
+    return Conventions((*found.faults, *faults), robot_of(table, 0, found.corrected))
 
 
 def _gross(found: EntryDifference) -> bool:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from er3a.comparison.entries import LENGTHS, Entry, shifted
 from er3a.kinematics.table_batch import Tables
@@ -389,13 +390,7 @@ def _lowest(heights: Reals, cyclic: Sequence[bool], count: int) -> Integers:
     each grid."""
     is_low = np.ones(heights.shape, dtype=bool)
     for axis, around in enumerate(cyclic, start=1):
-        for shift in (1, -1):
-            neighbour = np.roll(heights, shift, axis=axis)
-            if not around:
-                edge = [slice(None)] * heights.ndim
-                edge[axis] = slice(0, 1) if shift == 1 else slice(-1, None)
-                neighbour[tuple(edge)] = np.inf
-            is_low &= heights <= neighbour
+        is_low &= heights <= minimum_filter1d(heights, 3, axis, mode="wrap" if around else "nearest")
     flat = np.where(is_low, heights, np.inf).reshape(len(heights), -1)
     order = np.argsort(flat, axis=1, kind="stable")[:, :count]
     kept = np.isfinite(np.take_along_axis(flat, order, axis=1))
