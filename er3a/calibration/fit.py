@@ -317,25 +317,22 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
     C = found.covariance
-    order = np.argsort(pose_of, kind="stable")
-    starts, counts = np.unique(pose_of[order], return_index=True, return_counts=True)[1:]
-    sizes, pulls, pushes = [], [], []
-    for count in np.unique(counts):
-        rows = order[starts[counts == count][:, None] + np.arange(count)]
-        J = found.J[rows]  # (poses, count, k + c)
-        size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
-        weight = (axes / np.sqrt(np.maximum(size, MIN_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        pushes.append((J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0])
+    sizes, pulls, pushes = list[Reals](), list[Reals](), list[Reals]()
+    for pose in np.unique(pose_of):
+        J, rest = found.J[pose_of == pose], found.rest[pose_of == pose]
+        size, axes = np.linalg.eigh(np.eye(len(J)) - J @ C @ J.T)
+        weight = axes / np.sqrt(np.maximum(size, MIN_OWN)) @ axes.T
+        pushes.append(J.T @ weight @ rest)
         shares = weight @ J @ C
-        sizes.append((shares**2).sum(axis=1))
-        pulls.append(J.swapaxes(1, 2) @ shares)
-    own, pull = np.concatenate(sizes), np.concatenate(pulls)  # (P, k + c), (P, k + c, k + c)
+        sizes.append((shares**2).sum(axis=0))
+        pulls.append(J.T @ shares)
+    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
     drawn = np.einsum("pik,pik->pk", pull, C @ pull)
     by_number = pull.transpose(2, 1, 0)
     both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
-    errors = np.concatenate(pushes) @ C  # squares: no rounding makes a variance negative
+    errors = np.array(pushes) @ C  # squares: no rounding makes a variance negative
     return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 

@@ -28,6 +28,7 @@ LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 RICH_POSES, FEW = 64, 6  # joint vectors all over the range; places and planes that are looked at there
+OF_POINTS = "row_values", "on_tool", "seen", "lines", "touched", "orientations"  # arrays by point
 IN_LINE = 1e-9  # m, of points that no plane is seen from
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
@@ -383,18 +384,9 @@ class PointObservations:
         -------
         observations : in the same order
         """
-        own = used[self.pose_of]
-        return replace(
-            self,
-            row_values=self.row_values[used],
-            on_tool=self.on_tool[used],
-            seen=self.seen[used],
-            values_mm=self.values_mm[own],
-            deviation_mm=self.deviation_mm[own],
-            lines=self.lines[used],
-            touched=self.touched[used],
-            orientations=self.orientations[used],
-        )
+        of_points = {name: getattr(self, name)[used] for name in OF_POINTS}
+        of_values = {name: getattr(self, name)[used[self.pose_of]] for name in ("values_mm", "deviation_mm")}
+        return replace(self, **of_points, **of_values)
 
     @property
     def same_pose(self) -> Integers:

@@ -63,8 +63,8 @@ class Diagnosis(list[Hypothesis], Displayed):
     def __init__(self, conclusion: Finding, references: int, tried: int, hypotheses: Sequence[Hypothesis] = ()):
         super().__init__(hypotheses)
         self.conclusion, self.references, self.tried = conclusion, references, tried
-        self.not_examined: Sequence[str] = ()
-        self.missed: Sequence[Reference] = ()
+        self.not_examined: tuple[str, ...] = ()
+        self.missed: tuple[Reference, ...] = ()
 
     __repr__ = Displayed.__repr__
 

@@ -4,12 +4,12 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.compare import shift_between, turn_between
+from er3a.comparison.compare import shift_between, turn_between, worst_pose
 from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.diagnosis.faults import SIDES, entry_of
 from er3a.diagnosis.ranking import usable
@@ -20,7 +20,6 @@ from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.kinematics.table_batch import Tables, frames_of, join, tables_of
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import box_points, peak
 from er3a.numerics.quasi_random import quasi_random_points
 from er3a.references.quantities import MM, Extreme
 from er3a.references.reference import Documents, Reference, ReferenceSet, conflicts
@@ -44,13 +43,13 @@ def diagnose(robot: Robot, references: Sequence[Reference]) -> Diagnosis:
     found = diagnosis_of(robot, references)
     moving = [entry for entry in entries_of(robot) if entry.column not in (*SIDES, "speed")]
     reacts = reactions(robot, usable(references), moving)
-    found.not_examined = [entry.name for k, entry in enumerate(moving) if not reacts[:, k].any()]
+    found.not_examined = tuple(entry.name for k, entry in enumerate(moving) if not reacts[:, k].any())
     extremes = [each for each in references if isinstance(each.quantity, Extreme)]
     extremes = [each for each in extremes if each.is_authoritative] or extremes
     asked = Asked(robot, requirements_of(extremes))
     if len(asked) and (robot.lower <= robot.upper).all():
         off = asked.violation(asked.off(tables_of(robot)))
-        found.missed = [extremes[i] for each, by in zip(asked.order, off) if by > MET for i in each.references]
+        found.missed = tuple(extremes[i] for each, by in zip(asked.order, off) if by > MET for i in each.references)
     return found
 
 
@@ -229,7 +228,6 @@ class ToolRange:
     def __init__(self, robot: Robot, table: Tables):
         self.robot, self.table = robot, table
         self.lower, self.upper = np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper)
-        self.points = box_points(self.lower, self.upper)
 
     def off(self, other: Tables) -> ToolOff:
         """How far the tool of another table is off at most over the joint ranges.
@@ -244,10 +242,12 @@ class ToolRange:
         """
         both = join([self.table, other])
 
-        def most(off: Callable[[Reals, Reals], Reals]) -> float:
-            return peak(lambda q: off(*self._tool(both, q)), self.lower, self.upper, self.points)[1]
+        def tools(q: Reals) -> tuple[Reals, Reals]:
+            one, there = self._tool(both, q)
+            return one, there
 
-        return ToolOff(MM * most(shift_between), float(np.degrees(most(turn_between))))
+        mm, rad = (worst_pose(off, tools, self.robot)[0] for off in (shift_between, turn_between))
+        return ToolOff(MM * mm, float(np.degrees(rad)))
 
     def signature(self, tables: Tables) -> Reals:
         """Numbers that are equal for tables whose tools move alike.
