@@ -207,25 +207,12 @@ class Extents:
             nearest_rows(self.region.tables(direction[None], amounts[None]), self.region, self.watched)
         )
 
-    def of(self, entry: Entry) -> Extent:
-        """The interval of an entry, the others free.
-
-        Parameters
-        ----------
-        entry : one of ``entries``
-
-        Returns
-        -------
-        extent : in the entry's unit
-        """
-        return self.along(np.eye(len(self.entries))[self.entries.index(entry)])
-
     def along(self, factors: Reals) -> Extent:
         """The interval of a combination of entries, the others free.
 
         Parameters
         ----------
-        factors : (k,), of the entries' steps; one at least is not 0
+        factors : (k,), of the entries' steps; one at least is not 0, and of an entry alone it is 1
 
         Returns
         -------

@@ -256,7 +256,7 @@ class _Judge:
         evidence : values in the entries' units
         """
         judged = [self._judged(entry) for entry in self.entries if only is None or entry.name in only]
-        sums = [self._combination(row) for row in self.gauge.determined]
+        sums = [self._number(row) for row in self.gauge.determined]
         trusted = self.view(self.trusted)
         views = list(dict.fromkeys(self._views.values()))
         unmet = {name for each in views if not each.extents.met for name in self._documents(each.own)}
@@ -300,14 +300,13 @@ class _Judge:
         return self._views[own]
 
     def _judged(self, entry: Entry) -> EntryEvidence:
+        if entry in self.free:
+            return self._number(np.eye(len(self.free))[self.free.index(entry)])
         own = self._independent(document_of(self.robot, entry))
         relevant = self.relevant(entry, own)
         if entry.column in LIMITS:
             return self._bound(entry, relevant)
-        view = self.view(own)
-        if entry.column == "direction":
-            return self._direction(entry, own, relevant, view)
-        return self._number(entry, relevant, view)
+        return self._direction(entry, own, relevant, self.view(own))
 
     def _independent(self, document: str) -> tuple[int, ...]:
         """Trusted references of documents that are independent of one; of those that contradict another which the table
@@ -345,22 +344,37 @@ class _Judge:
     def _documents(self, places: Sequence[int]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.references[i].document for i in places))
 
-    def _number(self, entry: Entry, relevant: tuple[int, ...], view: _View) -> EntryEvidence:
-        gauge = bool(self.gauge.support()[self.free.index(entry)])
-        extent = view.extents.free_choice(entry) if gauge else view.extents.of(entry)
-        concerned = [each for each in view.alternatives if entry.name in each.names]
-        open_anyway = entry.name in self.view(self.trusted).open_names
+    def _number(self, row: Reals) -> EntryEvidence:
+        """Of an entry that can take any value, or of what is determined together of several that are gauge, by their
+        factors (k,)."""
+        factors = [(entry, float(f)) for entry, f in zip(self.free, row) if f]
+        first, names, alone = factors[0][0], [entry.name for entry, _ in factors], len(factors) == 1
+        own = self._independent(document_of(self.robot, first))
+        view = self.view(own)
+        gauge = alone and bool(self.gauge.support()[self.free.index(first)])
+        extent = view.extents.free_choice(first) if gauge else view.extents.along(row)
+        relevant, every = (
+            sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
+        )
+        concerned = [each for each in view.alternatives if alone and first.name in each.names]
+        open_anyway = alone and first.name in self.view(self.trusted).open_names
         status: Status = "weak"
         if gauge:
             status = "gauge"
         elif not relevant:
-            consistent = self.relevant(entry, self.every)
-            status = "consistent" if consistent and not open_anyway else "open"
+            status = "consistent" if every and not open_anyway else "open"
         elif open_anyway:
             status = "open"
         elif not concerned and view.extents.met and self._small(extent):
-            status = self._settled(view, [entry.name])
-        return self._described(entry, status, extent, concerned, relevant)
+            status = self._settled(view, names)
+        if alone:
+            return self._described(first, status, extent, concerned, relevant)
+        return replace(
+            self._described(first, status, extent, [], relevant or every),
+            entry=_sum_of(factors),
+            value=sum(f * self.values[entry.name] for entry, f in factors),
+            alternatives=(),
+        )
 
     def _direction(self, entry: Entry, own: tuple[int, ...], relevant: tuple[int, ...], view: _View) -> EntryEvidence:
         concerned = [each for each in view.alternatives if entry.name in each.names]
@@ -445,35 +459,6 @@ class _Judge:
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
         return not extent.at_least and extent.off.within(self.tolerance.mm, self.tolerance.deg)
-
-    def _combination(self, row: Reals) -> EntryEvidence:
-        """What of entries that are gauge is determined together."""
-        factors = [(entry, float(f)) for entry, f in zip(self.free, row) if f]
-        first = factors[0][0]
-        document = document_of(self.robot, first)
-        own = self._independent(document)
-        view = self.view(own)
-        extent = view.extents.along(row)
-        relevant, every = (
-            sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
-        )
-        status: Status = "weak"
-        if not relevant:
-            status = "consistent" if every else "open"
-        elif view.extents.met and self._small(extent):
-            status = self._settled(view, [entry.name for entry, _ in factors])
-        return EntryEvidence(
-            entry=_sum_of(factors),
-            value=sum(f * self.values[entry.name] for entry, f in factors),
-            unit=first.unit,
-            status=status,
-            interval=extent.interval,
-            by=self._documents(relevant or every),
-            alternatives=(),
-            document=document,
-            off=NOT_OFF if status in OUTRIGHT_OR_NOT else extent.off,
-            at_least=extent.at_least and status == "weak",
-        )
 
     def _given(self) -> list[EntryEvidence]:
         found = []
