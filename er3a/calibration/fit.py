@@ -185,26 +185,18 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
-    off = observations.predict(robot) - observations.values_mm
-    known = np.linalg.norm(observations.slid(robot))
-    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
+    seen = observations.predict(robot)
+    held = observations.shifted(np.where(robot.sliding, -observations.row_values, 0.0)).predict(robot)
+    known, off = float(np.linalg.norm(seen - held)), float(np.linalg.norm(seen - observations.values_mm))
+    min_known = max(CLEAR * off, DEPENDENT * abs(longest.value(robot)) * len(seen) ** 0.5)
     return longest if known < min_known else None
 
 
 def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObservations) -> list[Entry]:
     """Lengths in whose place others move the points alike: such a one may stay as it is while all shrink to a point."""
-    every = [*observations.placements, *parameters_of(robot, "all_entries")]
-    J = jacobian(robot, every, observations.as_coordinates())
-    sizes = np.linalg.norm(J, axis=0)
-    J /= np.maximum(sizes, 1e-300)
-    found = []
-    for entry in lengths:
-        k = every.index(entry)
-        own, others = J[:, k], np.delete(J, k, axis=1)
-        rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
-        if np.linalg.norm(rest) <= DEPENDENT:
-            found.append(entry)
-    return found
+    every, seen = [*observations.placements, *parameters_of(robot, "all_entries")], observations.as_coordinates()
+    ordered = ([*(each for each in every if each != entry), entry] for entry in lengths)
+    return [order[-1] for order in ordered if order[-1] not in subspace(robot, order, seen).kept]
 
 
 def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Entry, ...]:

@@ -13,7 +13,6 @@ References
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -332,25 +331,18 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
     -------
     fits : up to ``grid.basins`` for each start table and combination
     """
-    reach, starts = arm_lengths(search.starts), len(search.starts)
-    amounts, which, sizes = list[Reals](), list[Integers](), list[tuple[int, ...]]()
+    reach, rows, found = arm_lengths(search.starts), np.arange(len(search.starts)), list[Fits]()
     for combination in combinations:
         numbers = [search.numbers[place] for place in combination]
         values = [grid_of(number, grid) for number in numbers]
-        scales = np.stack([reach if number.column in LENGTHS else np.ones(starts) for number in numbers], axis=1)
         points = np.array(list(product(*values)))
-        amounts.append((points * scales[:, None, :]).reshape(-1, len(combination)))
-        which.append(np.tile(np.array(combination), (starts * len(points), 1)))
-        sizes.append(tuple(len(each) for each in values))
-    start = np.concatenate([np.repeat(np.arange(starts), len(each) // starts) for each in amounts])
-    tried = search.at(start, np.concatenate(which), np.concatenate(amounts))
-    rows, before, squares = list[Integers](), 0, tried.squares
-    for combination, size in zip(combinations, sizes):
-        count = starts * math.prod(size)
-        cyclic = [search.numbers[place].column in ANGLES for place in combination]
-        rows.append(before + _lowest(squares[before : before + count].reshape(starts, *size), cyclic, grid.basins))
-        before += count
-    return tried[np.concatenate(rows)]
+        scales = np.stack([reach if number.column in LENGTHS else np.ones(len(reach)) for number in numbers], axis=1)
+        amounts = (points * scales[:, None]).reshape(-1, len(numbers))
+        tried = search.at(np.repeat(rows, len(points)), np.tile(combination, (len(amounts), 1)), amounts)
+        heights = tried.squares.reshape(-1, *(len(each) for each in values))
+        found.append(tried[_lowest(heights, [number.column in ANGLES for number in numbers], grid.basins)])
+    parts = zip(*((each.start, each.which, each.amounts, each.left) for each in found))
+    return Fits(*(np.concatenate(part) for part in parts))
 
 
 def grid_of(number: Entry, grid: ScanGrid) -> Reals:

@@ -300,12 +300,12 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
     case : its difference predicts each distinct quantity once
     """
     expected, _ = expected_of(stated)
-    measured = [(type(each), tuple(vars(each).values())) for each in quantities_of(stated)]
-    first = {key: each for key, each in reversed(list(zip(measured, quantities_of(stated))))}
-    column = np.array([list(first).index(key) for key in measured], dtype=np.int64)
+    asked = quantities_of(stated)
+    distinct = {repr(each): each for each in asked}
+    column = np.array([list(distinct).index(repr(each)) for each in asked], dtype=np.int64)
 
     def difference(tables: Tables) -> Reals:
-        return predict_tables(tables, robot, list(first.values()))[:, column] - expected
+        return predict_tables(tables, robot, list(distinct.values()))[:, column] - expected
 
     few = _spread(stated)
     return Case(tables_of(robot), stated, difference, case_of(robot, few) if len(few) < len(stated) else None)

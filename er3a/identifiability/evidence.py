@@ -352,7 +352,7 @@ class _Judge:
         own = self._independent(document_of(self.robot, first))
         view = self.view(own)
         gauge = alone and bool(self.gauge.support()[self.free.index(first)])
-        extent = view.extents.free_choice(first) if gauge else view.extents.along(row)
+        extent = view.extents.along(row, moves_tool=not gauge)
         relevant, every = (
             sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
         )
