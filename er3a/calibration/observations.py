@@ -535,15 +535,10 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
         are measured, of joints that take all points in one plane
     """
     check_poses(measurements, robot)
-    xyz = np.array([each.xyz_mm for each in measurements], dtype=float).reshape(-1, 3)
     names = [each.touched for each in measurements]
     numbers = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
     touched = np.array([numbers[name] if name else -1 for name in names], dtype=np.int64)
-    for k, each in enumerate(measurements):
-        if each.touched:
-            xyz[k] = 0.0 if each.place else (0.0, np.nan, np.nan)
-    turned = np.array([each.turn is not None for each in measurements], dtype=bool)
-    values = np.hstack([xyz, np.where(turned[:, None], np.zeros((1, 3)), np.nan)])
+    values = np.array([_values(each) for each in measurements], dtype=float).reshape(-1, 6)
     seen = np.isfinite(values)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
@@ -571,6 +566,12 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
         )
         raise InputError(None, "measurements", problem, "Move more joints, or measure coordinates")
     return found
+
+
+def _values(seen: Measurement) -> tuple[float | None, ...]:
+    """What is observed: three coordinates, in mm, 0 of what was touched, and the turn from the measured orientation."""
+    xyz = (0.0, 0.0, 0.0) if seen.place else (0.0, None, None) if seen.plane else seen.xyz_mm
+    return (*xyz, *(None if seen.turn is None else 0.0 for _ in COORDINATES))
 
 
 def _is_flat(robot: Robot, points: PointObservations) -> bool:

@@ -118,7 +118,7 @@ def counted_from_ground(
     if limits_besides and not any(r.quantity.depends_on_table for r in references):
         return []
     axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
-    quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
+    off = _misfit_of(references)
     for joint in range(1, robot.joints):
         parallel = [k for k in range(joint) if abs(axes[k] @ axes[joint]) > PARALLEL]
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
@@ -126,10 +126,15 @@ def counted_from_ground(
                 fault = fact("counted_from_ground", joint=joint + 1, along=tuple(k + 1 for k in along), sign=sign)
                 own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends))
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
-                off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
-                if np.abs(off).max() <= MEETS:
+                if np.abs(off(own.corrected)).max() <= MEETS:
                     found.setdefault(fault, own)
     return list(found.values())
+
+
+def _misfit_of(references: Sequence[Reference]) -> Misfit:
+    """How far (n,) an arm is off references, in half-widths."""
+    quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
+    return lambda arm: (predict_tables(tables_of(arm), arm, quantities)[0] - expected) / uncertainty
 
 
 def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal[1, -1], ends: bool) -> Robot:
@@ -206,13 +211,7 @@ def _fitted_to(
 ) -> Conventions | None:
     """The start that comes nearest to what is stated, of nearly equal ones that with the fewest directions reversed,
     fitted; None if something is missed then."""
-    quantities, (expected, uncertainty) = quantities_of(stated), expected_of(stated)
-
-    def off(arm: Robot) -> Reals:
-        difference = predict_tables(tables_of(arm), arm, quantities)[0] - expected
-        return np.asarray(difference / uncertainty)
-
-    tried = []
+    off, tried = _misfit_of(stated), []
     for start in starts:
         arm = _with_flange(start, stated)
         reversed_count = int((arm.direction != robot.direction).sum())
@@ -303,16 +302,15 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
     own = [r for r in stated if isinstance(r.quantity, PointCoordinate) and r.quantity.point == "flange"]
     if not own:
         return robot
-    expected, uncertainty = expected_of(own)
+    off = _misfit_of(own)
 
-    def at(shift: Reals) -> Reals:
-        arm = robot.replace(flange=robot.flange @ translation(*shift))
-        return np.asarray((predict_tables(tables_of(arm), arm, quantities_of(own))[0] - expected) / uncertainty)
+    def moved(shift: Reals) -> Robot:
+        return robot.replace(flange=robot.flange @ translation(*shift))
 
-    here = at(np.zeros(3))
-    slopes = np.stack([at(row) - here for row in np.eye(3)], axis=1)
-    shift = -np.linalg.lstsq(slopes, here, rcond=1e-9)[0]
-    return robot.replace(flange=robot.flange @ translation(*shift))
+    def model(shifts: Reals, _: Integers) -> Reals:
+        return np.array([off(moved(shift)) for shift in shifts])
+
+    return moved(lowered(model, np.zeros((1, 3)), passes=ROUNDS)[0][0])
 
 
 def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:
