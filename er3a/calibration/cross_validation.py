@@ -345,7 +345,9 @@ class _RippleSearch:
         self._terms = [
             [JointTerm("ripple", int(row) + 1, turns) for turns in RIPPLES] for row in np.flatnonzero(~here.sliding)
         ]
-        self._columns = [rows @ term_jacobian(here, here, terms, observations) for terms in self._terms]
+        self._columns = [(rows @ term_jacobian(here, here, terms, observations)).T for terms in self._terms]
+        pairs = (columns.reshape(len(RIPPLES), 2, -1) for columns in self._columns)
+        self._grams = [own @ own.swapaxes(1, 2) + DEPENDENT * (own**2).sum() / len(own) * np.eye(2) for own in pairs]
 
     def best(self, J: Reals, rest: Reals) -> list[JointTerm]:
         """The ripple of each turning joint that explains most of what is left.
@@ -360,11 +362,11 @@ class _RippleSearch:
         terms : one for each turning joint
         """
         span, found = np.linalg.qr(J)[0], []
-        left = rest - span @ (span.T @ rest)
-        for terms, columns in zip(self._terms, self._columns):
-            own = (columns - span @ (span.T @ columns)).T.reshape(len(terms), 2, -1)
-            size = DEPENDENT * (columns**2).sum() / len(terms)
-            gram, aim = own @ own.swapaxes(1, 2) + size * np.eye(2), own @ left
+        beside = np.column_stack([rest - span @ (span.T @ rest), span])
+        for terms, columns, own in zip(self._terms, self._columns, self._grams):
+            along = (columns @ beside).reshape(len(terms), 2, -1)
+            aim, taken = along[..., 0], along[..., 1:]
+            gram = own - taken @ taken.swapaxes(1, 2)
             explained = np.einsum("tk,tk->t", aim, np.linalg.solve(gram, aim[..., None])[..., 0])
             found.append(terms[int(explained.argmax())])
         return found

@@ -20,7 +20,7 @@ from itertools import product
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from er3a.comparison.entries import LENGTHS, Entry, shifted
+from er3a.comparison.entries import LENGTHS, Entry, entries_in, shifted
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
 
@@ -39,7 +39,7 @@ def free_numbers(joints: int) -> tuple[Entry, ...]:
     -------
     entries : the scale, then each column from row 1 on
     """
-    return (Entry("scale"), *(Entry(column, joint) for column in COLUMNS for joint in range(1, joints + 1)))
+    return (Entry("scale"), *entries_in(COLUMNS, joints))
 
 
 def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Reals) -> Tables:
