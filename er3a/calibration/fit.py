@@ -395,26 +395,24 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
 
 def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
     """S (4, 4) and t (3,) of :func:`rough_places`, each left where it is if it is not free."""
-    S: Reals = np.eye(4)
-    t: Reals = np.zeros(3)
-    if "base" not in free:
-        if "tool" in free:
-            t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0].astype(float)
-        return S, t
-    S = aligned(x, m)[0]
-    if "tool" not in free:
-        return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
-    rows = np.concatenate([np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9), -eye, -R], axis=2).reshape(-1, 15)
-    inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
+    starts, columns = [np.eye(3)], R
+    if "base" in free:
+        starts, columns = [aligned(x, m)[0][:3, :3]], np.concatenate([R, eye], axis=2)
+        if "tool" in free:
+            by_place = np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9)
+            rows = np.concatenate([by_place, -eye, -R], axis=2).reshape(-1, 15)
+            inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
+            starts.append(nearest_rotations(inverse.T))
     found = []
-    for turn in (S[:3, :3], nearest_rotations(inverse.T)):
-        S = posed(turn, np.zeros(3))
+    for turn in starts:
+        S, t = posed(turn, np.zeros(3)), np.zeros(3)
         for _ in range(TURNS):
-            back = (m @ S[:3, :3] - x).ravel()
-            both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
-            t = np.linalg.lstsq(both, back, rcond=None)[0][:3].astype(float)
-            S = aligned(x + R @ t, m)[0]
+            if "tool" in free:
+                back = (m @ S[:3, :3] - x).ravel()
+                t = np.linalg.lstsq(columns.reshape(len(back), -1), back, rcond=None)[0][:3].astype(float)
+            if "base" in free:
+                S = aligned(x + R @ t, m)[0]
         found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
     return min(found, key=lambda each: each[0])[1:]
 

@@ -227,32 +227,24 @@ def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:
 
 
 def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: fitting.Fits) -> Pool:
-    """Hypotheses of fitted numbers that change something."""
-    fits = _changing(case, starts, fits)
-    tables = fitting.moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
+    """Hypotheses of fitted numbers that change something, angles within half a turn."""
+    numbers = np.array(case.numbers)[fits.which]
+    is_angle = np.isin([each.column for each in case.numbers], fitting.ANGLES)[fits.which]
+    is_scale = np.array([not each.joint for each in case.numbers])[fits.which]
+    given = np.stack([each.of(starts) for each in case.numbers], axis=1)[fits.start[:, None], fits.which]
+    amounts = np.where(is_angle, wrap_to_pi(given + fits.amounts) - given, fits.amounts)
+    moves = np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED
+    kept = (moves & ~(is_scale & (1 + amounts < MIN_SCALE))).all(axis=1)
+    start, which = fits.start[kept], fits.which[kept]
+    tables = fitting.moved(starts[start], case.numbers, which, amounts[kept])
+    values = np.take_along_axis(np.stack([each.of(tables) for each in case.numbers], axis=1), which, axis=1)
+    best = np.where(is_scale[kept], 1 + amounts[kept], values)
     repaired, cost = _named(chosen)
-    given = np.stack([number.of(starts) for number in case.numbers], axis=1)
-    fitted = np.stack([number.of(tables) for number in case.numbers], axis=1)
-    faults: list[Faults] = []
-    for row, (start, places) in enumerate(zip(fits.start.tolist(), fits.which.tolist())):
-        free = []
-        for k, place in enumerate(places):
-            number, amount = case.numbers[place], float(fits.amounts[row, k])
-            best = float(fitted[row, place]) if number.joint else 1 + amount
-            free.append(wrong_number(number, float(given[start, place]), best))
-        faults.append((*repaired[start], *free))
-    return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
-
-
-def _changing(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
-    """Fits with angles within half a turn, without those that change nothing."""
-    is_angle = np.array([number.column in fitting.ANGLES for number in case.numbers])[fits.which]
-    values = np.stack([number.of(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
-    amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
-    changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
-    is_scale = np.array([not number.joint for number in case.numbers])[fits.which]
-    changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
-    return fitting.Fits(fits.start, fits.which, amounts, fits.left)[changes]
+    faults = [
+        (*repaired[row], *(wrong_number(*number) for number in zip(*found)))
+        for row, *found in zip(start, numbers[kept], given[kept], best)
+    ]
+    return case.pool(tables, faults, cost[start] + FREE_NUMBER * which.shape[1])
 
 
 SHOWN = 10  # groups of hypotheses

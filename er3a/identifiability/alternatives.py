@@ -278,12 +278,7 @@ class _AlternativeSearch:
     def _compose(self, chosen: tuple[int, ...]) -> None:
         if len(self.composed) > MAX_COMPOSED:
             return
-        new = [
-            (*each, *chosen)
-            for each in self.composed
-            if not {name for i in each for name in self.flips[i].entries}
-            & {name for i in chosen for name in self.flips[i].entries}
-        ]
+        new = [(*each, *chosen) for each in self.composed if _apart(self.flips, (*each, *chosen))]
         self.signatures = np.concatenate([self.signatures, _signatures(self.tool, self.table, self.flips, new)])
         self.composed += new
 
