@@ -340,7 +340,7 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Hypotheses in order, gathered into sets that no reference tells apart.
+    """Hypotheses in order, gathered into sets between which no reference decides.
 
     Attributes
     ----------
