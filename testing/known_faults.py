@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from er3a.comparison.entries import Entry
-from er3a.diagnosis.diagnose import missed
 from er3a.diagnosis.faults import SIDES, Fault, Faults, entry_of, repairs_of, wrong_number
 from er3a.diagnosis.fitting import ANGLES, MEETS, moved
 from er3a.diagnosis.ranking import Case, Ranking, case_of, rank_case, usable
 from er3a.finding import fact
 from er3a.kinematics.table_batch import COLUMNS, Tables, robot_of, tables_of
-from er3a.numerics.arrays import Reals
+from er3a.numerics.arrays import Flags, Reals
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import MM, Limit, Quantity, Side
 from er3a.references.reference import Reference, ReferenceSet, expected_of, quantities_of
@@ -179,6 +178,14 @@ def _same(table: Tables, right: Tables) -> bool:
 
 LENGTHS_M = 1e-5 * 1.1 ** np.arange(124)  # up to 1.2 m
 ANGLES_RAD = np.pi / 1.1 ** np.arange(123, -1, -1)  # from 0.0015 deg to half a turn
+
+
+def missed(case: Case, number: Entry, amounts: Reals) -> Flags:
+    """Whether (H,) some reference is missed when amounts (H,), m or rad, are added to an entry."""
+    tables = case.given[np.zeros(len(amounts), dtype=int)]
+    changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
+    found: Flags = np.any(np.abs(case.difference(changed)) > case.uncertainty * MEETS, axis=1)
+    return found
 
 
 def least_noticed(case: Case, number: Entry) -> float | None:

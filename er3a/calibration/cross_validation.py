@@ -32,7 +32,6 @@ from er3a.calibration.terms import (
     JointTerm,
     TermKind,
     candidates,
-    effects,
     places_of,
     term_jacobian,
     wrong_way,
@@ -259,7 +258,7 @@ def choose_terms(
     J, rest = rows @ jacobian(here, kept, observations), rows @ off
     rest = rest / np.sqrt(rest @ rest / (len(rest) - count))
     parts = [part for seed in SEEDS for part in parts_of(observations, seed)]
-    search = _RippleSearch(here, observations) if ripples else None
+    search = _RippleSearch(here, observations, rows) if ripples else None
     taken: dict[JointTerm, TriedTerm] = {}
     dropped: dict[JointTerm, TriedTerm] = {}
     while True:
@@ -335,20 +334,20 @@ class _Trial:
 
 
 class _RippleSearch:
-    """Of each joint's ripples the one that explains most, of coordinates that were measured."""
+    """Of each joint's ripples the one that explains most, of coordinates that were measured.
 
-    def __init__(self, here: Robot, observations: PointObservations):
-        x, rows = observations.row_values, np.flatnonzero(~here.sliding)
-        effect = 1000 * effects(here, x, observations.points(here))[..., rows]
-        self._effect = effect[observations.seen] / observations.deviation_mm[:, None]
-        count = len(observations)
-        self._by_pose = scipy.sparse.csr_array((np.ones(count), (observations.pose_of, np.arange(count))))
-        angle = x[:, rows].T[:, None] * np.array(RIPPLES)[:, None]
-        shapes = np.stack([np.sin(angle), np.cos(angle)], axis=2)
-        squares = (self._by_pose @ self._effect**2).T[:, None, None]
-        self._own = (shapes * squares) @ shapes.swapaxes(2, 3)
-        self._own += DEPENDENT * squares.sum(axis=-1)[..., None] * np.eye(2)
-        self._rows, self._shapes = rows, shapes.reshape(len(rows), -1, len(x))
+    Attributes
+    ----------
+    rows : (n, n), which take observed values to independent ones, in standard deviations
+    """
+
+    def __init__(self, here: Robot, observations: PointObservations, rows: scipy.sparse.csr_array):
+        self._terms = [
+            [JointTerm("ripple", int(row) + 1, turns) for turns in RIPPLES] for row in np.flatnonzero(~here.sliding)
+        ]
+        self._columns = [(rows @ term_jacobian(here, here, terms, observations)).T for terms in self._terms]
+        pairs = (columns.reshape(len(RIPPLES), 2, -1) for columns in self._columns)
+        self._grams = [own @ own.swapaxes(1, 2) + DEPENDENT * (own**2).sum() / len(own) * np.eye(2) for own in pairs]
 
     def best(self, J: Reals, rest: Reals) -> list[JointTerm]:
         """The ripple of each turning joint that explains most of what is left.
@@ -362,12 +361,12 @@ class _RippleSearch:
         -------
         terms : one for each turning joint
         """
-        span = np.linalg.qr(J)[0]
-        beside, found = np.column_stack([rest - span @ (span.T @ rest), span]), []
-        for row, effect, shapes, own in zip(self._rows, self._effect.T, self._shapes, self._own):
-            along = (shapes @ (self._by_pose @ (effect[:, None] * beside))).reshape(len(RIPPLES), 2, -1)
-            left, taken = along[..., 0], along[..., 1:]
+        span, found = np.linalg.qr(J)[0], []
+        beside = np.column_stack([rest - span @ (span.T @ rest), span])
+        for terms, columns, own in zip(self._terms, self._columns, self._grams):
+            along = (columns @ beside).reshape(len(terms), 2, -1)
+            aim, taken = along[..., 0], along[..., 1:]
             gram = own - taken @ taken.swapaxes(1, 2)
-            explained = np.einsum("tk,tk->t", left, np.linalg.solve(gram, left[..., None])[..., 0])
-            found.append(JointTerm("ripple", int(row) + 1, RIPPLES[int(explained.argmax())]))
+            explained = np.einsum("tk,tk->t", aim, np.linalg.solve(gram, aim[..., None])[..., 0])
+            found.append(terms[int(explained.argmax())])
         return found

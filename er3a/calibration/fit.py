@@ -185,26 +185,18 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
-    off = observations.predict(robot) - observations.values_mm
-    known = np.linalg.norm(observations.slid(robot))
-    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
+    seen = observations.predict(robot)
+    held = observations.shifted(np.where(robot.sliding, -observations.row_values, 0.0)).predict(robot)
+    known, off = float(np.linalg.norm(seen - held)), float(np.linalg.norm(seen - observations.values_mm))
+    min_known = max(CLEAR * off, DEPENDENT * abs(longest.value(robot)) * len(seen) ** 0.5)
     return longest if known < min_known else None
 
 
 def _replaceable(robot: Robot, lengths: Sequence[Entry], observations: PointObservations) -> list[Entry]:
     """Lengths in whose place others move the points alike: such a one may stay as it is while all shrink to a point."""
-    every = [*observations.placements, *parameters_of(robot, "all_entries")]
-    J = jacobian(robot, every, observations.as_coordinates())
-    sizes = np.linalg.norm(J, axis=0)
-    J /= np.maximum(sizes, 1e-300)
-    found = []
-    for entry in lengths:
-        k = every.index(entry)
-        own, others = J[:, k], np.delete(J, k, axis=1)
-        rest = own - others @ np.linalg.lstsq(others, own, rcond=DEPENDENT**2)[0]
-        if np.linalg.norm(rest) <= DEPENDENT:
-            found.append(entry)
-    return found
+    every, seen = [*observations.placements, *parameters_of(robot, "all_entries")], observations.as_coordinates()
+    ordered = ([*(each for each in every if each != entry), entry] for entry in lengths)
+    return [order[-1] for order in ordered if order[-1] not in subspace(robot, order, seen).kept]
 
 
 def without_scale(parameters: Sequence[Entry], scale: Entry | None) -> tuple[Entry, ...]:
@@ -317,25 +309,22 @@ def covariance_by_poses(found: Fit, pose_of: Integers) -> tuple[Reals, Reals]:
     has drawn to itself count in full. Degrees of freedom as Satterthwaite's, if noise were white [2]_.
     """
     C = found.covariance
-    order = np.argsort(pose_of, kind="stable")
-    starts, counts = np.unique(pose_of[order], return_index=True, return_counts=True)[1:]
-    sizes, pulls, pushes = [], [], []
-    for count in np.unique(counts):
-        rows = order[starts[counts == count][:, None] + np.arange(count)]
-        J = found.J[rows]  # (poses, count, k + c)
-        size, axes = np.linalg.eigh(np.eye(count) - J @ C @ J.swapaxes(1, 2))
-        weight = (axes / np.sqrt(np.maximum(size, MIN_OWN))[:, None]) @ axes.swapaxes(1, 2)
-        pushes.append((J.swapaxes(1, 2) @ weight @ found.rest[rows][..., None])[..., 0])
+    sizes, pulls, pushes = list[Reals](), list[Reals](), list[Reals]()
+    for pose in np.unique(pose_of):
+        J, rest = found.J[pose_of == pose], found.rest[pose_of == pose]
+        size, axes = np.linalg.eigh(np.eye(len(J)) - J @ C @ J.T)
+        weight = axes / np.sqrt(np.maximum(size, MIN_OWN)) @ axes.T
+        pushes.append(J.T @ weight @ rest)
         shares = weight @ J @ C
-        sizes.append((shares**2).sum(axis=1))
-        pulls.append(J.swapaxes(1, 2) @ shares)
-    own, pull = np.concatenate(sizes), np.concatenate(pulls)  # (P, k + c), (P, k + c, k + c)
+        sizes.append((shares**2).sum(axis=0))
+        pulls.append(J.T @ shares)
+    own, pull = np.array(sizes), np.array(pulls)  # (P, k + c), (P, k + c, k + c)
     drawn = np.einsum("pik,pik->pk", pull, C @ pull)
     by_number = pull.transpose(2, 1, 0)
     both = C @ (by_number @ by_number.transpose(0, 2, 1))
     squares = (own**2).sum(axis=0) - 2 * (own * drawn).sum(axis=0) + np.einsum("kij,kji->k", both, both)
     freedom = (own - drawn).sum(axis=0) ** 2 / np.maximum(squares, MIN_OWN * (own**2).sum(axis=0))
-    errors = np.concatenate(pushes) @ C  # squares: no rounding makes a variance negative
+    errors = np.array(pushes) @ C  # squares: no rounding makes a variance negative
     return np.asarray(errors.T @ errors, np.float64), np.asarray(np.maximum(freedom, 1.0), np.float64)
 
 
@@ -406,26 +395,24 @@ def rough_places(robot: Robot, observations: PointObservations) -> tuple[Reals, 
 
 def _base_and_tool(x: Reals, R: Reals, m: Reals, free: Sequence[PlacementName]) -> tuple[Reals, Reals]:
     """S (4, 4) and t (3,) of :func:`rough_places`, each left where it is if it is not free."""
-    S: Reals = np.eye(4)
-    t: Reals = np.zeros(3)
-    if "base" not in free:
-        if "tool" in free:
-            t = np.linalg.lstsq(R.reshape(-1, 3), (m - x).ravel(), rcond=None)[0].astype(float)
-        return S, t
-    S = aligned(x, m)[0]
-    if "tool" not in free:
-        return S, t
     eye = np.broadcast_to(np.eye(3), R.shape)
-    rows = np.concatenate([np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9), -eye, -R], axis=2).reshape(-1, 15)
-    inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
+    starts, columns = [np.eye(3)], R
+    if "base" in free:
+        starts, columns = [aligned(x, m)[0][:3, :3]], np.concatenate([R, eye], axis=2)
+        if "tool" in free:
+            by_place = np.einsum("pij,pk->pijk", eye, m).reshape(-1, 3, 9)
+            rows = np.concatenate([by_place, -eye, -R], axis=2).reshape(-1, 15)
+            inverse = np.linalg.lstsq(rows, x.ravel(), rcond=None)[0][:9].reshape(3, 3)
+            starts.append(nearest_rotations(inverse.T))
     found = []
-    for turn in (S[:3, :3], nearest_rotations(inverse.T)):
-        S = posed(turn, np.zeros(3))
+    for turn in starts:
+        S, t = posed(turn, np.zeros(3)), np.zeros(3)
         for _ in range(TURNS):
-            back = (m @ S[:3, :3] - x).ravel()
-            both = np.concatenate([R, eye], axis=2).reshape(-1, 6)
-            t = np.linalg.lstsq(both, back, rcond=None)[0][:3].astype(float)
-            S = aligned(x + R @ t, m)[0]
+            if "tool" in free:
+                back = (m @ S[:3, :3] - x).ravel()
+                t = np.linalg.lstsq(columns.reshape(len(back), -1), back, rcond=None)[0][:3].astype(float)
+            if "base" in free:
+                S = aligned(x + R @ t, m)[0]
         found.append((float(np.linalg.norm((x + R @ t) @ S[:3, :3].T + S[:3, 3] - m)), S, t))
     return min(found, key=lambda each: each[0])[1:]
 

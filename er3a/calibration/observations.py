@@ -28,6 +28,7 @@ LIMIT_SLACK = 0.01  # deg, mm
 SAME_POSE = 1e-4  # rad, m: by which joints may read otherwise at one pose
 PLACEMENTS: tuple[PlacementName, ...] = ("base", "tool")
 RICH_POSES, FEW = 64, 6  # joint vectors all over the range; places and planes that are looked at there
+OF_POINTS = "row_values", "on_tool", "seen", "lines", "touched", "orientations"  # arrays by point
 IN_LINE = 1e-9  # m, of points that no plane is seen from
 TouchKind = Literal["place", "plane"]
 UNKNOWN: dict[TouchKind, int] = {"place": 1, "plane": 3}
@@ -354,24 +355,6 @@ class PointObservations:
         """
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)
 
-    def slid(self, robot: Robot) -> Reals:
-        """By how much joints that slide have changed what is observed; what drops out with a place doesn't count.
-
-        Parameters
-        ----------
-        robot : whose axes the joints slide along
-
-        Returns
-        -------
-        change : (n,), mm
-        """
-        T = frames_of(tables_of(robot), robot, self.row_values)[0]
-        ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
-        shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
-        shift = np.pad(shift, ((0, 0), (0, 3)))  # what slides turns nothing
-        found: Reals = MM * self.relative_shift(shift, self.positions(robot))[self.seen]
-        return found
-
     def take(self, used: Flags) -> PointObservations:
         """Observations of some points.
 
@@ -383,18 +366,9 @@ class PointObservations:
         -------
         observations : in the same order
         """
-        own = used[self.pose_of]
-        return replace(
-            self,
-            row_values=self.row_values[used],
-            on_tool=self.on_tool[used],
-            seen=self.seen[used],
-            values_mm=self.values_mm[own],
-            deviation_mm=self.deviation_mm[own],
-            lines=self.lines[used],
-            touched=self.touched[used],
-            orientations=self.orientations[used],
-        )
+        of_points = {name: getattr(self, name)[used] for name in OF_POINTS}
+        of_values = {name: getattr(self, name)[used[self.pose_of]] for name in ("values_mm", "deviation_mm")}
+        return replace(self, **of_points, **of_values)
 
     @property
     def same_pose(self) -> Integers:
@@ -561,15 +535,10 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
         are measured, of joints that take all points in one plane
     """
     check_poses(measurements, robot)
-    xyz = np.array([each.xyz_mm for each in measurements], dtype=float).reshape(-1, 3)
     names = [each.touched for each in measurements]
     numbers = {name: k for k, name in enumerate(dict.fromkeys(name for name in names if name))}
     touched = np.array([numbers[name] if name else -1 for name in names], dtype=np.int64)
-    for k, each in enumerate(measurements):
-        if each.touched:
-            xyz[k] = 0.0 if each.place else (0.0, np.nan, np.nan)
-    turned = np.array([each.turn is not None for each in measurements], dtype=bool)
-    values = np.hstack([xyz, np.where(turned[:, None], np.zeros((1, 3)), np.nan)])
+    values = np.array([_values(each) for each in measurements], dtype=float).reshape(-1, 6)
     seen = np.isfinite(values)
     on_tool = np.array([each.point == "tool" for each in measurements], dtype=bool)
     known = all(each.deviation_mm is not None for each in measurements)
@@ -597,6 +566,12 @@ def observed(measurements: Sequence[Measurement], robot: Robot, fixed: Sequence[
         )
         raise InputError(None, "measurements", problem, "Move more joints, or measure coordinates")
     return found
+
+
+def _values(seen: Measurement) -> tuple[float | None, ...]:
+    """What is observed: three coordinates, in mm, 0 of what was touched, and the turn from the measured orientation."""
+    xyz = (0.0, 0.0, 0.0) if seen.place else (0.0, None, None) if seen.plane else seen.xyz_mm
+    return (*xyz, *(None if seen.turn is None else 0.0 for _ in COORDINATES))
 
 
 def _is_flat(robot: Robot, points: PointObservations) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from er3a.calibration.outcomes import LevelName, PlacementName
-from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, TOOL_TURNS, Entry, EntryUnit, shifted
+from er3a.comparison.entries import BASE_COLUMNS, TOOL_COLUMNS, TOOL_TURNS, Entry, EntryUnit, entries_in, shifted
 from er3a.geometry.transforms import posed, rot_x, rot_y, rot_z, translation
 from er3a.kinematics.table_batch import robot_of, tables_of
 from er3a.numerics.arrays import Reals
@@ -40,17 +40,15 @@ def parameters_of(robot: Robot, level: LevelName) -> tuple[Entry, ...]:
     -------
     entries : of the table; base and tool are not among them
     """
-    joints = range(1, robot.rows + 1)
-    lengths = [Entry(column, j) for column in "ad" for j in joints if getattr(robot, column)[j - 1]]
-    offsets = [Entry("offset", j) for j in joints]
+    lengths = [each for each in entries_in("ad", robot.rows) if each.value(robot)]
+    offsets = entries_in(("offset",), robot.rows)
     if level == LEVELS[0]:
         return tuple(lengths)
     if level == LEVELS[1]:
         return (*lengths, *offsets)
-    turns = [Entry("alpha", j) for j in joints]
     hayati = [Entry("beta", row) for row, _ in parallel_pairs(robot)]
-    others = [Entry(column, j) for column in "ad" for j in reversed(joints) if not getattr(robot, column)[j - 1]]
-    return (*lengths, *offsets, *turns, *hayati, *others)
+    others = [each for column in "ad" for each in reversed(entries_in(column, robot.rows)) if each not in lengths]
+    return (*lengths, *offsets, *entries_in(("alpha",), robot.rows), *hayati, *others)
 
 
 def placements_of(names: Sequence[PlacementName], oriented: bool = False) -> tuple[Entry, ...]:
@@ -81,8 +79,7 @@ def all_parameters(robot: Robot) -> tuple[Entry, ...]:
     -------
     entries : a, alpha, beta, d and offset of each row, then those of base and tool
     """
-    joints = range(1, robot.rows + 1)
-    table = (Entry(column, j) for column in ("a", "alpha", "beta", "d", "offset") for j in joints)
+    table = entries_in(("a", "alpha", "beta", "d", "offset"), robot.rows)
     return (*table, *placements_of(("base", "tool"), oriented=True))
 
 

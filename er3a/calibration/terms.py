@@ -278,8 +278,6 @@ class CorrectedModel(ByValue):
 
     def _seen(self, measurements: Sequence[Measurement]) -> PointObservations:
         seen = observed(measurements, self.robot)
-        if not self.errors.terms:
-            return seen
         return seen.shifted(self.errors.amounts(seen.row_values, seen.points(self.errors.robot)))
 
 

@@ -131,8 +131,8 @@ def in_order(order: Sequence[int], columns: Sequence[str]) -> Change:
     return lambda tables: replace(tables, **{name: getattr(tables, name)[:, list(order)] for name in columns})
 
 
-def swapped(row: int | None = None) -> Change:
-    """a and d in each other's place.
+def swapped(row: int | None = None, columns: tuple[str, str] = ("a", "d")) -> Change:
+    """The numbers of two columns in each other's place.
 
     Parameters
     ----------
@@ -144,8 +144,8 @@ def swapped(row: int | None = None) -> Change:
     """
 
     def change(tables: Tables) -> Tables:
-        own = _chosen(tables, row)
-        return replace(tables, a=np.where(own, tables.d, tables.a), d=np.where(own, tables.a, tables.d))
+        own, (one, other) = _chosen(tables, row), (getattr(tables, name) for name in columns)
+        return replace(tables, **{columns[0]: np.where(own, other, one), columns[1]: np.where(own, one, other)})
 
     return change
 

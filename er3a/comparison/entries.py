@@ -3,7 +3,7 @@ calibration and evidence name and change."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -91,6 +91,20 @@ class Entry:
             return np.ones(len(tables))
         column: Reals = getattr(tables, self.column)[:, self.joint - 1]
         return column
+
+
+def entries_in(columns: Iterable[str], rows: int) -> tuple[Entry, ...]:
+    """All entries of some columns.
+
+    Parameters
+    ----------
+    rows : how many the table has
+
+    Returns
+    -------
+    entries : column by column, rows from 1
+    """
+    return tuple(Entry(column, row + 1) for column in columns for row in range(rows))
 
 
 def shifted(tables: Tables, entries: Sequence[Entry], amounts: Reals) -> Tables:

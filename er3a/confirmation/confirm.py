@@ -13,7 +13,7 @@ from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.calibration.parameters import corrected
 from er3a.comparison.entries import Entry
 from er3a.confirmation.fit import Fitter, Solution
-from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, search
+from er3a.confirmation.layers import EXPLAINED, PRICE, Attempts, cost, parts_of, search
 from er3a.confirmation.pairs import Pairs, spread
 from er3a.confirmation.poses import read_pairs
 from er3a.errors import ArgumentError, Er3aError
@@ -29,6 +29,17 @@ from er3a.robots.robot import Robot, Source
 Layer = Literal["reading", "frames", "joints", "small", "another"]
 Verdict = Literal["agrees", "reading", "frames", "joints", "small", "another", "open"]
 LAYERS: tuple[Layer, ...] = ("reading", "frames", "joints", "small", "another")
+LAYER_OF: dict[str, Layer] = {
+    "form": "reading",
+    "unit": "reading",
+    "row": "reading",
+    "joints_in": "reading",
+    "base": "frames",
+    "tool": "frames",
+    "small": "small",
+    "entry": "another",
+}
+"""Of parts of an explanation; of all others it is ``joints``."""
 SEARCHED, FITTED = 40, 300  # rows with which explanations are sought, and with which the chosen one is fitted
 LEAST, LEAST_POSITIONS = 4, 8  # distinct poses with orientations, and without
 ALIKE = 45.0  # squares and price by which another explanation may be worse and is named
@@ -255,17 +266,8 @@ def _on_more(fitter: Fitter, chosen: Solution) -> Solution:
 
 
 def _layers(solution: Solution, named: Sequence[str]) -> tuple[Layer, ...]:
-    found = solution.explanation
-    of_units = [each for each in found.joints.faults if each.code == "joints_in"]
-    columns = [each.column for each in found.entries]
-    holds: dict[Layer, bool] = {
-        "reading": found.form not in named or found.factor != 1 or bool(of_units) or not solution.rows.all(),
-        "frames": bool(found.free),
-        "joints": len(found.joints.faults) > len(of_units) or "offset" in columns,
-        "small": found.small,
-        "another": any(column != "offset" for column in columns),
-    }
-    return tuple(layer for layer in LAYERS if holds[layer])
+    found = {LAYER_OF.get(kind, "joints") for kind, _ in parts_of(solution, named)}
+    return tuple(layer for layer in LAYERS if layer in found)
 
 
 def _places(solution: Solution) -> dict[str, Placed | None]:
@@ -342,9 +344,9 @@ def _held_out(fitter: Fitter, solution: Solution) -> float | None:
 
 def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
     """Other explanations that fit as well, and are none with more of the same."""
-    seen, named = [_parts(chosen)], []
+    seen, named = [set(parts_of(chosen))], []
     for each in found.explained():
-        parts = _parts(each)
+        parts = set(parts_of(each))
         if found.total(each) > found.total(chosen) + ALIKE or any(before <= parts for before in seen):
             continue
         seen.append(parts)
@@ -353,16 +355,6 @@ def _alike(found: Attempts, chosen: Solution) -> tuple[Finding, ...]:
         entries = tuple(entry.name for entry in each.explanation.entries if entry.column != "offset")
         named.append(fact("explains_too", joints=joints, places=places, zeros=zeros, entries=entries))
     return tuple(named)
-
-
-def _parts(solution: Solution) -> frozenset[object]:
-    found = solution.explanation
-    row = ["row"] if not solution.rows.all() else []
-    own = [(each.code, tuple(sorted(each.params.items()))) for each in found.joints.faults]
-    units = [found.factor] if found.factor != 1 else []
-    return frozenset(
-        [*own, *found.free, *(each.name for each in found.entries), *["small"] * found.small, *row, *units, found.form]
-    )
 
 
 def _unseen(fitter: Fitter, solution: Solution) -> tuple[tuple[str, ...], tuple[str, ...]]:

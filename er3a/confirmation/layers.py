@@ -8,7 +8,7 @@ Of several, the one is chosen whose squares plus ``PRICE`` times its cost are le
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -23,8 +23,19 @@ from er3a.numerics.arrays import Reals
 EXPLAINED = 4.0
 """Squares per degree of freedom: what is left is less than twice what digits explain."""
 PRICE = 20.0  # squares that a fault has to save: 1 in 10 000 do by chance
-COST = {"joints_in": 1.0, "zero_elsewhere": 3.2}
-OTHER_FORM, OTHER_UNIT, OF_JOINTS, OF_PLACE, OF_ZERO, OF_ENTRY, OF_ALL, OF_ROW = 1.0, 1.0, 3.0, 2.0, 3.0, 4.0, 9.0, 1.5
+COST = {
+    "form": 1.0,
+    "unit": 1.0,
+    "row": 1.5,
+    "joints_in": 1.0,
+    "zero_elsewhere": 3.2,
+    "base": 2.0,
+    "tool": 2.0,
+    "zero": 3.0,
+    "entry": 4.0,
+    "small": 9.0,
+}
+OF_JOINTS = 3.0  # any other way of reading joints
 UNITS = {"m": 1e3, "km": 1e6, "um": 1e-3, "in": 25.4, "cm": 10.0, "m_as_in": 1e3 / 25.4, "in_as_m": 0.0254, "ft": 304.8}
 UNIT_NEAR, UNIT_RIGHT = 0.3, 0.3
 FAR_TURN, FAR_AWAY = 0.01, 0.01  # rad and m, beyond which pairs of ways of reading are tried
@@ -36,6 +47,26 @@ PLACES: tuple[tuple[Place, ...], ...] = ((), ("tool",), ("base",), ("base", "too
 BOTH: tuple[Place, ...] = ("base", "tool")
 
 
+def parts_of(solution: Solution, named: Sequence[str] = ()) -> list[tuple[str, object]]:
+    """What an explanation is made of: of each part the kind, and which one it is.
+
+    Parameters
+    ----------
+    named : forms of orientation that the columns' names allow, which are no part
+    """
+    found = solution.explanation
+    parts: list[tuple[str, object]] = [(each.code, each) for each in found.joints.faults]
+    if found.form not in named:
+        parts.append(("form", found.form))
+    if found.factor != 1:
+        parts.append(("unit", found.factor))
+    parts += [(place, place) for place in found.free]
+    parts += [("zero" if each.column == "offset" else "entry", each.name) for each in found.entries]
+    if found.small:
+        parts.append(("small", None))
+    return parts + [("row", None)] * int((~solution.rows).sum())
+
+
 def cost(solution: Solution, named: Sequence[str]) -> float:
     """What an explanation asks for.
 
@@ -43,16 +74,7 @@ def cost(solution: Solution, named: Sequence[str]) -> float:
     ----------
     named : forms of orientation that the columns' names allow
     """
-    found = solution.explanation
-    return (
-        OTHER_FORM * (found.form not in named)
-        + OTHER_UNIT * (found.factor != 1)
-        + sum(COST.get(each.code, OF_JOINTS) for each in found.joints.faults)
-        + OF_PLACE * len(found.free)
-        + sum(OF_ZERO if each.column == "offset" else OF_ENTRY for each in found.entries)
-        + OF_ALL * found.small
-        + OF_ROW * int((~solution.rows).sum())
-    )
+    return sum(COST.get(kind, OF_JOINTS) for kind, _ in parts_of(solution, named))
 
 
 @dataclass
@@ -99,8 +121,7 @@ def search(fitter: Fitter) -> Attempts:
     if found.explained():
         return found
     candidates = _candidates(fitter, found)
-    for near in candidates:
-        _with_frames(found, near)
+    starts = [pair for near in candidates for pair in _with_frames(found, near)]
     if found.explained():
         return found
     for solution in _nearest_of(found, 2 * TRIED):
@@ -108,9 +129,10 @@ def search(fitter: Fitter) -> Attempts:
     if found.explained():
         return found
     states: list[Solution] = []
-    for starts in _starts(found):
-        here = [state for start in starts for state in _with_entries(found, [start])]
-        _with_small(found, starts, here)
+    starts.sort(key=lambda pair: pair[1].chi2 ** 0.5 * 1.2 ** cost(pair[1], found.named))
+    for pair in starts[:TRIED]:
+        here = [state for start in pair for state in _with_entries(found, [start])]
+        _with_small(found, pair, here)
         if found.explained():
             return found
         states += here
@@ -146,8 +168,9 @@ def _factors(near: Near) -> list[float]:
     return right or other[:1] or [1.0]
 
 
-def _with_frames(found: Attempts, near: Near) -> None:
-    """Fit a way of reading with no frame, a tool, a base, and both."""
+def _with_frames(found: Attempts, near: Near) -> Iterator[tuple[Solution, Solution]]:
+    """Fit a way of reading with no frame, a tool, a base, and both; what is found with none and with both, for each
+    unit."""
     fitter = found.fitter
     robot, pairs = fitter.robot, fitter.pairs
     F = fitter.flanges([near.joints])[0, 0]
@@ -163,6 +186,7 @@ def _with_frames(found: Attempts, near: Near) -> None:
             explanation = Explanation(near.joints, near.form, factor, free)
             Y, X = Y if "base" in free else robot.base, X if "tool" in free else robot.tool
             found.add(explanation, (Y, X, np.zeros(0)))
+        yield found.found[-len(PLACES)], found.found[-1]
 
 
 def _middle(T: Reals) -> Reals:
@@ -191,19 +215,6 @@ def _without_rows(found: Attempts, solution: Solution) -> None:
     bad = solution.by_row > ROW_OFF * numbers
     if 0 < bad.sum() <= most:
         found.add(solution.explanation, solution.values, np.where(bad, 0.0, 1.0))
-
-
-def _starts(found: Attempts) -> list[list[Solution]]:
-    """Solutions to which entries are added: of the nearest ways of reading, without frames and with both."""
-    both = [each for each in found.found if each.explanation.free == BOTH]
-    both = sorted(both, key=lambda each: each.chi2**0.5 * 1.2 ** cost(each, found.named))[:TRIED]
-    alone = [each for each in found.found if not each.explanation.free and each.rows.all()]
-    return [[*[other for other in alone if _same_reading(other, each)][:1], each] for each in both]
-
-
-def _same_reading(first: Solution, second: Solution) -> bool:
-    a, b = first.explanation, second.explanation
-    return a.joints is b.joints and a.form == b.form and a.factor == b.factor and not (a.entries or b.entries)
 
 
 def _with_entries(found: Attempts, states: Iterable[Solution]) -> list[Solution]:

@@ -71,5 +71,5 @@ class Pairs(ByValue):
         rows : numbers from 0, or (N,) bool
         """
         turns = {form: R[rows] for form, R in self.turns.items()}
-        digits = {name: getattr(self, name)[rows] for name in ("q_digit", "xyz_digit", "turn_digit")}
-        return replace(self, q=self.q[rows], xyz=self.xyz[rows], turns=turns, lines=self.lines[rows], **digits)
+        arrays = ("q", "xyz", "q_digit", "xyz_digit", "turn_digit", "lines")
+        return replace(self, turns=turns, **{name: getattr(self, name)[rows] for name in arrays})

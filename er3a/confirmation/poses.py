@@ -210,10 +210,6 @@ class _Columns:
                 whole.setdefault(start, [numbered[k] for k in sorted(numbered)])
         return whole
 
-    def refused(self, error: NoRotationError) -> InputError:
-        """The error of a row whose orientation is none."""
-        return InputError(self.path, f"row {self.rows[error.row][0]}", error.problem, error.remedy)
-
 
 def _pairs(path: Path, robot: Robot, lines: Lines, lengths: str | None) -> Pairs:
     columns = _Columns(path, lines)
@@ -300,7 +296,8 @@ def _turns(columns: _Columns, names: Sequence[str]) -> tuple[dict[str, Reals], i
         try:
             turns = {form: rotations(kind, values[:, list(order)], NEAR_ROTATION) for form, order in orders.items()}
         except NoRotationError as error:
-            raise columns.refused(error) from None
+            place = f"row {columns.rows[error.row][0]}"
+            raise InputError(columns.path, place, error.problem, error.remedy) from None
         return turns, 1, factor * digit
     unit = columns.units[names[0]] or ("rad" if np.abs(values).max() < NEAR_TURN else "deg")
     allowed = ANGLES.get(tuple(re.sub(r".*_", "", name) for name in names), ("rotation_vector", "rpy", "abc", "zyz"))

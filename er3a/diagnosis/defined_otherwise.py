@@ -29,7 +29,7 @@ from er3a.comparison.mechanism import (
     mechanism_of,
     turn_of,
 )
-from er3a.diagnosis.faults import SIDES, Fault, Faults, limit_stated, rounded, wrong_number
+from er3a.diagnosis.faults import Fault, Faults, limit_repairs, rounded, wrong_number
 from er3a.diagnosis.fitting import MEETS, lowered
 from er3a.finding import fact
 from er3a.geometry.transforms import exp_rotation, posed, translation
@@ -118,7 +118,7 @@ def counted_from_ground(
     if limits_besides and not any(r.quantity.depends_on_table for r in references):
         return []
     axes, found = frames(robot, np.zeros(robot.joints))[:-1, :3, 2], dict[Fault, Conventions]()
-    quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
+    off = _misfit_of(references)
     for joint in range(1, robot.joints):
         parallel = [k for k in range(joint) if abs(axes[k] @ axes[joint]) > PARALLEL]
         for along in dict.fromkeys((*((k,) for k in reversed(parallel)), tuple(parallel))):
@@ -126,10 +126,15 @@ def counted_from_ground(
                 fault = fact("counted_from_ground", joint=joint + 1, along=tuple(k + 1 for k in along), sign=sign)
                 own = Conventions((fault,), _from_ground(robot, joint, along, sign, ends))
                 own = _with_limits(robot, own, references) if limits_besides and not ends else own
-                off = (predict_tables(tables_of(own.corrected), own.corrected, quantities)[0] - expected) / uncertainty
-                if np.abs(off).max() <= MEETS:
+                if np.abs(off(own.corrected)).max() <= MEETS:
                     found.setdefault(fault, own)
     return list(found.values())
+
+
+def _misfit_of(references: Sequence[Reference]) -> Misfit:
+    """How far (n,) an arm is off references, in half-widths."""
+    quantities, (expected, uncertainty) = quantities_of(references), expected_of(references)
+    return lambda arm: (predict_tables(tables_of(arm), arm, quantities)[0] - expected) / uncertainty
 
 
 def _from_ground(robot: Robot, joint: int, along: tuple[int, ...], sign: Literal[1, -1], ends: bool) -> Robot:
@@ -206,13 +211,7 @@ def _fitted_to(
 ) -> Conventions | None:
     """The start that comes nearest to what is stated, of nearly equal ones that with the fewest directions reversed,
     fitted; None if something is missed then."""
-    quantities, (expected, uncertainty) = quantities_of(stated), expected_of(stated)
-
-    def off(arm: Robot) -> Reals:
-        difference = predict_tables(tables_of(arm), arm, quantities)[0] - expected
-        return np.asarray(difference / uncertainty)
-
-    tried = []
+    off, tried = _misfit_of(stated), []
     for start in starts:
         arm = _with_flange(start, stated)
         reversed_count = int((arm.direction != robot.direction).sum())
@@ -233,16 +232,12 @@ def _fitted_to(
 def _with_limits(given: Robot, found: Conventions, references: Sequence[Reference]) -> Conventions:
     """What was found, with limits as they are stated, or as wide as poses that are shown; those that the robot's file
     gives otherwise are faults."""
-    lower, upper, faults = found.corrected.lower.copy(), found.corrected.upper.copy(), list(found.faults)
-    for joint, side in itertools.product(np.flatnonzero(~given.slides).tolist(), SIDES):
-        ends = lower if side == "lower" else upper
-        own = math.degrees(ends[joint])
-        stated = limit_stated(joint, side, own, references)
-        if stated is not None:
-            ends[joint] = math.radians(stated)
-            if given.states("limits"):
-                faults.append(fact("wrong_limit", joint=joint + 1, side=side, given_deg=own, fits_deg=stated))
-    return Conventions(tuple(faults), found.corrected.replace(lower=lower, upper=upper))
+    table = tables_of(found.corrected)
+    repairs = limit_repairs(table, references)
+    for repair in repairs:
+        table = repair.apply(table)
+    faults = [repair.fault for repair in repairs] if given.states("limits") else []
+    return Conventions((*found.faults, *faults), robot_of(table, 0, found.corrected))
 
 
 def _gross(found: EntryDifference) -> bool:
@@ -307,16 +302,15 @@ def _with_flange(robot: Robot, stated: Sequence[Reference]) -> Robot:
     own = [r for r in stated if isinstance(r.quantity, PointCoordinate) and r.quantity.point == "flange"]
     if not own:
         return robot
-    expected, uncertainty = expected_of(own)
+    off = _misfit_of(own)
 
-    def at(shift: Reals) -> Reals:
-        arm = robot.replace(flange=robot.flange @ translation(*shift))
-        return np.asarray((predict_tables(tables_of(arm), arm, quantities_of(own))[0] - expected) / uncertainty)
+    def moved(shift: Reals) -> Robot:
+        return robot.replace(flange=robot.flange @ translation(*shift))
 
-    here = at(np.zeros(3))
-    slopes = np.stack([at(row) - here for row in np.eye(3)], axis=1)
-    shift = -np.linalg.lstsq(slopes, here, rcond=1e-9)[0]
-    return robot.replace(flange=robot.flange @ translation(*shift))
+    def model(shifts: Reals, _: Integers) -> Reals:
+        return np.array([off(moved(shift)) for shift in shifts])
+
+    return moved(lowered(model, np.zeros((1, 3)), passes=ROUNDS)[0][0])
 
 
 def _changed(robot: Robot, numbers: Sequence[Entry], x: Reals) -> Robot:

@@ -8,71 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from er3a.by_value import ByValue, Displayed, Sheet, first_rows, shortly
-from er3a.comparison.entries import Entry
 from er3a.diagnosis import conclusions
 from er3a.diagnosis.defined_otherwise import conventions_of, counted_from_ground
 from er3a.diagnosis.faults import Faults, entry_of
-from er3a.diagnosis.fitting import ANGLES, MEETS, free_numbers, moved
-from er3a.diagnosis.ranking import SHOWN, UNITS, Case, Ranking, case_of, rank_case, usable
+from er3a.diagnosis.fitting import MEETS
+from er3a.diagnosis.ranking import SHOWN, UNITS, Ranking, case_of, rank_case, usable
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import robot_of, tables_of
-from er3a.numerics.arrays import Flags, Reals
-from er3a.references.predict import predict_tables, search
-from er3a.references.quantities import Extreme, Unit
+from er3a.numerics.arrays import Reals
+from er3a.references.predict import predict_tables
+from er3a.references.quantities import Unit
 from er3a.references.reference import (
     Reference,
     ReferenceSet,
-    conflicts,
     expected_of,
     lengths_of,
     quantities_of,
     vectors_of,
 )
 from er3a.robots.robot import Robot
-
-REACH_STARTS = 16  # local searches for each extreme
-TRIED_RAD = tuple(np.radians([1.0, 10.0, 37.0, 90.0, 150.0, 180.0]).tolist())
-TRIED_M = 0.001, 0.01, 0.1, 0.5
-
-
-def unseen_of(case: Case) -> tuple[str, ...]:
-    """Entries that no reference reacts to at any value tried, and joints that could be reversed.
-
-    Parameters
-    ----------
-    case : a table and its references
-
-    Returns
-    -------
-    names : such as ``alpha6`` and ``direction5``; all entries if no reference is about the arm's shape
-    """
-    before, rows = case.difference(case.given)[0], case.given.direction.shape[-1]
-    tried = {
-        each: np.outer([1, -1], TRIED_RAD if each.column in ANGLES else TRIED_M).ravel()
-        for each in free_numbers(rows)[1:]
-    }
-    tried |= {Entry("direction", k + 1): -2 * case.given.direction[:, k] for k in range(rows)}
-    return tuple(each.name for each, amounts in tried.items() if not missed(case, each, amounts, before).any())
-
-
-def missed(case: Case, number: Entry, amounts: Reals, before: Reals | float = 0.0) -> Flags:
-    """Whether some reference reacts when an entry is changed.
-
-    Parameters
-    ----------
-    number : the entry
-    amounts : (H,), m or rad, added to it
-    before : (n,), differences to the references from which changes are counted; 0 to count misses
-
-    Returns
-    -------
-    missed : (H,) bool, whether a change, or miss, is larger than a reference's uncertainty
-    """
-    tables = case.given[np.zeros(len(amounts), dtype=int)]
-    changed = moved(tables, [number], np.zeros((len(amounts), 1), dtype=int), amounts[:, None])
-    found: Flags = np.any(np.abs(case.difference(changed) - before) > case.uncertainty * MEETS, axis=1)
-    return found
-
 
 MOSTLY = 0.05
 
@@ -101,8 +55,8 @@ class Diagnosis(list[Hypothesis], Displayed):
     ----------
     conclusion : what they amount to
     references : how many it rests on; tried : how many hypotheses were evaluated
-    not_examined : entries of the table that could have any value without a reference being missed (``alpha6``), and
-        joints that could be reversed (``direction5``); an empty list says nothing about them
+    not_examined : entries of the table that no reference reacts to (``alpha6``, ``direction5``): an empty list says
+        nothing about them
     missed : references that no hypothesis rests on, and that the table misses: extremes over the limits, such as reach
     """
 
@@ -142,53 +96,6 @@ class Diagnosis(list[Hypothesis], Displayed):
         )
 
 
-def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:
-    """Hypotheses about what is wrong with a table, best first.
-
-    Parameters
-    ----------
-    robot : the table as given, tool not considered (references concern the flange)
-    references : official, CAD and export data count, if there are any, else claims do
-
-    Returns
-    -------
-    ranked : at most 10, those that explain first; empty if the references are met, or if no one or two faults do better
-        than the table as it is. What it could not examine is in ``not_examined``, and extremes over the limits that
-        the table misses in ``missed``
-    """
-    found = diagnosis_of(robot, references)
-    found.not_examined = unseen_of(case_of(robot, usable(references)))
-    found.missed = extremes_missed(robot, references)
-    return found
-
-
-def extremes_missed(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, ...]:
-    """References about extremes over the limits, such as reach, that a table misses.
-
-    Parameters
-    ----------
-    references : authoritative ones count alone if there are any; those that contradict each other don't count
-
-    Returns
-    -------
-    missed : by more than their uncertainty; none for arms whose limits are crossed
-    """
-    if (robot.lower > robot.upper).any():
-        return ()
-    every = references.checkable if isinstance(references, ReferenceSet) else references
-    stated = [r for r in every if r.expected is not None and isinstance(r.quantity, Extreme)]
-    stated = [r for r in stated if r.is_authoritative] or stated
-    contradicted = {i for pair in conflicts(stated) for i in pair}
-    found = []
-    for i, reference in enumerate(stated):
-        if isinstance(reference.quantity, Extreme) and i not in contradicted:
-            expected, uncertainty = expected_of([reference])
-            value = search(robot, reference.quantity, REACH_STARTS)[0]
-            if abs(value - expected[0]) > uncertainty[0] * MEETS:
-                found.append(reference)
-    return tuple(found)
-
-
 def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -> Diagnosis:
     """Hypotheses about a table's faults, and what they amount to.
 
@@ -203,8 +110,7 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
     stated = usable(references)
     if not stated:
         return Diagnosis(fact("no_reference"), 0, 0)
-    case = case_of(robot, stated)
-    ranking = rank_case(case)
+    ranking = rank_case(case_of(robot, stated))
     if not ranking:
         return Diagnosis(fact("met", references=len(stated)), len(stated), 0)
     hypotheses = tuple(_of_group(ranking, group, robot) for group in ranking.groups)
@@ -225,7 +131,7 @@ def diagnosis_of(robot: Robot, references: ReferenceSet | Sequence[Reference]) -
         conclusion = _concluded(first, first.indistinguishable_from if from_ground else ())
         if conclusion and (first.explains or not explained):
             return Diagnosis(conclusion, len(stated), tried, (first, *hypotheses[: SHOWN - 1]))
-    conclusion = _conclusion(case, ranking, hypotheses)
+    conclusion = _conclusion(ranking, hypotheses)
     return Diagnosis(conclusion, len(stated), tried, hypotheses)
 
 
@@ -252,10 +158,10 @@ def _concluded(best: Hypothesis, alternatives: tuple[Faults, ...]) -> Finding | 
     )
 
 
-def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> Finding:
+def _conclusion(ranking: Ranking, hypotheses: Sequence[Hypothesis]) -> Finding:
     tried = len(ranking.pool.faults)
     if not hypotheses:
-        relative = np.nan_to_num(np.abs(ranking.before) / case.uncertainty, nan=np.inf)
+        relative = np.nan_to_num(np.abs(ranking.before) / ranking.case.uncertainty, nan=np.inf)
         missed = int((relative > MEETS).sum())
         return fact(
             "no_fault_stands_out",
@@ -277,7 +183,7 @@ def _conclusion(case: Case, ranking: Ranking, hypotheses: Sequence[Hypothesis]) 
 
 def _largest(ranking: Ranking, difference: Reals, unit: Unit) -> Reals:
     """The largest (...,) of differences (..., n) in a unit; the coordinates of one point count as one distance."""
-    of_unit = [own for own in vectors_of(ranking.references) if ranking.references[own[0]].unit == unit]
+    of_unit = [own for own in vectors_of(ranking.case.references) if ranking.case.references[own[0]].unit == unit]
     largest: Reals = lengths_of(difference, of_unit).max(axis=-1)
     return largest
 
@@ -292,8 +198,8 @@ def _hypothesis(
     score: float = 0.0,
 ) -> Hypothesis:
     """A hypothesis by what is left (n,) between its table and the references."""
-    _, uncertainty = expected_of(ranking.references)
-    unit = _worst_unit(ranking, after, uncertainty)
+    uncertainty = ranking.case.uncertainty
+    unit = _worst_unit(ranking, after)
     residual_before, residual_after = (float(_largest(ranking, each, unit)) for each in (ranking.before, after))
     half_widths = float(np.abs(after / uncertainty).max())
     explains = half_widths <= MEETS
@@ -307,8 +213,8 @@ def _of_group(ranking: Ranking, group: tuple[int, ...], robot: Robot) -> Hypothe
     return _hypothesis(ranking, pool.faults[best], corrected, pool.difference[best], alike, score=score)
 
 
-def _worst_unit(ranking: Ranking, after: Reals, uncertainty: Reals) -> Unit:
+def _worst_unit(ranking: Ranking, after: Reals) -> Unit:
     """mm if any length is missed before or after, else the first unit in which something is."""
-    missed = (np.abs(ranking.before) > uncertainty) | (np.abs(after) > uncertainty)
-    found = [reference.unit for reference, off in zip(ranking.references, missed) if off]
+    missed = np.maximum(np.abs(ranking.before), np.abs(after)) > ranking.case.uncertainty
+    found = [reference.unit for reference, off in zip(ranking.case.references, missed) if off]
     return next((unit for unit in UNITS if unit in found), found[0])

@@ -4,16 +4,15 @@ with a free number are in :mod:`er3a.diagnosis.fitting`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.changes import SHAPE, Change, Slip, slips_of, times
+from er3a.comparison.changes import SHAPE, Change, Slip, slips_of, swapped, times
 from er3a.comparison.entries import LENGTHS, Entry
 from er3a.finding import Finding, fact, is_one
 from er3a.kinematics.table_batch import COLUMNS, Tables
-from er3a.numerics.arrays import Reals
 from er3a.references.quantities import Limit, LimitExcess, Side, value_at
 from er3a.references.reference import Reference, expected_of
 
@@ -102,7 +101,7 @@ def place_of(fault: Fault) -> str | Fault:
     return entry_of(fault) or rounded(fault)
 
 
-SIDES: tuple[Side, ...] = ("lower", "upper")
+SIDES: tuple[Side, Side] = ("lower", "upper")
 RADIANS_PER_DEGREE = np.pi / 180
 SAME = 1e-12
 DECIMALS = 9
@@ -262,41 +261,29 @@ def _offsets(given: Tables, joints: range) -> list[Repair]:
     for j in joints:
         before = float(np.degrees(given.offset[0, j]))
         for step in (90.0, -90.0, 180.0):
-            after = (before + step + 180.0) % 360.0 - 180.0 or 0.0
-            after = 180.0 if after == -180.0 else after
-            found.append(
-                Repair(
-                    fact("wrong_offset", joint=j + 1, given_deg=before, fits_deg=after),
-                    _offset_moved(j, np.radians(step)),
-                )
-            )
+            after = 180.0 - (180.0 - before - step) % 360.0
+            fault = fact("wrong_offset", joint=j + 1, given_deg=before, fits_deg=after)
+            found.append(Repair(fault, _added("offset", j, np.radians(step))))
     return found
 
 
-def _offset_moved(joint: int, angle: float) -> Change:
-    return lambda tables: tables.with_column("offset", [joint], tables.offset[:, [joint]] + angle)
-
-
-_LIMIT_FAULTS: tuple[tuple[str, Callable[[Reals, Reals], tuple[Reals, Reals]]], ...] = (
-    ("crossed", lambda low, high: (high, low)),
-    ("signs_swapped", lambda low, high: (-high, -low)),
-    ("lower_sign", lambda low, high: (-low, high)),
-    ("upper_sign", lambda low, high: (low, -high)),
-)
+def _added(column: str, joint: int, amount: float) -> Change:
+    return lambda tables: tables.with_column(column, [joint], getattr(tables, column)[:, [joint]] + amount)
 
 
 def _limits(joints: range) -> list[Repair]:
-    places: list[tuple[list[int], int | None]] = [([j], j + 1) for j in joints]
-    return [
-        Repair(fact("wrong_limits", joint=joint, fault=fault), _limits_changed(changed, change))
-        for changed, joint in (*places, (list(joints), None))
-        for fault, change in _LIMIT_FAULTS
-    ]
+    found = []
+    for row in (*joints, None):
+        changes = {
+            "crossed": swapped(row, SIDES),
+            "signs_swapped": _signs_swapped(row),
+            "lower_sign": times(-1.0, ("lower",), row),
+            "upper_sign": times(-1.0, ("upper",), row),
+        }
+        joint = None if row is None else row + 1
+        found += [Repair(fact("wrong_limits", joint=joint, fault=fault), change) for fault, change in changes.items()]
+    return found
 
 
-def _limits_changed(joints: list[int], change: Callable[[Reals, Reals], tuple[Reals, Reals]]) -> Change:
-    def apply(tables: Tables) -> Tables:
-        low, high = change(tables.lower[:, joints], tables.upper[:, joints])
-        return tables.with_column("lower", joints, low).with_column("upper", joints, high)
-
-    return apply
+def _signs_swapped(row: int | None) -> Change:
+    return lambda tables: times(-1.0, SIDES, row)(swapped(row, SIDES)(tables))

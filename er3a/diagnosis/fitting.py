@@ -13,14 +13,14 @@ References
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
-from er3a.comparison.entries import LENGTHS, Entry, shifted
+from er3a.comparison.entries import LENGTHS, Entry, entries_in, shifted
 from er3a.kinematics.table_batch import Tables
 from er3a.numerics.arrays import Flags, Integers, Reals
 
@@ -39,7 +39,7 @@ def free_numbers(joints: int) -> tuple[Entry, ...]:
     -------
     entries : the scale, then each column from row 1 on
     """
-    return (Entry("scale"), *(Entry(column, joint) for column in COLUMNS for joint in range(1, joints + 1)))
+    return (Entry("scale"), *entries_in(COLUMNS, joints))
 
 
 def moved(tables: Tables, numbers: Sequence[Entry], which: Integers, amounts: Reals) -> Tables:
@@ -331,25 +331,18 @@ def scanned(search: Search, combinations: Sequence[tuple[int, ...]], grid: ScanG
     -------
     fits : up to ``grid.basins`` for each start table and combination
     """
-    reach, starts = arm_lengths(search.starts), len(search.starts)
-    amounts, which, sizes = list[Reals](), list[Integers](), list[tuple[int, ...]]()
+    reach, rows, found = arm_lengths(search.starts), np.arange(len(search.starts)), list[Fits]()
     for combination in combinations:
         numbers = [search.numbers[place] for place in combination]
         values = [grid_of(number, grid) for number in numbers]
-        scales = np.stack([reach if number.column in LENGTHS else np.ones(starts) for number in numbers], axis=1)
         points = np.array(list(product(*values)))
-        amounts.append((points * scales[:, None, :]).reshape(-1, len(combination)))
-        which.append(np.tile(np.array(combination), (starts * len(points), 1)))
-        sizes.append(tuple(len(each) for each in values))
-    start = np.concatenate([np.repeat(np.arange(starts), len(each) // starts) for each in amounts])
-    tried = search.at(start, np.concatenate(which), np.concatenate(amounts))
-    rows, before, squares = list[Integers](), 0, tried.squares
-    for combination, size in zip(combinations, sizes):
-        count = starts * math.prod(size)
-        cyclic = [search.numbers[place].column in ANGLES for place in combination]
-        rows.append(before + _lowest(squares[before : before + count].reshape(starts, *size), cyclic, grid.basins))
-        before += count
-    return tried[np.concatenate(rows)]
+        scales = np.stack([reach if number.column in LENGTHS else np.ones(len(reach)) for number in numbers], axis=1)
+        amounts = (points * scales[:, None]).reshape(-1, len(numbers))
+        tried = search.at(np.repeat(rows, len(points)), np.tile(combination, (len(amounts), 1)), amounts)
+        heights = tried.squares.reshape(-1, *(len(each) for each in values))
+        found.append(tried[_lowest(heights, [number.column in ANGLES for number in numbers], grid.basins)])
+    parts = zip(*((each.start, each.which, each.amounts, each.left) for each in found))
+    return Fits(*(np.concatenate(part) for part in parts))
 
 
 def grid_of(number: Entry, grid: ScanGrid) -> Reals:
@@ -389,13 +382,7 @@ def _lowest(heights: Reals, cyclic: Sequence[bool], count: int) -> Integers:
     each grid."""
     is_low = np.ones(heights.shape, dtype=bool)
     for axis, around in enumerate(cyclic, start=1):
-        for shift in (1, -1):
-            neighbour = np.roll(heights, shift, axis=axis)
-            if not around:
-                edge = [slice(None)] * heights.ndim
-                edge[axis] = slice(0, 1) if shift == 1 else slice(-1, None)
-                neighbour[tuple(edge)] = np.inf
-            is_low &= heights <= neighbour
+        is_low &= heights <= minimum_filter1d(heights, 3, axis, mode="wrap" if around else "nearest")
     flat = np.where(is_low, heights, np.inf).reshape(len(heights), -1)
     order = np.argsort(flat, axis=1, kind="stable")[:, :count]
     kept = np.isfinite(np.take_along_axis(flat, order, axis=1))

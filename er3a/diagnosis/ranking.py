@@ -21,7 +21,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 
 from er3a.comparison.entries import Entry
 from er3a.diagnosis import fitting
-from er3a.diagnosis.faults import Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
+from er3a.diagnosis.faults import SIDES, Fault, Faults, Repair, entry_of, place_of, repairs_of, rounded, wrong_number
 from er3a.geometry.vectors import wrap_to_pi
-from er3a.kinematics.table_batch import Tables, join, tables_of
+from er3a.kinematics.table_batch import COLUMNS, Tables, join, tables_of
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.references.predict import predict_tables
 from er3a.references.quantities import Extreme, Speed, Unit
@@ -164,56 +164,6 @@ class Case:
         return Pool(tables, self.difference(tables), faults, cost)
 
 
-def single_faults(case: Case) -> Pool:
-    """All single faults, free numbers at their best values.
-
-    Parameters
-    ----------
-    case : a table and its references
-
-    Returns
-    -------
-    pool : repairs first, then free numbers
-    """
-    alone = [(each,) for each in case.repairs]
-    tables = join([repair.apply(case.given) for repair in case.repairs])
-    return joined_pools([case.pool(tables, *_named(alone)), *_with_numbers(case, [()], 1, fitting.FINE)])
-
-
-def double_faults(case: Case) -> Pool:
-    """All pairs of faults, free numbers at their best values.
-
-    Parameters
-    ----------
-    case : a table and its references
-
-    Returns
-    -------
-    pool : two repairs, a repair and a number, two numbers
-    """
-    alone = [(each,) for each in case.repairs]
-    one, two = _with_numbers(case, alone, 1, fitting.COARSE), _with_numbers(case, [()], 2, fitting.PAIRED)
-    return joined_pools([_two_repairs(case), *one, *two])
-
-
-def every_pair_refitted(case: Case) -> Pool:
-    """All pairs with a free number, from more places and to the end, however little promise they show.
-
-    This shows whether the pairs that explain the references are all that do.
-
-    Parameters
-    ----------
-    case : a table and its references, of which one at least is about the arm's shape
-
-    Returns
-    -------
-    pool : a repair and a number, two numbers
-    """
-    alone = [(each,) for each in case.repairs]
-    one = _with_numbers(case, alone, 1, fitting.FINE, thorough=True)
-    return joined_pools([*one, *_with_numbers(case, [()], 2, fitting.DENSE, thorough=True)])
-
-
 def joined_pools(pools: Sequence[Pool]) -> Pool:
     """All hypotheses of several pools, in order.
 
@@ -240,14 +190,6 @@ def _two_repairs(case: Case) -> Pool:
     return case.pool(tables, *_named(list(combinations(repairs, 2))))
 
 
-def _alike(tables: Tables, without: Sequence[str] = ()) -> tuple[Integers, Integers]:
-    """Tables that are the same but for some columns: the first of each group, and each table's group, (H,)."""
-    columns = [getattr(tables, each.name) for each in fields(tables) if each.name not in ("modified", *without)]
-    rows = np.hstack([tables.modified[:, None].astype(float), *columns]).round(DECIMALS) + 0.0
-    _, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return first, group.reshape(-1)
-
-
 def _with_numbers(
     case: Case, chosen: Sequence[tuple[Repair, ...]], count: int, grid: fitting.ScanGrid, thorough: bool = False
 ) -> list[Pool]:
@@ -255,10 +197,12 @@ def _with_numbers(
     if not case.numbers:
         return []
     starts = join([own[0].apply(case.given) if own else case.given for own in chosen])
-    first, group = _alike(starts, ("lower", "upper"))
+    columns = [getattr(starts, name) for name in COLUMNS if name not in SIDES]
+    shapes = np.hstack([starts.modified[:, None], *columns]).round(DECIMALS) + 0.0
+    _, first, group = np.unique(shapes, axis=0, return_index=True, return_inverse=True)
     places = list(combinations(range(len(case.numbers)), count))
     fits = _searched(case, starts[first], places, grid, thorough)
-    rows = [np.flatnonzero(fits.start == shape) for shape in group]
+    rows = [np.flatnonzero(fits.start == shape) for shape in group.reshape(-1)]
     start = np.repeat(np.arange(len(starts)), [len(own) for own in rows])
     return [_fitted(case, starts, chosen, replace(fits[np.concatenate(rows)], start=start))]
 
@@ -283,63 +227,35 @@ def _named(chosen: Sequence[tuple[Repair, ...]]) -> tuple[list[Faults], Reals]:
 
 
 def _fitted(case: Case, starts: Tables, chosen: Sequence[tuple[Repair, ...]], fits: fitting.Fits) -> Pool:
-    """Hypotheses of fitted numbers that change something."""
-    fits = _changing(case, starts, fits)
-    tables = fitting.moved(starts[fits.start], case.numbers, fits.which, fits.amounts)
+    """Hypotheses of fitted numbers that change something, angles within half a turn."""
+    numbers = np.array(case.numbers)[fits.which]
+    is_angle = np.isin([each.column for each in case.numbers], fitting.ANGLES)[fits.which]
+    is_scale = np.array([not each.joint for each in case.numbers])[fits.which]
+    given = np.stack([each.of(starts) for each in case.numbers], axis=1)[fits.start[:, None], fits.which]
+    amounts = np.where(is_angle, wrap_to_pi(given + fits.amounts) - given, fits.amounts)
+    moves = np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED
+    kept = (moves & ~(is_scale & (1 + amounts < MIN_SCALE))).all(axis=1)
+    start, which = fits.start[kept], fits.which[kept]
+    tables = fitting.moved(starts[start], case.numbers, which, amounts[kept])
+    values = np.take_along_axis(np.stack([each.of(tables) for each in case.numbers], axis=1), which, axis=1)
+    best = np.where(is_scale[kept], 1 + amounts[kept], values)
     repaired, cost = _named(chosen)
-    given = np.stack([number.of(starts) for number in case.numbers], axis=1)
-    fitted = np.stack([number.of(tables) for number in case.numbers], axis=1)
-    faults: list[Faults] = []
-    for row, (start, places) in enumerate(zip(fits.start.tolist(), fits.which.tolist())):
-        free = []
-        for k, place in enumerate(places):
-            number, amount = case.numbers[place], float(fits.amounts[row, k])
-            best = float(fitted[row, place]) if number.joint else 1 + amount
-            free.append(wrong_number(number, float(given[start, place]), best))
-        faults.append((*repaired[start], *free))
-    return case.pool(tables, faults, cost[fits.start] + FREE_NUMBER * fits.which.shape[1])
-
-
-def _changing(case: Case, starts: Tables, fits: fitting.Fits) -> fitting.Fits:
-    """Fits with angles within half a turn, without those that change nothing."""
-    is_angle = np.array([number.column in fitting.ANGLES for number in case.numbers])[fits.which]
-    values = np.stack([number.of(starts) for number in case.numbers], axis=1)[fits.start[:, None], fits.which]
-    amounts = np.where(is_angle, wrap_to_pi(values + fits.amounts) - values, fits.amounts)
-    changes: Flags = np.all(np.abs(np.where(is_angle, wrap_to_pi(amounts), amounts)) > UNCHANGED, axis=1)
-    is_scale = np.array([not number.joint for number in case.numbers])[fits.which]
-    changes &= ~(is_scale & (1 + amounts < MIN_SCALE)).any(axis=1)
-    return fitting.Fits(fits.start, fits.which, amounts, fits.left)[changes]
+    faults = [
+        (*repaired[row], *(wrong_number(*number) for number in zip(*found)))
+        for row, *found in zip(start, numbers[kept], given[kept], best)
+    ]
+    return case.pool(tables, faults, cost[start] + FREE_NUMBER * which.shape[1])
 
 
 SHOWN = 10  # groups of hypotheses
 UNITS: tuple[Unit, ...] = ("mm", "deg")
 
 
-@dataclass(frozen=True, eq=False)
-class Ranking:
-    """Hypotheses in order.
-
-    Attributes
-    ----------
-    pool : all that were evaluated
-    score : (H,), smaller is better
-    explains : (H,), whether all references are met
-    groups : rows of the pool, best group first; the first row of a group is its best, the others are those that no
-        reference tells from it
-    before : (n,), difference of the given table to the references, in their units
-    references : those it rests on
-    """
-
-    pool: Pool
-    score: Reals
-    explains: Flags
-    groups: tuple[tuple[int, ...], ...]
-    before: Reals
-    references: tuple[Reference, ...]
-
-
 def rank_case(case: Case) -> Ranking | None:
     """Rank all hypotheses about a table: pairs only if no single fault meets all references.
+
+    If pairs do, those with a free number are fitted again, from more places and to the end, however little promise they
+    show: that tells whether these are all that do.
 
     Parameters
     ----------
@@ -349,22 +265,19 @@ def rank_case(case: Case) -> Ranking | None:
     -------
     ranking : None if the table meets all references
     """
-    stated = case.references
     before = case.difference(case.given)[0]
     if (np.abs(before) <= case.uncertainty * fitting.MEETS).all():
         return None
-    pool = single_faults(case)
+    alone = [(each,) for each in case.repairs]
+    repaired = case.pool(join([repair.apply(case.given) for repair in case.repairs]), *_named(alone))
+    pool = joined_pools([repaired, *_with_numbers(case, [()], 1, fitting.FINE)])
     if not pool.explains(case.uncertainty).any():
-        pool = joined_pools([pool, double_faults(case)])
-        if case.numbers and pool.explains(case.uncertainty).any():
-            pool = joined_pools([pool, every_pair_refitted(case)])
-    per_fault = np.log(len(stated)) + np.log(len(pool.faults))
-    units = np.array([reference.unit for reference in stated])
-    score = _misfit(pool.difference / case.uncertainty, units) + per_fault * pool.cost
-    untouched = float(_misfit(before / case.uncertainty, units))
-    explains = pool.explains(case.uncertainty)
-    groups = _Groups(case.given, pool, score, explains, case.uncertainty).found(untouched)
-    return Ranking(pool, score, explains, groups, before, stated)
+        one, two = _with_numbers(case, alone, 1, fitting.COARSE), _with_numbers(case, [()], 2, fitting.PAIRED)
+        pool = joined_pools([pool, _two_repairs(case), *one, *two])
+        if pool.explains(case.uncertainty).any():
+            one = _with_numbers(case, alone, 1, fitting.FINE, thorough=True)
+            pool = joined_pools([pool, *one, *_with_numbers(case, [()], 2, fitting.DENSE, thorough=True)])
+    return Ranking(case, pool, before)
 
 
 def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
@@ -379,12 +292,12 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
     case : its difference predicts each distinct quantity once
     """
     expected, _ = expected_of(stated)
-    measured = [(type(each), tuple(vars(each).values())) for each in quantities_of(stated)]
-    first = {key: each for key, each in reversed(list(zip(measured, quantities_of(stated))))}
-    column = np.array([list(first).index(key) for key in measured], dtype=np.int64)
+    asked = quantities_of(stated)
+    distinct = {repr(each): each for each in asked}
+    column = np.array([list(distinct).index(repr(each)) for each in asked], dtype=np.int64)
 
     def difference(tables: Tables) -> Reals:
-        return predict_tables(tables, robot, list(first.values()))[:, column] - expected
+        return predict_tables(tables, robot, list(distinct.values()))[:, column] - expected
 
     few = _spread(stated)
     return Case(tables_of(robot), stated, difference, case_of(robot, few) if len(few) < len(stated) else None)
@@ -425,42 +338,53 @@ def usable(references: ReferenceSet | Sequence[Reference]) -> tuple[Reference, .
     return tuple(reference for i, reference in enumerate(resting) if i not in contradicted)
 
 
-def _misfit(weighted: Reals, units: NDArray[np.str_]) -> Reals:
-    """Sum over the units of n ln(max(chi2 / n, 1)), of differences (..., n) in uncertainties."""
-    total: Reals = np.zeros(weighted.shape[:-1])
-    for unit in UNITS:
-        own = weighted[..., units == unit]
-        if own.shape[-1]:
-            total += own.shape[-1] * np.log(np.maximum((own**2).mean(axis=-1), 1.0))
-    return total
-
-
 @dataclass(frozen=True, eq=False)
-class _Groups:
-    """Hypotheses gathered into sets that no reference tells apart."""
+class Ranking:
+    """Hypotheses in order, gathered into sets between which no reference decides.
 
-    given: Tables
+    Attributes
+    ----------
+    pool : all that were evaluated
+    before : (n,), difference of the given table to the references, in their units
+    """
+
+    case: Case
     pool: Pool
-    score: Reals
-    explains: Flags
-    uncertainty: Reals
+    before: Reals
 
-    def found(self, untouched: float) -> tuple[tuple[int, ...], ...]:
-        """The sets, best first: those that explain everything are one set.
+    @cached_property
+    def explains(self) -> Flags:
+        """Whether all references are met, (H,)."""
+        return self.pool.explains(self.case.uncertainty)
 
-        Parameters
-        ----------
-        untouched : score of the unchanged table; hypotheses that score no better are dropped
+    @cached_property
+    def score(self) -> Reals:
+        """Of hypotheses (H,), smaller is better."""
+        per_fault = np.log(len(self.case.references)) + np.log(len(self.pool.faults))
+        score: Reals = self._misfit(self.pool.difference) + per_fault * self.pool.cost
+        return score
 
-        Returns
-        -------
-        groups : up to ``SHOWN``, rows of the pool, the best row first
+    def _misfit(self, difference: Reals) -> Reals:
+        """Sum over the units of n ln(max(chi2 / n, 1)), of differences (..., n)."""
+        units = np.array([reference.unit for reference in self.case.references])
+        total: Reals = np.zeros(difference.shape[:-1])
+        for unit in UNITS:
+            own = (difference / self.case.uncertainty)[..., units == unit]
+            if own.shape[-1]:
+                total += own.shape[-1] * np.log(np.maximum((own**2).mean(axis=-1), 1.0))
+        return total
+
+    @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Up to ``SHOWN`` sets of rows of the pool, best first, the best row of each first.
+
+        Those that explain everything are one set; hypotheses that score no better than the unchanged table are dropped.
         """
         groups = [self._explaining()] if self.explains.any() else []
         placed = {row for group in groups for row in group}
         alone: set[Fault] = set()
         order = np.argsort(self.score, kind="stable")
-        for best in order[(self.score[order] < untouched) & ~self.explains[order]].tolist():
+        for best in order[(self.score[order] < self._misfit(self.before)) & ~self.explains[order]].tolist():
             if len(groups) == SHOWN:
                 break
             if best in placed or alone.intersection(map(rounded, self.pool.faults[best])):
@@ -480,13 +404,15 @@ class _Groups:
         the least turned."""
         rows = np.flatnonzero(self.explains)
         rows = rows[self.pool.count[rows] == self.pool.count[rows].min()]
-        greatest = np.abs(self.pool.difference[rows] / self.uncertainty).max(axis=1)
+        greatest = np.abs(self.pool.difference[rows] / self.case.uncertainty).max(axis=1)
         return self._once(rows[np.lexsort((self._turned_by(rows), greatest.round(2), self.pool.cost[rows]))].tolist())
 
     def _turned_by(self, rows: Integers) -> Reals:
         """By how much (rad) hypotheses turn the table's angles, rounded."""
         tables = self.pool.tables[rows]
-        turned = [np.abs(wrap_to_pi(getattr(tables, name) - getattr(self.given, name))) for name in ("alpha", "offset")]
+        turned = [
+            np.abs(wrap_to_pi(getattr(tables, name) - getattr(self.case.given, name))) for name in ("alpha", "offset")
+        ]
         total: Reals = np.sum(turned, axis=(0, 2)).round(3)
         return total
 
@@ -496,14 +422,14 @@ class _Groups:
         rows = np.flatnonzero(self._near(best) & (count <= count[best]) & ~self.explains)
         group = [best]
         for row in rows[np.argsort(self.score[rows], kind="stable")]:
-            if row != best and (np.abs(difference[group] - difference[row]) < self.uncertainty).all():
+            if row != best and (np.abs(difference[group] - difference[row]) < self.case.uncertainty).all():
                 group.append(int(row))
         return self._once(group)
 
     def _near(self, best: int) -> Flags:
         """Whether no reference tells a hypothesis from ``best``, (H,)."""
         difference = self.pool.difference
-        near: Flags = np.all(np.abs(difference - difference[best]) < self.uncertainty, axis=1)
+        near: Flags = np.all(np.abs(difference - difference[best]) < self.case.uncertainty, axis=1)
         return near
 
     def _once(self, rows: Sequence[int]) -> tuple[int, ...]:

@@ -17,13 +17,13 @@ from er3a.calibration.observations import PLACEMENTS, Measurement, TouchKind, ch
 from er3a.calibration.outcomes import FixedName
 from er3a.calibration.parameters import all_parameters, corrected
 from er3a.calibration.terms import CorrectedModel, JointErrors, JointTerm, starting_table, terms_of
-from er3a.diagnosis import diagnose as diagnosis
-from er3a.diagnosis.diagnose import Diagnosis
+from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
 from er3a.errors import ArgumentError, InputError
 from er3a.files.csv_file import METRES, CsvColumn, columns_of, read_csv, read_header, refuse_unit
 from er3a.files.orientations import POSITION
 from er3a.files.reference_sets import check_robot_origins, load_references
 from er3a.files.units import joint_names, refuse_radians
+from er3a.identifiability import statements
 from er3a.identifiability.entry_evidence import Evidence, Tolerance
 from er3a.identifiability.evidence import evidence_of
 from er3a.kinematics.forward import forward
@@ -148,7 +148,8 @@ def _check_scale(path: Path, rows: list[Measurement], robot: Robot) -> None:
 
 
 def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str | Path) -> Diagnosis:
-    """Hypotheses about the faults of a table, best first; see :func:`er3a.diagnosis.diagnose.diagnose`.
+    """Hypotheses about the faults of a table, best first; see
+    :func:`er3a.identifiability.statements.diagnose`.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def diagnose(robot: Robot, references: ReferenceSet | Sequence[Reference] | str 
     InputError
         if the reference set doesn't exist or can't be read
     """
-    return diagnosis.diagnose(robot, _of_arm(references, robot).references)
+    return statements.diagnose(robot, _of_arm(references, robot).references)
 
 
 def _of_arm(given: ReferenceSet | Sequence[Reference] | str | Path, robot: Robot) -> ReferenceSet:
@@ -199,7 +200,7 @@ def evidence(robot: Robot, references: References | None = None, tolerance: Tole
         documents |= own.documents.by_name
     if references is None:
         check_robot_origins(robot, documents)
-    best = diagnosis.diagnosis_of(robot, stated)[:1]
+    best = diagnosis_of(robot, stated)[:1]
     right = [each.corrected for each in best if each.explains]
     return evidence_of(robot, stated, Documents(documents), tolerance, corrected=right)
 

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, islice
+from itertools import combinations
 
 import numpy as np
 
 from er3a.by_value import ByValue
 from er3a.comparison.changes import SIGNS, Slip, other_convention, slips_of, times
 from er3a.comparison.entries import Entry
+from er3a.geometry.vectors import wrap_to_pi
 from er3a.identifiability.entries import entries_of
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.requirements import Asked
@@ -31,13 +32,12 @@ from er3a.robots.robot import Robot
 
 MAX_TOGETHER = 4  # flips in a combination
 PATTERNS_UP_TO = 6
-MAX_FLIPS = 3  # in a combination that is the same robot
 SOME_DEG = 1e-6
 FITTED_RAD = 1e-5  # to within which a fitted angle that is written as 0 is 0
 
 
-def half_turn(angle: Reals) -> Reals:
-    """Half a turn further, kept within (-pi, pi] as people write angles.
+def as_written(angle: Reals) -> Reals:
+    """Angles within (-pi, pi] as people write them: half a turn is positive, whatever a fit has made of it.
 
     Parameters
     ----------
@@ -47,14 +47,16 @@ def half_turn(angle: Reals) -> Reals:
     -------
     angle : (...,), rad
     """
-    turned = angle + np.pi
-    return np.where(turned > np.pi + FITTED_RAD, turned - 2 * np.pi, turned)
+    return wrap_to_pi(angle - FITTED_RAD) + FITTED_RAD
 
 
 def _turned_round(column: str, row: int) -> Slip:
     """An angle half a turn further."""
     return Slip(
-        "half_turn", (column,), (row,), lambda H: H.with_column(column, [row], half_turn(getattr(H, column)[:, [row]]))
+        "half_turn",
+        (column,),
+        (row,),
+        lambda H: H.with_column(column, [row], as_written(getattr(H, column)[:, [row]] + np.pi)),
     )
 
 
@@ -146,21 +148,11 @@ def changed(table: Tables, flips: Sequence[Slip], chosen: Sequence[tuple[int, ..
     -------
     tables : H
     """
-    batch = table[np.zeros(len(chosen), dtype=np.int64)]
-    for i, flip in enumerate(flips):
-        rows = np.array([i in each for each in chosen])
-        if rows.any():
-            own = flip.undone(batch[rows])
-            batch = _placed(batch, rows, own)
+    batch, count = table[np.zeros(len(chosen), dtype=np.int64)], len(chosen)
+    for i in sorted({i for each in chosen for i in each}):
+        flipped = np.array([i in each for each in chosen])
+        batch = join([batch, flips[i].undone(batch)])[np.arange(count) + count * flipped]
     return batch
-
-
-def _placed(batch: Tables, rows: Flags, own: Tables) -> Tables:
-    """A batch with some of its rows replaced."""
-    order = np.empty(len(batch), dtype=np.int64)
-    order[~rows] = np.arange(int((~rows).sum()))
-    order[rows] = np.arange(int(rows.sum())) + int((~rows).sum())
-    return join([batch[~rows], own])[order]
 
 
 CHUNK = 1024  # combinations that are tried at once
@@ -187,29 +179,6 @@ class Alternative(ByValue):
     def names(self) -> tuple[str, ...]:
         """Names of the entries."""
         return tuple(name for name, _ in self.entries)
-
-
-def gauge_flips(tool: ToolRange, flips: Sequence[Slip]) -> list[tuple[str, ...]]:
-    """Minimal combinations of discrete changes that are the same robot.
-
-    Parameters
-    ----------
-    tool : of the robot, over its joint ranges
-    flips : as of :func:`flips_of`
-
-    Returns
-    -------
-    names : of the entries that each combination changes
-    """
-    own = tool.signature(tool.table)[0]
-    found: list[tuple[int, ...]] = []
-    basic = [i for i, flip in enumerate(flips) if len(flip.columns) < 2]
-    for chosen in islice(sets_of(flips), MAX_FLIPS):
-        sets = [each for each in chosen if set(each) <= set(basic) and not _holds(each, found)]
-        if sets:
-            same = np.abs(_signatures(tool, tool.table, flips, sets) - own).max(axis=1) < SAME_TOOL
-            found += [each for each, equal in zip(sets, same) if equal]
-    return [tuple(name for i in each for name in flips[i].entries) for each in found]
 
 
 def with_readings(table: Tables, robot: Robot, readings: Sequence[Alternative]) -> Tables:
@@ -309,12 +278,7 @@ class _AlternativeSearch:
     def _compose(self, chosen: tuple[int, ...]) -> None:
         if len(self.composed) > MAX_COMPOSED:
             return
-        new = [
-            (*each, *chosen)
-            for each in self.composed
-            if not {name for i in each for name in self.flips[i].entries}
-            & {name for i in chosen for name in self.flips[i].entries}
-        ]
+        new = [(*each, *chosen) for each in self.composed if _apart(self.flips, (*each, *chosen))]
         self.signatures = np.concatenate([self.signatures, _signatures(self.tool, self.table, self.flips, new)])
         self.composed += new
 

@@ -70,26 +70,13 @@ def same_robots(table: Tables) -> Tables:
 
     Returns
     -------
-    rows : a batch, itself first; of arms with more than eight joints the first ``MAX_ROWS`` of them
+    rows : a batch, itself first; once there are ``MAX_ROWS``, as of arms with more than eight joints, further axes
+        are turned alone
     """
     found = table
     for turn in _turns(table):
-        found = join([found, turn(found)]) if len(found) < MAX_ROWS else found
+        found = join([found, turn(found if len(found) < MAX_ROWS else table)])
     return found
-
-
-def turned_once(table: Tables) -> Tables:
-    """Rows of the same robot with one axis turned round in each.
-
-    Parameters
-    ----------
-    table : a batch
-
-    Returns
-    -------
-    rows : a batch, the given ones first
-    """
-    return join([table, *(turn(table) for turn in _turns(table))])
 
 
 def _turns(table: Tables) -> list[Callable[[Tables], Tables]]:
@@ -220,25 +207,13 @@ class Extents:
             nearest_rows(self.region.tables(direction[None], amounts[None]), self.region, self.watched)
         )
 
-    def of(self, entry: Entry) -> Extent:
-        """The interval of an entry, the others free.
-
-        Parameters
-        ----------
-        entry : one of ``entries``
-
-        Returns
-        -------
-        extent : in the entry's unit
-        """
-        return self.along(np.eye(len(self.entries))[self.entries.index(entry)])
-
-    def along(self, factors: Reals) -> Extent:
+    def along(self, factors: Reals, moves_tool: bool = True) -> Extent:
         """The interval of a combination of entries, the others free.
 
         Parameters
         ----------
-        factors : (k,), of the entries' steps; one at least is not 0
+        factors : (k,), of the entries' steps; one at least is not 0, and of an entry alone it is 1
+        moves_tool : False if others can be changed with it so that no tool moves: then any value is allowed
 
         Returns
         -------
@@ -249,8 +224,10 @@ class Extents:
         value = float(sum(w * each.of(self.table)[0] for w, each in zip(weights, self.entries) if w))
         own = weights[self.places]
         watched = np.isin(np.arange(len(own)), self.watched)
-        if not own[watched].any():
-            return self._anything(first, value, self._off(first, self._widest(first)))
+        if not (moves_tool and own[watched].any()):
+            widest = self._widest(first)
+            off = self._off(first, widest) if moves_tool else NOT_OFF
+            return Extent((value - widest) * first.in_unit, (value + widest) * first.in_unit, off)
         if not self.met:
             return Extent(np.nan, np.nan, NOT_OFF)
         low, high = self._end(own)
@@ -260,23 +237,6 @@ class Extents:
         ends = (value + low) * first.in_unit, (value + high) * first.in_unit
         at_least = self.goes_far or (bool(self.far) and not off.within(self.tolerance.mm, self.tolerance.deg))
         return Extent(*ends, off, at_least)
-
-    def free_choice(self, entry: Entry) -> Extent:
-        """The interval of an entry that moves no tool if others are changed with it.
-
-        Parameters
-        ----------
-        entry : any value of it is allowed
-
-        Returns
-        -------
-        extent : in the entry's unit
-        """
-        return self._anything(entry, float(entry.of(self.table)[0]), NOT_OFF)
-
-    def _anything(self, entry: Entry, value: float, off: ToolOff) -> Extent:
-        widest = self._widest(entry)
-        return Extent((value - widest) * entry.in_unit, (value + widest) * entry.in_unit, off)
 
     def _widest(self, entry: Entry) -> float:
         return largest_length(self.table) if entry.unit == "mm" else np.pi

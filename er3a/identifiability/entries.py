@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.entries import Entry, entry_twists
+from er3a.comparison.entries import Entry, entries_in, entry_twists
 from er3a.kinematics.table_batch import frames_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.numerics.quasi_random import quasi_random_points
@@ -38,10 +38,8 @@ def entries_of(robot: Robot) -> tuple[Entry, ...]:
     -------
     entries : rows from 1, those that can take any value first
     """
-    joints = range(1, len(robot.a) + 1)
-    columns = "direction", "lower", "upper"
-    speeds = [Entry("speed", j) for j in joints if np.isfinite(robot.speed[j - 1])]
-    return (*continuous_of(robot), *(Entry(column, j) for column in columns for j in joints), *speeds)
+    speeds = [each for each in entries_in(("speed",), robot.rows) if np.isfinite(robot.speed[each.joint - 1])]
+    return (*continuous_of(robot), *entries_in(("direction", "lower", "upper"), robot.rows), *speeds)
 
 
 def continuous_of(robot: Robot) -> tuple[Entry, ...]:
@@ -55,9 +53,8 @@ def continuous_of(robot: Robot) -> tuple[Entry, ...]:
     -------
     entries : column by column, rows from 1
     """
-    joints = range(1, len(robot.a) + 1)
-    found = [Entry(column, j) for column in CONTINUOUS for j in joints]
-    return (*found, *(Entry("beta", j) for j in joints if robot.beta[j - 1]))
+    hayati = [each for each in entries_in(("beta",), robot.rows) if robot.beta[each.joint - 1]]
+    return (*entries_in(CONTINUOUS, robot.rows), *hayati)
 
 
 def column_of(name: str) -> str:

@@ -13,15 +13,15 @@ import numpy as np
 from er3a.comparison.entries import Entry, shifted, wrapped_between
 from er3a.diagnosis.defined_otherwise import described_by
 from er3a.diagnosis.ranking import usable
-from er3a.identifiability.alternatives import Alternative, alternatives_to, flips_of, gauge_flips, with_readings
-from er3a.identifiability.continuous import Extent, Extents, turned_once
-from er3a.identifiability.entries import column_of, continuous_of, document_of, entries_of, gauge_of
+from er3a.identifiability.alternatives import Alternative, alternatives_to, as_written, with_readings
+from er3a.identifiability.continuous import Extent, Extents, same_robots
+from er3a.identifiability.entries import continuous_of, document_of, entries_of, gauge_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Evidence, OtherReading, OtherTable, Status, Tolerance
 from er3a.identifiability.feasible import MET
 from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.identifiability.statements import NOT_OFF, ToolOff, ToolRange
-from er3a.kinematics.table_batch import robot_of, tables_of
+from er3a.kinematics.table_batch import Tables, robot_of, tables_of
 from er3a.numerics.arrays import Flags, Reals
 from er3a.references.quantities import LimitExcess, OfJoint, value_at
 from er3a.references.reference import Documents, Reference, conflicts
@@ -30,7 +30,8 @@ from er3a.robots.robot import Robot
 LimitStatus = Literal["settled", "weak", "contradicted", "consistent", "open"]
 OUTRIGHT_OR_NOT: tuple[Status, ...] = ("settled", "settled_up_to_signs")
 ROUNDING = 1e-9  # in an entry's unit
-OF_SIGNS = ("a", "alpha", "d", "beta", "offset", "direction")
+OF_SIGNS = ("direction", "offset", "alpha", "a", "d", "beta")
+MAX_REWRITTEN = 3  # entries that differ in other rows of the same robot, for these to be listed
 LIMITS = ("lower", "upper", "speed")
 CORRECTED = 1e-6  # in an entry's unit, from which on a corrected value is another one
 WIDEST = 720.0
@@ -228,13 +229,13 @@ class _Judge:
         self.robot, self.documents, self.tolerance = robot, documents, tolerance
         self.references = [reference for reference in references if reference.expected is not None]
         self.table, self.entries, self.free = tables_of(robot), entries_of(robot), continuous_of(robot)
+        self.turning = [each for column in OF_SIGNS for each in self.entries if each.column == column]
         self.reacts = reactions(robot, self.references, self.entries)
         self.tool, self.gauge = ToolRange(robot, self.table), gauge_of(robot, self.free)
         self.every = tuple(range(len(self.references)))
         self.trusted = tuple(i for i in self.every if self.references[i].is_authoritative) or self.every
         self.values = {entry.name: entry.value(robot) for entry in self.entries}
         self.conflicts = conflicts(self.references)
-        self.same = gauge_flips(self.tool, flips_of(robot, []))
         self._views: dict[tuple[int, ...], _View] = {}
         self._readings: dict[Alternative, OtherReading] = {}
 
@@ -255,7 +256,7 @@ class _Judge:
         evidence : values in the entries' units
         """
         judged = [self._judged(entry) for entry in self.entries if only is None or entry.name in only]
-        sums = [self._combination(row) for row in self.gauge.determined]
+        sums = [self._number(row) for row in self.gauge.determined]
         trusted = self.view(self.trusted)
         views = list(dict.fromkeys(self._views.values()))
         unmet = {name for each in views if not each.extents.met for name in self._documents(each.own)}
@@ -299,14 +300,13 @@ class _Judge:
         return self._views[own]
 
     def _judged(self, entry: Entry) -> EntryEvidence:
+        if entry in self.free:
+            return self._number(np.eye(len(self.free))[self.free.index(entry)])
         own = self._independent(document_of(self.robot, entry))
         relevant = self.relevant(entry, own)
         if entry.column in LIMITS:
             return self._bound(entry, relevant)
-        view = self.view(own)
-        if entry.column == "direction":
-            return self._direction(entry, own, relevant, view)
-        return self._number(entry, relevant, view)
+        return self._direction(entry, own, relevant, self.view(own))
 
     def _independent(self, document: str) -> tuple[int, ...]:
         """Trusted references of documents that are independent of one; of those that contradict another which the table
@@ -344,22 +344,37 @@ class _Judge:
     def _documents(self, places: Sequence[int]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(self.references[i].document for i in places))
 
-    def _number(self, entry: Entry, relevant: tuple[int, ...], view: _View) -> EntryEvidence:
-        gauge = bool(self.gauge.support()[self.free.index(entry)])
-        extent = view.extents.free_choice(entry) if gauge else view.extents.of(entry)
-        concerned = [each for each in view.alternatives if entry.name in each.names]
-        open_anyway = entry.name in self.view(self.trusted).open_names
+    def _number(self, row: Reals) -> EntryEvidence:
+        """Of an entry that can take any value, or of what is determined together of several that are gauge, by their
+        factors (k,)."""
+        factors = [(entry, float(f)) for entry, f in zip(self.free, row) if f]
+        first, names, alone = factors[0][0], [entry.name for entry, _ in factors], len(factors) == 1
+        own = self._independent(document_of(self.robot, first))
+        view = self.view(own)
+        gauge = alone and bool(self.gauge.support()[self.free.index(first)])
+        extent = view.extents.along(row, moves_tool=not gauge)
+        relevant, every = (
+            sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
+        )
+        concerned = [each for each in view.alternatives if alone and first.name in each.names]
+        open_anyway = alone and first.name in self.view(self.trusted).open_names
         status: Status = "weak"
         if gauge:
             status = "gauge"
         elif not relevant:
-            consistent = self.relevant(entry, self.every)
-            status = "consistent" if consistent and not open_anyway else "open"
+            status = "consistent" if every and not open_anyway else "open"
         elif open_anyway:
             status = "open"
         elif not concerned and view.extents.met and self._small(extent):
-            status = self._settled(view, [entry.name])
-        return self._described(entry, status, extent, concerned, relevant)
+            status = self._settled(view, names)
+        if alone:
+            return self._described(first, status, extent, concerned, relevant)
+        return replace(
+            self._described(first, status, extent, [], relevant or every),
+            entry=_sum_of(factors),
+            value=sum(f * self.values[entry.name] for entry, f in factors),
+            alternatives=(),
+        )
 
     def _direction(self, entry: Entry, own: tuple[int, ...], relevant: tuple[int, ...], view: _View) -> EntryEvidence:
         concerned = [each for each in view.alternatives if entry.name in each.names]
@@ -390,11 +405,7 @@ class _Judge:
         self, entry: Entry, status: Status, extent: Extent, concerned: list[Alternative], relevant: Sequence[int]
     ) -> EntryEvidence:
         readings = [self._reading(each) for each in concerned]
-        readings += [
-            OtherReading(tuple((name, self._flipped(name)) for name in names), NOT_OFF)
-            for names in self.same
-            if entry.name in names
-        ]
+        readings += [each for each in self._same if entry.name in dict(each.entries)]
         if entry in self.free:
             readings += [self._shift(row) for row in self.gauge.directions if row[self.free.index(entry)]]
         off = reduce(ToolOff.worse, (each.off for each in concerned), extent.off)
@@ -416,43 +427,38 @@ class _Judge:
         return "settled_up_to_signs" if view.alternatives and self._rewritten & set(names) else "settled"
 
     @cached_property
+    def _otherwise(self) -> tuple[Tables, Flags]:
+        """All ways to write the robot's rows (H), and which of the k entries ``turning`` differ there, (H, k)."""
+        rows = same_robots(self.table)
+        return rows, np.array([np.abs(wrapped_between(rows, self.table, each)) > ROUNDING for each in self.turning]).T
+
+    @cached_property
     def _rewritten(self) -> set[str]:
         """Entries that have another sign or half turn in other rows of the same robot."""
-        every, turning = turned_once(self.table), [each for each in self.entries if each.column in OF_SIGNS]
-        return {each.name for each in turning if np.abs(wrapped_between(every, self.table, each)).max() > ROUNDING}
+        return {each.name for each, differs in zip(self.turning, self._otherwise[1].T) if differs.any()}
+
+    @cached_property
+    def _same(self) -> list[OtherReading]:
+        """Few entries written otherwise so that it is the same robot, without those that contain others."""
+        rows, differ = self._otherwise
+        count, kept = differ.sum(axis=1), list[int]()
+        for k in np.argsort(count, kind="stable").tolist():
+            if 0 < count[k] <= MAX_REWRITTEN and not any((differ[j] <= differ[k]).all() for j in kept):
+                kept.append(k)
+        return [
+            OtherReading(tuple(self._value_in(rows[[k]], n) for n in np.flatnonzero(differ[k]).tolist()), NOT_OFF)
+            for k in kept
+        ]
+
+    def _value_in(self, rows: Tables, place: int) -> tuple[str, float]:
+        """Name and value of one of ``turning`` in a batch of one, in its unit."""
+        entry = self.turning[place]
+        value = entry.of(rows) if entry.unit != "deg" else as_written(entry.of(rows))
+        return entry.name, float(value[0] * entry.in_unit)
 
     def _small(self, extent: Extent) -> bool:
         """Whether what is left open moves the tool by less than the tolerance, as far as a finished search can tell."""
         return not extent.at_least and extent.off.within(self.tolerance.mm, self.tolerance.deg)
-
-    def _combination(self, row: Reals) -> EntryEvidence:
-        """What of entries that are gauge is determined together."""
-        factors = [(entry, float(f)) for entry, f in zip(self.free, row) if f]
-        first = factors[0][0]
-        document = document_of(self.robot, first)
-        own = self._independent(document)
-        view = self.view(own)
-        extent = view.extents.along(row)
-        relevant, every = (
-            sorted({i for entry, _ in factors for i in self.relevant(entry, among)}) for among in (own, self.every)
-        )
-        status: Status = "weak"
-        if not relevant:
-            status = "consistent" if every else "open"
-        elif view.extents.met and self._small(extent):
-            status = self._settled(view, [entry.name for entry, _ in factors])
-        return EntryEvidence(
-            entry=_sum_of(factors),
-            value=sum(f * self.values[entry.name] for entry, f in factors),
-            unit=first.unit,
-            status=status,
-            interval=extent.interval,
-            by=self._documents(relevant or every),
-            alternatives=(),
-            document=document,
-            off=NOT_OFF if status in OUTRIGHT_OR_NOT else extent.off,
-            at_least=extent.at_least and status == "weak",
-        )
 
     def _given(self) -> list[EntryEvidence]:
         found = []
@@ -471,12 +477,6 @@ class _Judge:
     @cached_property
     def _asked_by_all(self) -> Asked:
         return Asked(self.robot, requirements_of(self.references))
-
-    def _flipped(self, name: str) -> float:
-        value = self.values.get(name, 0.0)
-        if column_of(name) in ("offset", "alpha"):
-            return value + 180.0 if value <= 0 else value - 180.0
-        return -value
 
     def _shift(self, row: Reals) -> OtherReading:
         """A combination that moves no tool, with a step of 5 units for its first entry."""

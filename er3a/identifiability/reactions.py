@@ -123,17 +123,16 @@ def reactions(robot: Robot, references: Sequence[Reference], entries: Sequence[E
     quantities = quantities_of(references)
     reacts = np.zeros((len(quantities), len(entries)), dtype=bool)
     table = tables_of(robot)
-    probes, owner = _probes(table, entries)
+    tried = [k for k, entry in enumerate(entries) if entry.column != "speed"]
+    probes = _probes(table, [entries[k] for k in tried])
     plain = [i for i, quantity in enumerate(quantities) if not isinstance(quantity, Extreme | Speed | LimitExcess)]
     if plain:
         values = predict_tables(join([table, probes]), robot, [quantities[i] for i in plain])
         changed = ~(np.abs(values[1:] - values[0]) <= REACTS)
-        for k, row in zip(owner, changed):
-            reacts[plain, k] |= row
+        reacts[np.ix_(plain, tried)] = changed.reshape(2, len(tried), -1).any(axis=0).T
     for extreme in {quantity for quantity in quantities if isinstance(quantity, Extreme)}:
         rows = [i for i, other in enumerate(quantities) if other == extreme]
-        moving = {k for k, moves in zip(owner, _moving_extreme(robot, extreme, table, probes)) if moves}
-        reacts[np.ix_(rows, list(moving))] = True
+        reacts[np.ix_(rows, tried)] = _moving_extreme(robot, extreme, table, probes).reshape(2, -1).any(axis=0)
     for i, quantity in enumerate(quantities):
         for k, entry in enumerate(entries):
             reacts[i, k] |= _bounds(quantity, entry)
@@ -161,18 +160,12 @@ def _moving_extreme(robot: Robot, quantity: Extreme, table: Tables, probes: Tabl
     return moving
 
 
-def _probes(table: Tables, entries: Sequence[Entry]) -> tuple[Tables, list[int]]:
-    """Tables in which one entry is another, and the place of that entry."""
-    found: list[Tables] = []
-    owner: list[int] = []
-    for k, entry in enumerate(entries):
-        if entry.column == "direction":
-            found.append(shifted(table, [entry], np.array([[-2 * float(entry.of(table)[0])]])))
-        elif entry.column != "speed":
-            size = PROBE_M if entry.unit == "mm" else PROBE_RAD
-            found.append(shifted(table, [entry], np.array([[size], [-size]])))
-        owner += [k] * (len(found[-1]) if entry.column != "speed" else 0)
-    return join(found), owner
+def _probes(table: Tables, entries: Sequence[Entry]) -> Tables:
+    """Tables (2 k) in which one of k entries is another: more, then less; a direction is reversed in both."""
+    more = np.array([PROBE_M if each.unit == "mm" else PROBE_RAD for each in entries])
+    signs = np.array([each.of(table)[0] if each.column == "direction" else 0.0 for each in entries])
+    steps = [np.where(signs, -2 * signs, way * more) for way in (1.0, -1.0)]
+    return shifted(table, entries, np.concatenate([np.diag(step) for step in steps]))
 
 
 def _names(entries: Sequence[Entry]) -> tuple[str, ...]:

@@ -4,26 +4,53 @@ text.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from er3a.comparison.compare import shift_between, turn_between
-from er3a.diagnosis.diagnose import diagnosis_of
-from er3a.diagnosis.faults import entry_of
+from er3a.comparison.compare import shift_between, turn_between, worst_pose
+from er3a.diagnosis.diagnose import Diagnosis, diagnosis_of
+from er3a.diagnosis.faults import SIDES, entry_of
 from er3a.diagnosis.ranking import usable
 from er3a.finding import Finding, fact, is_one
 from er3a.identifiability.entries import continuous_of, document_of, entries_of
 from er3a.identifiability.feasible import MET
+from er3a.identifiability.reactions import reactions
 from er3a.identifiability.requirements import Asked, requirements_of
 from er3a.kinematics.table_batch import Tables, frames_of, join, tables_of
 from er3a.numerics.arrays import Reals
-from er3a.numerics.peaks import box_points, peak
 from er3a.numerics.quasi_random import quasi_random_points
-from er3a.references.quantities import MM
+from er3a.references.quantities import MM, Extreme
 from er3a.references.reference import Documents, Reference, ReferenceSet, conflicts
 from er3a.robots.robot import Robot
+
+
+def diagnose(robot: Robot, references: Sequence[Reference]) -> Diagnosis:
+    """Hypotheses about what is wrong with a table, best first.
+
+    Parameters
+    ----------
+    robot : the table as given, tool not considered (references concern the flange)
+    references : official, CAD and export data count, if there are any, else claims do
+
+    Returns
+    -------
+    ranked : at most 10, those that explain first; empty if the references are met, or if no one or two faults do better
+        than the table as it is. What it could not examine is in ``not_examined``, and extremes over the limits that
+        the table misses in ``missed``
+    """
+    found = diagnosis_of(robot, references)
+    moving = [entry for entry in entries_of(robot) if entry.column not in (*SIDES, "speed")]
+    reacts = reactions(robot, usable(references), moving)
+    found.not_examined = tuple(entry.name for k, entry in enumerate(moving) if not reacts[:, k].any())
+    extremes = [each for each in references if isinstance(each.quantity, Extreme)]
+    extremes = [each for each in extremes if each.is_authoritative] or extremes
+    asked = Asked(robot, requirements_of(extremes))
+    if len(asked) and (robot.lower <= robot.upper).all():
+        off = asked.violation(asked.off(tables_of(robot)))
+        found.missed = tuple(extremes[i] for each, by in zip(asked.order, off) if by > MET for i in each.references)
+    return found
 
 
 def is_another_arm(failed: int, total: int, conclusion: Finding | None) -> bool:
@@ -201,7 +228,6 @@ class ToolRange:
     def __init__(self, robot: Robot, table: Tables):
         self.robot, self.table = robot, table
         self.lower, self.upper = np.minimum(robot.lower, robot.upper), np.maximum(robot.lower, robot.upper)
-        self.points = box_points(self.lower, self.upper)
 
     def off(self, other: Tables) -> ToolOff:
         """How far the tool of another table is off at most over the joint ranges.
@@ -216,10 +242,12 @@ class ToolRange:
         """
         both = join([self.table, other])
 
-        def most(off: Callable[[Reals, Reals], Reals]) -> float:
-            return peak(lambda q: off(*self._tool(both, q)), self.lower, self.upper, self.points)[1]
+        def tools(q: Reals) -> tuple[Reals, Reals]:
+            one, there = self._tool(both, q)
+            return one, there
 
-        return ToolOff(MM * most(shift_between), float(np.degrees(most(turn_between))))
+        mm, rad = (worst_pose(off, tools, self.robot)[0] for off in (shift_between, turn_between))
+        return ToolOff(MM * mm, float(np.degrees(rad)))
 
     def signature(self, tables: Tables) -> Reals:
         """Numbers that are equal for tables whose tools move alike.

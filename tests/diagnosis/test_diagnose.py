@@ -135,7 +135,7 @@ def test_members_of_a_set_differ_by_less_than_the_uncertainty_everywhere(times, 
     stated = [replace(each, uncertainty=times * each.uncertainty) for each in usable(load_references("er3_600"))]
     stated[12] = replace(stated[12], expected=stated[12].expected + off * stated[12].uncertainty)
     ranking = rank(changed("er3_600", alpha=(4, -np.pi / 2)), stated)
-    _, uncertainty = expected_of(ranking.references)
+    _, uncertainty = expected_of(ranking.case.references)
     assert len(ranking.groups[0]) > 1
     for group in ranking.groups:
         difference = ranking.pool.difference[list(group)]
