@@ -336,7 +336,6 @@ def rate_intervals(motion: PiecewiseMotion, limit: RateLimit) -> list[Interval[R
 
 LONGEST_TURN = 1.0  # rad, of all joints that count, within one series of the distances
 DEGREE = 24  # by which a sine of so short a turn is met to rounding
-SLIGHT_TURN, SLIGHT_DEGREE = 0.1, 8  # the same, of pieces between points that are near to each other
 SAMPLES = 500  # of a motion of an arm without the three sets
 
 
@@ -381,8 +380,7 @@ def _distances(robot: Robot, motion: PiecewiseMotion) -> tuple[Reals, Reals]:
     within = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
     starts = motion.times[piece] + np.diff(motion.times)[piece] * within / parts[piece]
     times = np.append(starts, motion.times[-1])
-    degree = DEGREE if turned.max() > SLIGHT_TURN else SLIGHT_DEGREE
-    x = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
+    x = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     inner = -1 + 2 * (within[:, None] + (x + 1) / 2) / parts[piece][:, None]
     factors = singularity.determinant_factors(robot, evaluated(motion.angle, piece[:, None], inner))
     values = np.stack([np.sin(factors.wrist), np.sin(factors.elbow), factors.shoulder], axis=-1)
