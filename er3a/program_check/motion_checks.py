@@ -40,8 +40,7 @@ POINTS_APART_M, POINTS_APART_RAD = 0.01, 0.05  # of the tool, or of a joint
 MIN_PARTS, MAX_PARTS = 8, 400
 AHEAD = 0.02  # of a way: what is beyond where it ends has no solution, if it ends for want of one
 SHORTEST_PART = 1e-4  # of a way, in which a joint that moves by more than WIDE_STEP jumps
-SMOOTH_STEP, SMOOTH_PART = 0.05, 1e-3  # rad or m, of a joint; of a way: near singular poses cubics through
-# points farther apart than that miss rates by up to 7 %, through nearer ones by up to 2 %
+SMOOTH_STEP = 0.05  # rad or m, of a joint from one point to the next: cubics through others miss rates by up to 7 %
 NO_WAY = 1e-9  # m or rad
 SLIGHT_TURN = math.radians(1.0)  # of the tool on an arc, which way round does not matter
 SAME_ARRIVAL = 1e-4  # rad
@@ -318,9 +317,8 @@ def _followed(arm: Robot, poses: Poses, start: Reals, parts: int) -> tuple[Reals
         wide = np.flatnonzero(steps > WIDE_STEP)
         first = int(wide[0]) if wide.size else len(q) - 1  # the last point before the first that is not followed
         open_parts = np.union1d(wide, [len(q) - 1] if len(q) < len(share) else []).astype(int)
-        parts_left = np.diff(share)
-        again = open_parts[parts_left[open_parts] > SHORTEST_PART]
-        again = np.union1d(again, np.flatnonzero((steps > SMOOTH_STEP) & (parts_left[: len(steps)] > SMOOTH_PART)))
+        again = np.union1d(open_parts, np.flatnonzero(steps > SMOOTH_STEP))
+        again = again[np.diff(share)[again] > SHORTEST_PART]
         if not again.size:
             done = not open_parts.size
             return share[: first + 1], q[: first + 1], None if done else float(share[first + 1])

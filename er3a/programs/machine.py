@@ -234,9 +234,10 @@ class Machine:
                 return
             self.budget -= 1
             operation = frame.routine.code[frame.at]
-            counts = isinstance(operation, Branch) and operation.counted
             # Ways meet where jumps lead to. One in a state in which another has been would only repeat that one.
-            if frame.at in self.labels[frame.routine.name] and not (counts and self._is_known(way, operation)):
+            if frame.at in self.labels[frame.routine.name] and not (
+                isinstance(operation, Branch) and operation.counted and self._is_known(way, operation)
+            ):
                 self.budget -= STATE_COST
                 if self.pending and begun:
                     self._wait(way)
