@@ -155,7 +155,10 @@ class Judge:
             return None
         pose = np.eye(4) if tool.name == FLANGE else self.robot.tool
         pose = pose if tool.pose is None else tool.pose
-        return self._arms.setdefault(pose.tobytes(), self.robot.replace(tool=pose))
+        key = pose.tobytes()
+        if key not in self._arms:
+            self._arms[key] = self.robot.replace(tool=pose)
+        return self._arms[key]
 
     def _checked(self, motion: ArmMotion, before: Reals | None) -> CheckedMotion:
         arm, base = self._arm(motion.tool), motion.base.pose

@@ -55,7 +55,7 @@ Values = dict[str, Value]
 
 @dataclass(slots=True)
 class Frame:
-    """A routine that runs."""
+    """A routine that runs; ``decisions``: those through something unknown that its way had met when it began."""
 
     routine: Routine
     at: int = 0
@@ -63,6 +63,7 @@ class Frame:
     calls: tuple[Place, ...] = ()
     result: str = ""
     outs: tuple[tuple[str, Expression], ...] = ()
+    decisions: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class Visit:
     here: tuple[bytes, ...]
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Way:
     """A way through the program: everything that it depends on from here."""
 
@@ -139,7 +140,7 @@ class Machine:
         self.endings: list[Ending] = []
         self.entered: set[str] = set()
         self.budget = limits.operations
-        self.pending: list[Way] = []
+        self.pending: dict[Where, list[Way]] = {}
         self.seen: dict[Hashable, int] = {}
         self.labels = {name: _labels(routine) for name, routine in program.routines.items()}
         self.fixed: set[str] = set()  # variables that nothing changes, or that nothing depends on
@@ -164,7 +165,7 @@ class Machine:
                 memory.here = Position()
             routine = self.program.routines[name]
             memory.local = self._locals(routine, [], memory) if routine.parameters else {}
-            self.pending = [Way([Frame(routine, local=memory.local)], memory, name)]
+            self._wait(Way([Frame(routine, local=memory.local)], memory, name))
             while self.pending:
                 self._follow(self._next())
         after: dict[int, int] = {}
@@ -191,21 +192,25 @@ class Machine:
             if name not in self.entered:
                 yield name
 
+    def _wait(self, way: Way) -> None:
+        """Keep a way until it is the earliest in the text."""
+        self.pending.setdefault(way.where, []).append(way)
+
+    def _waiting(self) -> int:
+        return sum(map(len, self.pending.values()))
+
     def _next(self) -> Way:
         """The way that is earliest in the text, with those in its place joined to it."""
-        first = min(self.pending, key=lambda way: [frame.at for frame in way.frames])
-        where = first.where
-        here = [way for way in self.pending if way.where == where]
-        if len(here) > 1:
-            self.pending = [way for way in self.pending if way.where != where] + self._joined(here)
-            first = next(way for way in self.pending if way.where == where)
-        self.pending.remove(first)
+        where = min(self.pending, key=lambda where: [at for _, at in where])
+        first, *others = self._joined(self.pending.pop(where))
+        if others:
+            self.pending[where] = others
         return first
 
     def _joined(self, ways: list[Way]) -> list[Way]:
         """Ways in one place, those in one state as one; of too many one in which what differs is unknown: first for
         each position of the arm, then for all."""
-        kept = self._one_of_each(ways, self._state)
+        kept = self._one_of_each(ways, self._state) if len(ways) > 1 else ways
         if len(kept) > IN_ONE_PLACE:
             kept = self._one_of_each(kept, lambda way: way.memory.here.key())
         return self._one_of_each(kept, lambda way: 0) if len(kept) > IN_ONE_PLACE else kept
@@ -229,12 +234,13 @@ class Machine:
                 return
             self.budget -= 1
             operation = frame.routine.code[frame.at]
-            counts = isinstance(operation, Branch) and operation.counted
             # Ways meet where jumps lead to. One in a state in which another has been would only repeat that one.
-            if frame.at in self.labels[frame.routine.name] and not (counts and self._is_known(way, operation)):
+            if frame.at in self.labels[frame.routine.name] and not (
+                isinstance(operation, Branch) and operation.counted and self._is_known(way, operation)
+            ):
                 self.budget -= STATE_COST
                 if self.pending and begun:
-                    self.pending.append(way)
+                    self._wait(way)
                     return
                 state = way.where, self._state(way)
                 if state in self.seen:
@@ -266,7 +272,7 @@ class Machine:
             case Branch():
                 return self._branch(way, frame, operation, at)
             case Call():
-                if len(way.frames) > self.limits.depth:
+                if self._is_too_deep(way, operation.routine):
                     self._end(way, "depth", operation.place)
                     return False
                 self._call(way, operation)
@@ -278,6 +284,12 @@ class Machine:
             case _:
                 self._carry_out(way, operation)
         return True
+
+    def _is_too_deep(self, way: Way, routine: str) -> bool:
+        """Whether a call is one too many within others, or of a routine that only something unknown keeps from calling
+        itself for ever."""
+        again = [frame.decisions for frame in way.frames if frame.routine.name == routine]
+        return len(way.frames) > self.limits.depth or (len(again) > 1 and way.decisions > again[0])
 
     def _is_known(self, way: Way, operation: Operation) -> bool:
         """Whether it is known which side of a branch is taken."""
@@ -392,13 +404,10 @@ class Machine:
         self._note(other, branch.place, Decision(branch.text, False))
         if branch.to <= at:
             self._round(other, at)
-        if len(self.pending) + 1 >= self.limits.ways:
-            by_place: dict[Where, list[Way]] = {}
-            for each in self.pending:
-                by_place.setdefault(each.where, []).append(each)
-            self.pending = [each for here in by_place.values() for each in self._joined(here)]
-        if len(self.pending) + 1 < self.limits.ways:
-            self.pending.append(other)
+        if self._waiting() + 1 >= self.limits.ways:
+            self.pending = {where: self._joined(here) for where, here in self.pending.items()}
+        if self._waiting() + 1 < self.limits.ways:
+            self._wait(other)
         else:
             self._end(other, "ways", branch.place)
         return True
@@ -410,7 +419,8 @@ class Machine:
         if call.result == syntax.START:
             del local["%inside"]
         outs = tuple((parameter.name, each) for parameter, each in given if parameter.out and variable_of(each))
-        way.frames.append(Frame(routine, 0, local, (*way.frames[-1].calls, call.place), call.result, outs))
+        calls = (*way.frames[-1].calls, call.place)
+        way.frames.append(Frame(routine, 0, local, calls, call.result, outs, way.decisions))
         memory.local = local
 
     def _return(self, way: Way, operation: Return) -> None:

@@ -97,25 +97,24 @@ socket_read_ascii_float socket_read_binary_integer socket_read_byte_list socket_
 socket_send_byte socket_send_int socket_send_line socket_send_string socket_set_var str_at str_cat
 str_empty str_find str_len str_sub sync textmsg time to_num to_str tool_contact tool_contact_examples varmsg
 write_output_boolean_register write_output_float_register write_output_integer_register write_port_bit
-write_port_register zero_ftsensor
+write_port_register zero_ftsensor get_actual_tool_flange_pose get_list_length
 """
 HARMLESS = frozenset(HARMLESS_TEXT.split())
 """Functions of the language that move nothing and set no frame; any other name may be anybody's and do anything."""
-OUTPUTS = {
-    "set_digital_out": "digital_out",
-    "set_standard_digital_out": "standard_digital_out",
-    "set_configurable_digital_out": "configurable_digital_out",
-    "set_tool_digital_out": "tool_digital_out",
-    "set_analog_out": "analog_out",
-    "set_standard_analog_out": "standard_analog_out",
-    "set_flag": "flag",
-}
+OUTPUTS_TEXT = """
+set_digital_out set_standard_digital_out set_configurable_digital_out set_tool_digital_out set_analog_out
+set_standard_analog_out set_flag
+"""
+OUTPUTS = frozenset(OUTPUTS_TEXT.split())
 LOADS = {"set_payload": ("m", "cog"), "set_target_payload": ("m", "cog", "inertia", "transition_time")}
 """Functions that say what hangs on the flange, by their parameters."""
+WHERE_TEXT = """
+get_actual_joint_positions get_target_joint_positions get_actual_tcp_pose get_target_tcp_pose get_target_waypoint
+get_tcp_offset
+"""
+MATHS_TEXT = "sqrt sin cos tan asin acos atan floor ceil"
 SIGNATURES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("get_actual_joint_positions", "get_target_joint_positions", "get_actual_tcp_pose"), ()),
-    **dict.fromkeys(("get_target_tcp_pose", "get_target_waypoint", "get_tcp_offset"), ()),
-    "get_actual_tool_flange_pose": (),
+    **dict.fromkeys(WHERE_TEXT.split(), ()),
     "get_forward_kin": ("q",),
     "get_inverse_kin": ("x", "qnear"),
     "pose_trans": ("p_from", "p_from_to"),
@@ -126,8 +125,8 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
     "norm": ("a",),
     "normalize": ("v",),
     "length": ("v",),
-    "get_list_length": ("v",),
-    **dict.fromkeys(("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "floor", "ceil", "abs"), ("f",)),
+    **dict.fromkeys(MATHS_TEXT.split(), ("f",)),
+    "abs": ("f",),
     "atan2": ("x", "y"),
     "pow": ("base", "exponent"),
     "d2r": ("d",),
@@ -135,9 +134,7 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
 }
 """Parameters of the functions that are evaluated. A call that does not fit them is not understood."""
 PLAIN: dict[str, Callable[..., float]] = {
-    **{name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "pow")},
-    "floor": math.floor,
-    "ceil": math.ceil,
+    **{name: getattr(math, name) for name in (*MATHS_TEXT.split(), "atan2", "pow")},
     "d2r": math.radians,
     "r2d": math.degrees,
     "abs": abs,
@@ -274,7 +271,7 @@ class UrScriptDialect(Dialect):
             return Unknown(doing.text)
         output = _placed(("n", "b"), values, keywords) if call.function in OUTPUTS else None
         if output is not None and len(output) == 2:
-            name = f"{OUTPUTS[call.function]}[{shown(output['n'])}]"
+            name = f"{call.function.removeprefix('set_')}[{shown(output['n'])}]"
             return Output(name, shown(output["b"]))
         if call.function.partition(".")[2] in LIST_METHODS:
             return Aside(doing.text)
@@ -373,8 +370,6 @@ def _of_position(memory: ProgramMemory, name: str, given: Values) -> Value | Non
         case "get_forward_kin" if given:
             joints = _target(given["q"], "")
             here = Position(joints.joints) if isinstance(joints, JointTarget) else Position()
-        case "get_actual_tool_flange_pose":
-            tool = NamedFrame("flange", np.eye(4))
         case "get_forward_kin" | "get_actual_tcp_pose" | "get_target_tcp_pose" | "get_target_waypoint":
             pass
         case _:
@@ -394,7 +389,7 @@ def _of_values(name: str, values: list[Value]) -> Value | None:
     poses = [pose for pose in map(_pose, values) if pose is not None]
     plain = numbers(value) if isinstance(value, tuple) else None
     match name:
-        case "length" | "get_list_length":
+        case "length":
             return len(value) if isinstance(value, tuple) else None
         case "norm" | "normalize" if plain and finite(plain):
             size = math.hypot(*plain)
