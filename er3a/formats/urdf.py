@@ -110,7 +110,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
-    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (MISFIT_POSES, len(sources)))
     values = q @ coupling.T + shift
     given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()

@@ -150,8 +150,8 @@ PROGRAM = "a robot program"
 def check_file(path: Path, xacro: Sequence[str] = (), base: str | None = None, tip: str | None = None) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    A folder means the study in it. ``xacro``: arguments of a xacro file, ``NAME:=VALUE``; ``base``, ``tip``: the links of
-    a URDF at which the arm begins and ends.
+    A folder means the study in it. ``xacro``: arguments of a xacro file, ``NAME:=VALUE``; ``base``, ``tip``: links of a
+    URDF at which the arm begins and ends.
 
     Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
     where it stands, stands in, or else the working folder.

@@ -44,7 +44,7 @@ def test_arguments_that_a_file_may_need_are_named(tmp_path):
     file = tmp_path / "a.xacro"
     needed = '<xacro:arg default="" name="speeds"/><link name="${load_yaml(\'$(arg speeds)\')}"/>'
     file.write_text(ROBOT.replace('<link name="CODE"/>', needed), encoding="utf-8")
-    with pytest.raises(InputError, match="NAME:=VALUE.*speeds"), plain_urdf(file):
+    with pytest.raises(InputError, match=r"NAME:=VALUE.*speeds"), plain_urdf(file):
         pass
 
 
