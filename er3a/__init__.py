@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from er3a.kinematics.symbolic import arm_transform as arm_transform
     from er3a.kinematics.symbolic import link_transforms as link_transforms
     from er3a.pipeline.viewing.plot import plot as plot
-    from er3a.planning.follow import follow as follow
+    from er3a.planning.class_follow import follow as follow
     from er3a.planning.moves import line as line
     from er3a.planning.toolbox import ctraj as ctraj
     from er3a.planning.toolbox import jtraj as jtraj
@@ -83,7 +83,7 @@ _PUBLIC = {
     "jtraj": "er3a.planning.toolbox",
     "ctraj": "er3a.planning.toolbox",
     "line": "er3a.planning.moves",
-    "follow": "er3a.planning.follow",
+    "follow": "er3a.planning.class_follow",
     "plot": "er3a.pipeline.viewing.plot",
     "clearance": "er3a.collision.along",
     "select": "er3a.selection.select",

@@ -120,20 +120,34 @@ def read_arm(
     return ReadArm(robot, True, beside=beside_the_table(robot))
 
 
-def load_robot(name_or_path: str | Path, convention: Convention = "standard", xacro: Sequence[str] = ()) -> Robot:
+def load_robot(
+    name_or_path: str | Path,
+    convention: Convention = "standard",
+    xacro: Sequence[str] = (),
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+) -> Robot:
     """Load a robot by the name of a file in data/robots or of a known arm, or by a path of a robot file, D-H table,
     URDF or xacro.
 
     A name is looked up below the working folder first, then among the robots that come with er3a, then in the catalogue
     of arms (``er3a arms``). Other files than robot files (.yaml) hold a D-H table, as :func:`read_table` takes it.
-    Assumptions give a warning (``er3a.InputWarning``). ``xacro``: arguments of a xacro file, ``NAME:=VALUE``.
+    Assumptions give a warning (``er3a.InputWarning``).
+
+    Parameters
+    ----------
+    convention : of a D-H table
+    xacro : arguments of a xacro file, ``NAME:=VALUE``
+    base, tip : links of a URDF at which the arm begins and ends; None if the file has only one arm
 
     Raises
     ------
     InputError
         naming file, field and remedy
     """
-    return _warned(name_or_path, read_arm(str(name_or_path), convention=convention, whole=True, xacro=xacro))
+    given: Any = {"convention": convention, "xacro": xacro, "base": base, "tip": tip}
+    return _warned(name_or_path, read_arm(str(name_or_path), whole=True, **given))
 
 
 def _warned(source: str | Path, arm: ReadArm) -> Robot:

@@ -73,6 +73,9 @@ def _no_masses(robot: Robot) -> str:
     masses = [each.body.mass for each in robot.masses.links]
     if len(masses) >= SEVERAL and np.ptp(masses) == 0:
         return f"all links have the mass {masses[0]:g} kg"
+    moments = [np.linalg.eigvalsh(each.body.inertia_matrix) for each in robot.masses.links]
+    if len(moments) >= SEVERAL and np.allclose(moments, moments[0][0]):
+        return f"all links have the moment of inertia {moments[0][0]:g} kg m2 about each axis"
     away = {each.link: _outside(robot, each.link, np.array(each.body.centre)) for each in robot.masses.links}
     if far := {link: distance for link, distance in away.items() if distance > OUTSIDE_M}:
         link = max(far, key=lambda each: far[each])

@@ -110,7 +110,7 @@ def _imported(path: Path, base: str | None, tip: str | None, snap: bool) -> Urdf
     found = urdf_tree.read_chain(path, base, tip, snap)
     robot, sources, coupling, shift, notes = _robot_of_chain(path, found)
     moving = [joint for joint in found.joints if joint.moves]
-    q = np.random.default_rng(0).uniform(-math.pi, math.pi, (MISFIT_POSES, len(sources)))
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (MISFIT_POSES, len(sources)))
     values = q @ coupling.T + shift
     given = _chain_forward(found.joints, values)
     misfit = np.linalg.norm((forward(robot, q) - given)[:, :3, 3], axis=1).max()
@@ -290,10 +290,7 @@ def link_shapes(
             try:
                 made.append(urdf_tree.collision_shape(path, name, collision, place))
             except Er3aError as error:
-                said = str(error)
-                if isinstance(error, InputError) and error.file == str(path):  # of xacro a file that is gone by now
-                    said = f"{error.field}: {error.problem}. {error.remedy}"
-                unread.setdefault(name, said)
+                unread.setdefault(name, _said(path, error))
         shapes += urdf_tree.with_capsules(made)
     shapes.sort(key=lambda each: each.link)
     surfaces: dict[int, list[Reals]] = {}
@@ -309,6 +306,13 @@ def link_shapes(
     if astray:
         notes.append(f"shapes of {', '.join(astray)} are left out: they do not move with the arm's chain")
     return fields, tuple(notes), (*unread, *(name for name in astray if name in hanging))
+
+
+def _said(path: Path, error: Er3aError) -> str:
+    """An error about a URDF; without the file's name, as that of expanded xacro is gone by now."""
+    if isinstance(error, InputError) and error.file == str(path):
+        return f"{error.field}: {error.problem}. {error.remedy}"
+    return str(error)
 
 
 def link_visuals(
@@ -327,14 +331,14 @@ def link_visuals(
     notes : one at most, about geometry that could not be read
     """
     parts: dict[int, list[tuple[Reals, Integers]]] = {}
-    missing = dict[str, Er3aError]()
+    missing = dict[str, str]()
     for name, visuals, place in urdf_tree.in_links(root, robot, placed, "visual"):
         T, number = place or (np.eye(4), 0)
         for visual in visuals if place else ():
             try:
                 points, faces = urdf_tree.visual_surface(path, name, visual)
             except Er3aError as error:
-                missing.setdefault(name, error)
+                missing.setdefault(name, _said(path, error))
                 continue
             parts.setdefault(number, []).append((points @ T[:3, :3].T + T[:3, 3], faces))
     found = []

@@ -53,7 +53,7 @@ LIMITS = {"limit": ("lower", "upper"), "safety_controller": ("soft_lower_limit",
 """Attributes of a joint's limits, by their element."""
 FREE = ("floating", "planar")
 SNAP_RAD = 1e-4
-ROUNDED_RAD = 1e-3  # of angles in three digits, and of 1.57
+ROUNDED_RAD = 2e-3  # of angles in three digits, of 1.57 and of 3.14
 MAX_BYTES = 20_000_000
 ARM_JOINTS = 4  # so many joints before a branching make what follows a hand rather than an arm
 FINGER_JOINTS = 4
@@ -642,10 +642,11 @@ def masses_from_urdf(
     """
     found: dict[int, list[MassBody]] = {}
     notes: list[str] = []
-    changed: list[str] = []
+    astray: list[str] = []
+    changed: dict[str, str] = {}
     for name, inertials, place in in_links(root, robot, places, "inertial", carried=True):
         if place is None:
-            notes.append(f"link {name} does not move with the arm's chain; its mass was left out")
+            astray.append(name)
             continue
         try:
             body, T = body_of(name, inertials[0])
@@ -657,14 +658,18 @@ def masses_from_urdf(
             before, after = (
                 ", ".join(f"{value:g}" for value in np.linalg.eigvalsh(each.inertia_matrix)) for each in (given, body)
             )
-            notes.append(
-                f"link {name} has principal moments of inertia of {before} kg m2, which no body has: the nearest "
-                f"that a body can have, {after} kg m2, were taken"
+            changed[name] = (
+                f"principal moments of inertia of {before} kg m2, which no body has: the nearest that a body can have, "
+                f"{after} kg m2, were taken"
             )
-            changed.append(name)
         if body.mass > 0 or any(body.inertia):
             placed, number = place
             found.setdefault(number, []).append(moved(body, placed @ T))
+    if astray:
+        notes.append(f"masses of {', '.join(astray)} are left out: they do not move with the arm's chain")
+    if changed:
+        first, *others = changed
+        notes.append(f"link {first} has {changed[first]}" + (f"; likewise of {', '.join(others)}" if others else ""))
     missing = [name for k, name in enumerate(moving) if k + 1 not in found]
     if found and missing:
         notes.append(f"no mass is given for what moves with {', '.join(missing)}")
@@ -976,6 +981,7 @@ MACRO, EXPRESSION = re.compile(r"<xacro:(?!property\b|arg\b)"), re.compile(r"\$[
 EXPANDING_S = 30  # the largest public ones take two
 UNBOUNDED = "Look for an expression without end, such as 9**9**9"
 ARGUMENTS = "Give its arguments: --xacro NAME:=VALUE"
+DECLARED = re.compile(r'<xacro:arg\b[^>]*?\bname="([^"]+)"')
 NO_PACKAGE, PACKAGES = re.compile(r"Package not found: (\S+)"), "Keep that package in a folder beside the file's own"
 EXTRA = "Install it: pip install 'er3a[xacro]'; or expand the file elsewhere: xacro FILE > arm.urdf"
 
@@ -1039,7 +1045,8 @@ def _expanded(path: Path, values: dict[str, str]) -> str:
         if missing := NO_PACKAGE.search(reason):
             raise InputError(path, None, f"needs the package {missing[1]}, which was not found", PACKAGES)
         reason = reason.strip().rpartition("\n")[2][:200] or f"its expansion ended with {done.returncode}"
-        raise InputError(path, None, f"can't be expanded ({reason})", ARGUMENTS)
+        own = ", ".join(DECLARED.findall(read_text(path, MAX_BYTES)))
+        raise InputError(path, None, f"can't be expanded ({reason})", f"{ARGUMENTS}{own and f' (it has {own})'}")
     root = ElementTree.fromstring(text)
     for mesh in root.iter("mesh"):
         if (file := mesh_of(path, mesh.get("filename", ""))) is not None:

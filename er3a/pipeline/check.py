@@ -147,10 +147,11 @@ _CHECKS: dict[str, tuple[str, Callable[[Path], object]]] = {
 PROGRAM = "a robot program"
 
 
-def check_file(path: Path, xacro: Sequence[str] = ()) -> str:
+def check_file(path: Path, xacro: Sequence[str] = (), base: str | None = None, tip: str | None = None) -> str:
     """Check a file and return in words what it is; :class:`er3a.errors.InputError` if something is wrong with it.
 
-    A folder means the study in it. ``xacro``: arguments of a xacro file, ``NAME:=VALUE``.
+    A folder means the study in it. ``xacro``: arguments of a xacro file, ``NAME:=VALUE``; ``base``, ``tip``: links of a
+    URDF at which the arm begins and ends.
 
     Each file that it names is looked at too, from the folder that a study is run in: that which ``config`` or ``data``,
     where it stands, stands in, or else the working folder.
@@ -169,7 +170,7 @@ def check_file(path: Path, xacro: Sequence[str] = ()) -> str:
         read_dh_table(path, "arm")
         return "a D-H table"
     if path.suffix in URDF and path.exists():
-        load_robot(path, xacro=xacro)
+        load_robot(path, xacro=xacro, base=base, tip=tip)
         return URDF_FILE
     if path.suffix not in (".yaml", ".yml"):
         if not path.exists():

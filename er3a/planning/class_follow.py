@@ -35,6 +35,7 @@ from er3a.kinematics.classes.chain_solvers import Unsolved
 from er3a.kinematics.wrist_partitioned import wrist_partition_missing
 from er3a.numerics.arrays import Integers, Reals, copy_values
 from er3a.numerics.jit import kernel
+from er3a.planning import follow as closed_form
 from er3a.planning.motion_faults import limit_intervals
 from er3a.planning.moves import ToolPath
 from er3a.planning.piecewise import PiecewiseMotion, chebyshev_times, motion_through
@@ -268,6 +269,34 @@ def follows_tool_paths(robot: Robot) -> bool:
     solver = arm_solver(robot).chain
     by_class = not (isinstance(solver, Unsolved) or solver.parameters)
     return by_class or solver.code == "arm_angle" or wrist_partition_missing(robot) is None
+
+
+def follow(
+    robot: Robot, line: ToolPath, t: Reals, q_start: Reals | None = None, start_slot: int | None = None
+) -> closed_form.Followed | PiecewiseMotion:
+    """Follow a line, by whatever way the arm's class has; ``.joints(t)`` of the result has a row for each time.
+
+    Parameters
+    ----------
+    t : (N,), s, rising from 0 to the line's duration
+    q_start : (n,), rad or m, joints at the start, whose tool pose is the line's first
+    start_slot : closed-form branch (0..7) at the start, of six joints with a wrist; None for the best one
+
+    Returns
+    -------
+    followed : of six joints with parallel axes 2 and 3 and a wrist the best branches as a whole, also past jumps; of
+        other arms the motion of :func:`follow_by_class`
+
+    Raises
+    ------
+    NotWristPartitionedError
+        for an arm whose class has no such task
+    PathEndsError
+        where an arm of another class does not follow to the end
+    """
+    if wrist_partition_missing(robot) is None:
+        return closed_form.follow(robot, line, t, q_start, start_slot)
+    return follow_by_class(robot, line, q_start)
 
 
 def follow_by_class(robot: Robot, path: ToolPath, q_start: Reals | None = None) -> PiecewiseMotion:

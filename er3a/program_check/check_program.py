@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from er3a.by_value import ByValue
+from er3a.by_value import ByValue, Displayed, Sheet
 from er3a.collision.pairs import ASSUMED_MARGIN, PENETRATION_TOLERANCE
 from er3a.collision.scene import Scene
 from er3a.collision.shapes import has_bare_tool, shapes_assumed
@@ -168,8 +168,8 @@ class CycleTime:
     complete: bool
 
 
-@dataclass(frozen=True, eq=False)
-class ProgramCheck(ByValue):
+@dataclass(frozen=True, eq=False, repr=False)
+class ProgramCheck(ByValue, Displayed):
     """The result of a program check.
 
     Attributes
@@ -191,6 +191,13 @@ class ProgramCheck(ByValue):
     cycle: CycleTime
     checked: tuple[Check, ...]
     shapes: Finding | None = None
+
+    def sheet(self) -> Sheet:
+        """The level, how many motions pass, and a row for each finding."""
+        passed = sum(each.level == "pass" for each in self.verdicts)
+        heading = f"{self.execution.program.name}: {self.level}, {passed} of {len(self.verdicts)} motions pass"
+        rows = ((each.place.line, each.level, each.finding) for each in self.findings)
+        return Sheet.of_table(heading, ("line", "level", "finding"), rows, len(self.findings))
 
     @property
     def arms(self) -> tuple[tuple[str, Robot], ...]:

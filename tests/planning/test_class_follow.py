@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+import er3a
 from er3a.errors import NotWristPartitionedError
 from er3a.kinematics.forward import forward
 from er3a.planning.class_follow import PathEndsError, follow_by_class
@@ -95,6 +96,14 @@ def test_without_start_joints_the_arm_with_most_margin_is_taken_and_limits_count
 
 @pytest.mark.long
 @pytest.mark.usefixtures("uncompiled")
+def test_the_public_function_follows_by_whatever_way_the_class_has():
+    q = np.array([[0.3, 0.4, 0.1, 0.2], [0.4, 0.5, 0.12, 0.1]])
+    T = forward(SCARA, q)
+    t = np.linspace(0, 1, 5)
+    followed = er3a.follow(SCARA, line(T[0], T[1], 1.0), t, q[0])
+    np.testing.assert_array_equal(followed.joints(t), follow_by_class(SCARA, line(T[0], T[1], 1.0), q[0]).joints(t))
+
+
 def test_what_can_not_be_followed_is_told_with_the_time():
     T = forward(SCARA, by_hand(*np.array([[0.5, 0.0, 0.25, 0.0]]).T, 1))[0]
     beyond = T.copy()

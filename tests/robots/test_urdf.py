@@ -95,6 +95,7 @@ def test_import_agrees_with_pinocchio_and_survives_the_robot_file(random, tmp_pa
         ("-1.57", -np.pi / 2),
         ("0.785", np.pi / 4),
         ("3.1416", np.pi),
+        ("3.14", np.pi),
         ("1.569", None),
         ("0.79", None),
     ],

@@ -13,14 +13,17 @@ from er3a.formats.urdf import import_urdf
 ROD = '<collision><origin xyz="0 0 0.15"/><geometry><box size="0.1 0.1 0.3"/></geometry></collision>'
 
 
-def written(folder: Path, mass="{k}.5", centre="0 0 0.15", about_origin=False, effort="{k}00", limit=2.0) -> Path:
+def written(
+    folder: Path, mass="{k}.5", centre="0 0 0.15", about_origin=False, effort="{k}00", limit=2.0, inertia=None
+) -> Path:
     """An arm of four joints, each link a rod of 0.3 m along z; ``{k}`` is the number of joint or link."""
     text = '<robot name="r"><link name="l0"/>'
     for k in range(1, 5):
         across = float(mass.format(k=k)) * (0.1 / 12 + (0.15**2 if about_origin else 0))
         along = float(mass.format(k=k)) * 0.02 / 12
-        inertia = f'<inertia ixx="{across}" iyy="{across}" izz="{along}" ixy="0" ixz="0" iyz="0"/>'
-        body = f'<inertial><origin xyz="{centre}"/><mass value="{mass.format(k=k)}"/>{inertia}</inertial>'
+        across, along = inertia or (across, along)
+        moments = f'<inertia ixx="{across}" iyy="{across}" izz="{along}" ixy="0" ixz="0" iyz="0"/>'
+        body = f'<inertial><origin xyz="{centre}"/><mass value="{mass.format(k=k)}"/>{moments}</inertial>'
         text += f'<link name="l{k}">{ROD}{body}</link><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
         text += f'<child link="l{k}"/><origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="{k % 2} {1 - k % 2} 0"/>'
         text += f'<limit lower="{-limit}" upper="{limit}" velocity="2" effort="{effort.format(k=k)}"/></joint>'
@@ -38,8 +41,8 @@ def test_what_may_be_meant_is_kept(tmp_path):
 
 @pytest.mark.parametrize(
     "given",
-    [{"mass": "1"}, {"centre": "0 0 1.4"}, {"about_origin": True}],
-    ids=["one mass for all", "centres far outside", "moments about the origin"],
+    [{"mass": "1"}, {"centre": "0 0 1.4"}, {"about_origin": True}, {"inertia": (1, 1)}],
+    ids=["one mass for all", "centres far outside", "moments about the origin", "one inertia for all"],
 )
 def test_masses_that_are_none_are_left_out(tmp_path, given):
     imported = import_urdf(written(tmp_path, **given))

@@ -13,6 +13,7 @@ from er3a.files.robot_writer import write_robot
 from er3a.formats.urdf import export_urdf, import_urdf
 from er3a.kinematics.by_class import arm_solver
 from er3a.kinematics.forward import forward, frames
+from er3a.pipeline.check import check_file
 from testing.arms import make_arm
 from testing.fleet import DhModel, UrdfFile, dh_models, urdf_files
 from testing.fleet_study import round_trip, singular_joints
@@ -68,6 +69,8 @@ def test_two_arms_are_asked_for_by_name(written):
     path = written(row(5), row(4, 10), row(3, 20, "l1"))
     with pytest.raises(InputError, match=r"branches into moving joints j0, j10.*by --tip: l4, l22, l13"):
         import_urdf(path)
+    assert load_robot(path, tip="l4").joints == 5  # the arm that it names can be had in each way
+    assert check_file(path, tip="l4") == "a URDF"
     first, second = import_urdf(path, tip="l4"), import_urdf(path, tip="l13", base="base")
     assert (first.robot.joints, second.robot.joints) == (5, 4)
     assert first.joints == ("j0", "j1", "j2", "j3", "j4")

@@ -40,6 +40,14 @@ def test_an_expression_reaches_no_code_and_no_end_of_the_machine(tmp_path, monke
     assert not (tmp_path / "ran").exists()
 
 
+def test_arguments_that_a_file_may_need_are_named(tmp_path):
+    file = tmp_path / "a.xacro"
+    needed = '<xacro:arg default="" name="speeds"/><link name="${load_yaml(\'$(arg speeds)\')}"/>'
+    file.write_text(ROBOT.replace('<link name="CODE"/>', needed), encoding="utf-8")
+    with pytest.raises(InputError, match=r"NAME:=VALUE.*speeds"), plain_urdf(file):
+        pass
+
+
 def test_expressions_and_macros_are_expanded(tmp_path):
     file = tmp_path / "a.xacro"
     file.write_text(ROBOT.replace("CODE", "${python.len([1, 2])}"), encoding="utf-8")

@@ -77,6 +77,8 @@ def check(
         typer.Argument(callback=options.given_files, help="robot, study, target, path, scene or reference files"),
     ],
     xacro: options.Xacro = None,
+    base: options.Base = None,
+    tip: options.Tip = None,
     sarif: Annotated[Path | None, typer.Option(help="write the rules that URDFs break as SARIF 2.1.0")] = None,
     as_json: options.AsJson = False,
 ):
@@ -92,7 +94,7 @@ def check(
     for file in files:
         try:
             with noted_doubts() as doubts:
-                kind = check_file(file, xacro or ())
+                kind = check_file(file, xacro or (), base, tip)
         except Er3aError as error:
             options.print_error(error)
             parts = {key: getattr(error, key, None) for key in ("field", "problem", "remedy")}
