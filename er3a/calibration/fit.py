@@ -185,10 +185,9 @@ def scale_of(robot: Robot, observations: PointObservations) -> Entry | None:
     longest = max(alone, key=lambda entry: abs(entry.value(robot)), default=None)
     if longest is None:
         return None
-    seen = observations.predict(robot)
-    held = observations.shifted(np.where(robot.sliding, -observations.row_values, 0.0)).predict(robot)
-    known, off = float(np.linalg.norm(seen - held)), float(np.linalg.norm(seen - observations.values_mm))
-    min_known = max(CLEAR * off, DEPENDENT * abs(longest.value(robot)) * len(seen) ** 0.5)
+    off = observations.predict(robot) - observations.values_mm
+    known = np.linalg.norm(observations.slid(robot))
+    min_known = max(CLEAR * float(np.linalg.norm(off)), DEPENDENT * abs(longest.value(robot)) * len(off) ** 0.5)
     return longest if known < min_known else None
 
 

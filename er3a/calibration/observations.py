@@ -355,6 +355,24 @@ class PointObservations:
         """
         return np.where(self.on_tool[:, None], robot.tool[:3, 3], 0.0)
 
+    def slid(self, robot: Robot) -> Reals:
+        """By how much joints that slide have changed what is observed; what drops out with a place doesn't count.
+
+        Parameters
+        ----------
+        robot : whose axes the joints slide along
+
+        Returns
+        -------
+        change : (n,), mm
+        """
+        T = frames_of(tables_of(robot), robot, self.row_values)[0]
+        ways = np.where(robot.sliding, robot.direction * self.row_values, 0.0)
+        shift = np.einsum("pmi,pm->pi", T[:, :-1, :3, 2], ways)
+        shift = np.pad(shift, ((0, 0), (0, 3)))  # what slides turns nothing
+        found: Reals = MM * self.relative_shift(shift, self.positions(robot))[self.seen]
+        return found
+
     def take(self, used: Flags) -> PointObservations:
         """Observations of some points.
 
