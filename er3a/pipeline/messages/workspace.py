@@ -8,6 +8,7 @@ import er3a.pipeline.messages.collision  # noqa: F401
 from er3a.finding import Finding
 from er3a.pipeline.language import as_text, tr, with_unit, words
 from er3a.pipeline.messages.kinematics import sum_of_joints
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import FORMATS, say_as, says, sentence, texts
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.workspace import model
@@ -22,7 +23,7 @@ KEY_FIGURES = words(
         "samples": "samples",
     }
 )
-VOID_KINDS = words({"enclosed": "enclosed", "open": "open pocket"})
+VOID_KINDS = words({"enclosed": "enclosed", "open": "open"})
 
 
 TEXTS = texts(
@@ -105,6 +106,13 @@ def run_again_text(summary: Summary) -> str:
     """What to do before a motion is run beside the tray, or with a tool."""
     bare = any(each.reason == "tool" for each in summary.assumed)
     return sentence("box.run_again", bare=bare)
+
+
+def reaches(summary: model.WorkspaceSummary) -> str:
+    """How far from axis 1 an arm reaches, and with which point: the flange where no tool is given."""
+    far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
+    bare = any(each.reason == "tool" for each in summary.assumed)
+    return tr("flange reaches {far}", far=far) if bare else tr("tool reaches {far}", far=far)
 
 
 def millimetres(values: Sequence[float]) -> str:

@@ -13,9 +13,9 @@ from er3a.finding import is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.identifiability.evidence import LIMITS
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import N_, own_title, tr, with_unit
-from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
@@ -94,7 +94,7 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, drawn, stored),
-        keys=_keys(drawn),
+        figures=[_figures(row, _reach(stored[row.name])) for row in drawn],
         steps=_steps(chosen, stored[chosen.name]),
         outdated=_by_text(entries),
         tiles=_tiles(study, ranked, drawn[-1].name, stored),
@@ -208,18 +208,16 @@ def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
     robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
     note, lines = "", []
     if summary:
-        note = tr("reaches {far}", far=with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm"))
+        note = reaches(summary)
         border = stored["workspace"].results.border
         lines = border_lines(border.arc, border.rho_m, border.z_m)
     return seen_arm(robot, own_title(robot.title), note, kind, lines)
 
 
-def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
-    """Reach and checks of the arm that may be relied on; with each that of the wrong one."""
-    own, *other = ({cell.stage: cell.value for cell in row.cells if cell} for row in drawn)
-    named = {"workspace": tr("reach"), "validation": tr("checks")}
-    wrong = other[0] if other else {}
-    return [(name, own[stage], wrong.get(stage, "")) for stage, name in named.items() if stage in own]
+def _figures(row: RobotRow, known: WorkspaceSummary | None) -> str:
+    """How far a robot reaches, and how many independent checks its table passes, in few words."""
+    checks = next((cell.value for cell in row.cells if cell and cell.stage == "validation"), "–")
+    return joined([reaches(known) if known else "", tr("{passed} checks pass", passed=checks)], ", ")
 
 
 def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:

@@ -65,7 +65,7 @@ VERDICT_WORDS = {
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
 SHORT_NAMES = {
-    "validation": N_("Table"),
+    "validation": N_("D-H table"),
     "workspace": N_("Reach"),
     "collision": N_("Collisions"),
     "inverse": N_("Poses"),
@@ -365,8 +365,7 @@ def render(
             **context,
         )
     )
-    html = closed_up(html) if language.current() == "zh" else html
-    write_text(output, html)
+    write_text(output, closed_up(html) if language.current() == "zh" else DEGREES.sub("°", html))
 
 
 class _Compiled(dict[str, bytes]):
@@ -440,7 +439,7 @@ def render_stage(
     """
     stage, framed = stored.stage, _framed(study, stored)
     head = framed["head"]
-    if head.status == "caution" and head.gaps:
+    if head.status == "caution" and head.gaps and stage != "validation":  # whose own headline says what is open
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
@@ -486,6 +485,8 @@ BLANKS = re.compile(
     r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
     r"|(?<=\d) +(?=°)"
 )
+# Pages write ° everywhere; texts, which terminals and recordings show too, have deg.
+DEGREES = re.compile(r"(?<=[\d)])(?: |\u00a0|&nbsp;)deg\b|(?<=[(>])deg(?=[/)<])")
 
 
 def closed_up(html: str) -> str:

@@ -28,6 +28,7 @@ COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
+THICKEST = 0.13  # of the arm's own extent
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
 
@@ -40,7 +41,7 @@ class SeenArm:
     title, note : in a corner of the drawing, in the arm's colour
     kind : of its colour
     points_mm : (k, 2), the joints' places from the base to the flange: forward, up
-    reach_mm : outlines (m, 2) of what the tool point reaches; that of a wrong arm may leave the drawing
+    reach_mm : outlines (m, 2) of what the tool point reaches
     """
 
     title: str
@@ -58,6 +59,7 @@ class Label:
     ----------
     name : by which an address on the page leads to it
     start : (2,), mm, from where a dashed line leads to the place; None for none
+    written_there : at its place, though others are in a column
     """
 
     text: str
@@ -65,6 +67,7 @@ class Label:
     kind: LabelKind
     name: str = ""
     start: Reals | None = None
+    written_there: bool = False
 
 
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
@@ -126,12 +129,11 @@ def side_view(
     -------
     drawing : colours come from the page's style sheet
     """
-    right = [arm for arm in arms if arm.kind != "wrong"] or arms
     corners = np.concatenate(
         [
             *(arm.points_mm for arm in arms),
             *(line for _, line in over),
-            *(ring for arm in right for ring in arm.reach_mm),
+            *(ring for arm in arms for ring in arm.reach_mm),
         ]
     )
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -140,7 +142,7 @@ def side_view(
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
     for label in labels:
-        high[0] = max(high[0], (label.at[0] if column_mm is None else column_mm) + LABEL * tall)
+        high[0] = max(high[0], _across(label, column_mm) + LABEL * tall)
     wide, tall = high - low
     spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
@@ -156,7 +158,8 @@ def side_view(
     parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed]
-    parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
+    thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
+    parts += [_arm(arm, thick * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
     parts += [_over(kind, points, LETTERS * tall) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
@@ -192,8 +195,12 @@ def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float |
     below = low[1]
     for k in reversed(range(len(order))):
         below = heights[k] = max(below + gap, heights[k])
-    across = [label.at[0] if column_mm is None else column_mm for label in order]
-    return list(zip(order, np.column_stack([across, heights])))
+    return list(zip(order, np.column_stack([[_across(label, column_mm) for label in order], heights])))
+
+
+def _across(label: Label, column_mm: float | None) -> float:
+    """How far forward (mm) a label begins."""
+    return float(label.at[0]) if column_mm is None or label.written_there else column_mm
 
 
 def _lead(label: Label, place: Reals) -> Markup:

@@ -14,7 +14,7 @@ from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import address_of, bar_of
 from er3a.pipeline.player.player import drawing_head, player
@@ -23,7 +23,7 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
@@ -111,8 +111,8 @@ def _answer(
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
-    What collides as its file expects is counted apart, and so is a path of which only a part was measured: that is
-    clear of nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
+    What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
+    nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
     page that says how to mend a path.
     """
     found = {figure.name: figure.value for figure in summary.figures}
@@ -124,42 +124,57 @@ def _answer(
     for each in closest:
         measured = each.kind == "target" or each.name not in unreached
         own = hit if each.clearance_mm < 0 else clear if measured else partly
-        own.append(_row(each, measured, near, bars, advised))
-    caught = len(params.get("demonstrations", ()))
-    due = len(clear) + len(hit) + len(params.get("blocked", ())) - caught
+        own.append(_row(each, measured, near, bars, advised, closest[-1].clearance_mm))
+    blocked = len(params.get("blocked", ()))
+    due = len(closest) + blocked
+    parts = [
+        tr("{count} collide as expected.", count=caught) if (caught := len(params.get("demonstrations", ()))) else "",
+        tr("{count} can't be reached whole.", count=len(partly)) if partly else "",
+        tr("{count} targets collide in every solution.", count=blocked) if blocked else "",
+    ]
     keys = [(with_unit(fixed(1000 * summary.places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
     if free is not None:
         keys.insert(0, (with_unit(fixed(float(free), 0), "%"), tr("of joint space is free")))
+    if clear:
+        least = next(each for each in closest if each.clearance_mm >= 0)
+        keys.insert(0, (with_unit(fixed(least.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=least.name)))
     return Answer(
         tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
-        all_caught(caught),
-        tr("Reached in part, clear as far as measured: {count}.", count=len(partly)) if partly else "",
+        "",
+        joined(parts, " "),
         keys,
         (
             Group(tr("Collide"), hit[:MAX_ROWS]),
-            Group(tr("Clear"), clear[:MAX_ROWS]),
-            Group(tr("Not all of it is reached"), partly[:MAX_ROWS]),
+            Group(tr("Clear, nearest first"), clear[:MAX_ROWS]),
+            Group(tr("Clear as far as reached"), partly[:MAX_ROWS]),
         ),
         next((row.fix for row in hit if row.fix), None),
     )
 
 
 def _row(
-    found: model.Closest, measured: bool, near: Sequence[str], bars: Mapping[str, Sequence[Part]], advised: bool
+    found: model.Closest,
+    measured: bool,
+    near: Sequence[str],
+    bars: Mapping[str, Sequence[Part]],
+    advised: bool,
+    most_mm: float,
 ) -> ListRow:
-    """A path with its bar, or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes;
-    ``measured``: all of it."""
+    """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``measured``: all of it.
+
+    What is clear has its clearance as a bar, in parts of ``most_mm``; a path that is not has the bar of its time."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
-    of_path = found.kind == "path"
+    of_path, clear = found.kind == "path", found.clearance_mm >= 0 and measured
     if mark == "pass" and not measured:
         mark = "none"
-    bar = bars[found.name] if of_path else ()
+    length = found.clearance_mm / most_mm if clear else float(of_path)
+    bar = bars[found.name] if of_path and not clear else ()
     fix = None
     if mark == "fail" and of_path and advised:
         asked = address_of("trajectory", found.name, found.t_s or 0.0, found.name)
         fix = Fix(tr("{name}: see what the page Paths advises.", name=found.name), asked, instead=False)
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), float(of_path), bar, fix)
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -37,7 +37,7 @@ COLUMNS = {
     "d": "d (mm)",
     "beta": "β (°)",
     "offset": N_("offset (°)"),
-    "direction": N_("direction"),
+    "direction": N_("dir."),
     "lower": N_("from (°)"),
     "upper": N_("to (°)"),
     "speed": N_("speed (°/s)"),
@@ -215,6 +215,8 @@ def _interval(each: EntryEvidence) -> str:
 def _off(mm: float, deg: float) -> str:
     if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
         return tr("turned by {deg} deg", deg=fixed(deg, 0 if deg >= 10 else 1))
+    if fixed(deg, 1) == "0.0":
+        return with_unit(fixed(mm, 0 if mm >= 10 else 1), "mm")
     return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 

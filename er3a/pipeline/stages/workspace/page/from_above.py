@@ -9,15 +9,18 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr
+from er3a.pipeline.language import own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
 from er3a.robots.robot import Robot
 
-AROUND = 1.15  # of the reach, that is shown to each side
+AROUND = 1.2  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
+LETTER = 0.27  # half the width of a letter, of its height
+FINE = 0.1  # letters, of the reach, up to which there is room for the limits of joint 1
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
@@ -56,13 +59,25 @@ def from_above(
         words.append(_word(at, height, name, kind))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
-        middle = high + gap / 2
-        words.append(_word(0.78 * reach * np.array([np.cos(middle), np.sin(middle)]), height, tr("dead zone"), ""))
+        parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
+        name = tr("dead zone")
+        words.append(_word((size - LETTER * len(name) * height) * _way(high + gap / 2), height, name, ""))
+        for limit, aside in ((low, height), (high, -height)) if letters < FINE else ():
+            words.append(_word(1.08 * reach * _way(limit + aside / reach), height, _limit(limit), "limit"))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
     drawing = '<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>'
     return Markup(drawing).format(box, said, Markup("").join([*parts, *words]))
+
+
+def _way(angle: float) -> Reals:
+    """The direction (2,) at an angle, rad, about axis 1."""
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def _limit(angle: float) -> str:
+    return joined(["J1", with_unit(fixed(np.degrees(angle), 0), "deg")], " ")
 
 
 def _sector(radius: float, low: float, high: float) -> str:
