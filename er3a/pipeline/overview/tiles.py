@@ -15,7 +15,7 @@ from er3a.pipeline.stages.programs.model import ProgramsResults
 from er3a.pipeline.stages.programs.page.report import programs_answer
 from er3a.pipeline.stages.trajectory.page.report import paths_answer
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section, known_alone
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
@@ -63,7 +63,7 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     evidence = results.summary.evidence
     robot, bad = study.robot(name), evidence.contradicted
     answer = (
-        tr("{count} of {all} contradicted.", count=bad, all=evidence.alone)
+        tr("{count} of {all} contradicted.", count=bad, all=known_alone(evidence))
         if bad
         else tr("{count} not settled", count=len(evidence.unconfirmed))
     )

@@ -213,8 +213,8 @@ def _lead(label: Label, place: Reals) -> Markup:
 def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
     name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
-        label.kind, name, *(100 * share), label.text
+    return Markup('<span class="label {}{}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, " there" if label.written_there else "", name, *(100 * share), label.text
     )
 
 

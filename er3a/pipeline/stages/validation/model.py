@@ -264,11 +264,6 @@ class TableEvidence:
         return sum(each.status == "contradicted" for each in self.entries)
 
     @property
-    def alone(self) -> int:
-        """How many entries of the table mean something alone."""
-        return sum(each.value is not None and each.status != "gauge" for each in self.entries)
-
-    @property
     def unconfirmed(self) -> list[str]:
         """The entries of the table that no independent document settles or excludes."""
         return [each.entry for each in self.entries if each.status in ("open", "weak", "consistent")]

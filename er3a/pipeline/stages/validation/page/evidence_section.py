@@ -95,6 +95,11 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     )
 
 
+def known_alone(evidence: TableEvidence) -> int:
+    """How many entries of a table mean something alone."""
+    return sum(each.value is not None and each.status != "gauge" for each in evidence.entries)
+
+
 def plain_table(robot: Robot) -> tuple[list[str], list[list[str]]]:
     """Columns and rows of a table that no document speaks of, as the page shows them: mm and deg."""
     kinds = [kind for kind in OTHER_COLUMNS if kind != "beta" or robot.beta.any()]

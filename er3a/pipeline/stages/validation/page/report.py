@@ -30,6 +30,7 @@ from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
     evidence_section,
+    known_alone,
     other_robot,
     plain_table,
 )
@@ -243,7 +244,7 @@ def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
             angle = column_of(entry) in ANGLES
             if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and given:
                 kind, gives = _kind(cell["status"]), cell["gives"]
-                text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " or ")
+                text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
                 text = with_unit(text, "deg" if angle else "mm")
                 found.append(Label(text, places.get(entry, places[str(joint)]), kind))
     return found
@@ -264,8 +265,8 @@ def _answer(
     keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
     below = ""
     if evidence:
-        settled = evidence.alone - bad - unsure
-        keys.append((f"{settled}/{evidence.alone}", tr("entries settled by them")))
+        alone = known_alone(evidence)
+        keys.append((f"{alone - bad - unsure}/{alone}", tr("entries settled by them")))
         if unsure and not bad:
             below = tr("A check that other values would pass as well settles no entry.")
     if instead:
