@@ -23,7 +23,7 @@ from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
 FEW = 6  # rows of a tile: so many are seen whole on the first screen
-LETTERS = 0.18  # of the reach, in the small view from above
+LETTERS = 0.14  # of the reach, in the small view from above
 
 
 @dataclass(frozen=True)

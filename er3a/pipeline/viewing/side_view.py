@@ -24,6 +24,7 @@ UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 LETTERS = 0.021  # of the height: of a joint's name at its arrow
 GAP = 0.045  # of the height, between two labels
+TICK = 0.02  # of a dimension, half of what ends it
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
@@ -93,6 +94,15 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
     far = float(np.linalg.norm(right - wrong))
     off = tr("flange {off} off", off=with_unit(fixed(far, 0), "mm"))
     return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
+
+
+def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[tuple[str, Reals]]:
+    """A dimension at the height ``low``, from axis 1 to ``far`` in front of it, with a tick at both ends, and a dashed
+    line from its end up to ``high``; all in mm. As ``over`` of :func:`side_view` takes it."""
+    tick = TICK * far
+    ends = [(x, low + side * tick) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
+    upwards = np.array([(far, low), (far, high)])
+    return [(f"dimension {kind}", np.array(ends)), (f"dimension far {kind}", upwards)]
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:

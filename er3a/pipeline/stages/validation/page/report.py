@@ -48,6 +48,7 @@ from er3a.pipeline.viewing.side_view import (
     Label,
     LabelKind,
     beyond,
+    dimension,
     entry_places,
     flanges_off,
     seen_arm,
@@ -228,10 +229,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
             source = re.split("[,，]", own_title(stated.source))[0]
             text = tr("{far}: {source}", far=with_unit(fixed(far, 1), each.unit), source=source)
             labels.append(Label(text, np.array([0.0, low]), kind, written_there=True))
-            low -= step / 2
-            ends = [(x, low + side * step / 4) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
-            upwards = np.array([(far, low), (far, -1.5 * step)])
-            lines += [(f"dimension {kind}", np.array(ends)), (f"dimension far {kind}", upwards)]
+            lines += dimension(far, low - step / 2, -1.5 * step, kind)
     return labels, lines
 
 
@@ -266,7 +264,10 @@ def _answer(
     below = ""
     if evidence:
         alone = known_alone(evidence)
-        keys.append((f"{alone - bad - unsure}/{alone}", tr("entries settled by them")))
+        if bad:
+            keys.append((f"{bad}/{alone}", tr("entries contradicted")))
+        else:
+            keys.append((f"{alone - unsure}/{alone}", tr("entries settled by them")))
         if unsure and not bad:
             below = tr("A check that other values would pass as well settles no entry.")
     if instead:

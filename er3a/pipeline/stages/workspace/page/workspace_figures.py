@@ -28,7 +28,7 @@ from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
 from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED, VERDICTS, VOIDS
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, side_view
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -42,6 +42,7 @@ PROOF = {
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
+BELOW = 0.08  # of the reach, from what is reached down to its dimension
 STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
@@ -231,8 +232,12 @@ def labelled(
         corners = _tray_corners(tray)
         outlines.append(("tray", corners))
         labels.append(Label(tray.name, corners[1], "tray"))
-    seen = SeenArm(own_title(robot.title), reaches(summary), kind, arm, lines)
-    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines)
+    seen = SeenArm(own_title(robot.title), "", kind, arm, lines)
+    far, height = outer[outer[:, 0].argmax()]
+    below = low[1] - BELOW * far
+    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), "right"))
+    over = dimension(far, below, height, "right")
+    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines, over=over)
 
 
 def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
