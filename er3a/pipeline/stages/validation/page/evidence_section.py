@@ -10,7 +10,7 @@ from typing import Any
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
@@ -87,11 +87,6 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         first=[ListRow("caution", each.entry, _tool_off(each), f"#entry-{each.entry}") for each in left[:FIRST]],
         left=len(evidence.unconfirmed) + evidence.contradicted,
-        unmet=not evidence.table_meets and evidence.other is None,
-        allowed=evidence.other is not None and evidence.other.code == "allowed",
-        tolerance=tr(
-            "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
-        ),
     )
 
 

@@ -39,7 +39,6 @@ from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
-    status_word,
     text_address,
 )
 from er3a.pipeline.viewing.side_view import (
@@ -87,11 +86,10 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
         for group in dict.fromkeys(check.group for check in own):
             part = [check for check in own if check.group == group]
             counted = Counter(check.status for check in part)
-            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=lambda check: check.tolerances_off)
             off = with_unit(_value(worst.difference, worst), worst.unit)
             counts = counted["pass"], counted["fail"], counted["conflict"]
-            rows.append([title, word("group", GROUPS, group), status_word(status), *counts, say(worst.subject), off])
+            rows.append([title, word("group", GROUPS, group), *counts, say(worst.subject), off])
     return rows
 
 
@@ -225,11 +223,11 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
         step = BELOW * each.measured
         labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
         for row, stated in enumerate(each.statements, 2):
-            far, low, kind = stated.expected, -step * row, "right" if stated.met else "open"
+            kind: LabelKind = "right" if stated.met else "open"
             source = re.split("[,，]", own_title(stated.source))[0]
-            text = tr("{far}: {source}", far=with_unit(fixed(far, 1), each.unit), source=source)
-            labels.append(Label(text, np.array([0.0, low]), kind, written_there=True))
-            lines += dimension(far, low - step / 2, -1.5 * step, kind)
+            text = joined([with_unit(fixed(stated.expected, 1), each.unit), source], ": ")
+            labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
+            lines += dimension(stated.expected, -step * (row + 0.5), -1.5 * step, kind)
     return labels, lines
 
 
@@ -264,10 +262,8 @@ def _answer(
     below = ""
     if evidence:
         alone = known_alone(evidence)
-        if bad:
-            keys.append((f"{bad}/{alone}", tr("entries contradicted")))
-        else:
-            keys.append((f"{alone - unsure}/{alone}", tr("entries settled by them")))
+        count, what = (bad, tr("entries contradicted")) if bad else (alone - unsure, tr("entries settled by them"))
+        keys.append((f"{count}/{alone}", what))
         if unsure and not bad:
             below = tr("A check that other values would pass as well settles no entry.")
     if instead:
@@ -276,9 +272,12 @@ def _answer(
             f"../{instead}/validation.html",
         )
     elif disputed:
-        stated = with_unit(tr(" or ").join(fixed(each.expected, 1) for each in disputed[0].statements), disputed[0].unit)
-        text = tr("measure the {subject}: {values}?", subject=say(disputed[0].subject), values=stated)
-        fix = Fix(text, f"#{SEEN}", instead=False)
+        stated = joined([fixed(each.expected, 1) for each in disputed[0].statements], " or ")
+        fix = Fix(
+            tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated),
+            f"#{SEEN}",
+            instead=False,
+        )
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):

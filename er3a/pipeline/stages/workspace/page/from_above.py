@@ -9,9 +9,8 @@ from markupsafe import Markup
 
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import own_title, tr, with_unit
+from er3a.pipeline.language import own_title, tr
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import joined
 from er3a.pipeline.stages.workspace.model import WorkspaceResults
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
@@ -62,7 +61,8 @@ def from_above(
         parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
         words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
         for limit, aside in ((low, height), (high, -height)) if letters < FINE else ():
-            words.append(_word(1.08 * reach * _way(limit + aside / reach), height, _limit(limit), "", size))
+            named = f"J1 {fixed(np.degrees(limit), 0)}°"
+            words.append(_word(1.08 * reach * _way(limit + aside / reach), height, named, "", size))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
@@ -73,10 +73,6 @@ def from_above(
 def _way(angle: float) -> Reals:
     """The direction (2,) at an angle, rad, about axis 1."""
     return np.array([np.cos(angle), np.sin(angle)])
-
-
-def _limit(angle: float) -> str:
-    return joined(["J1", with_unit(fixed(np.degrees(angle), 0), "deg")], " ")
 
 
 def _sector(radius: float, low: float, high: float) -> str:
@@ -92,7 +88,7 @@ def _line(points: Reals) -> str:
 
 
 def _word(at: Reals, letters: float, text: str, kind: str, size: float) -> Markup:
-    """A word in the middle of a place (2,), or as near to it as it is whole in a drawing of that ``size`` to each side."""
+    """A word in the middle of a place (2,), or as near to it as it is whole in a drawing of ``size`` to each side."""
     room = max(0.0, size - LETTER * letters * len(text))
     return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
         kind, np.clip(at[0], -room, room), -at[1], letters, text

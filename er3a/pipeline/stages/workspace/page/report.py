@@ -11,8 +11,8 @@ from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres, reaches
+from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -76,9 +76,9 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: t
     enclosed = summary.enclosed_voids
     litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
     rest = tr("Void ≥ {size}.", size=litres) if enclosed else tr("No enclosed void.")
-    heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
+    low, high = millimetres([reach.lowest]), millimetres([reach.highest])
     keys = [
-        (with_unit(tr("{low} to {high}", low=heights[0], high=heights[1]), "mm"), tr("its height along axis 1")),
+        (with_unit(tr("{low} to {high}", low=low, high=high), "mm"), tr("its height along axis 1")),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
             tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
@@ -131,13 +131,9 @@ def _context(robot: Robot, results: model.WorkspaceResults, placing: Placing | N
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
-        str(row),
-        bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
+        tr(workspace_figures.VOID_NAMES[void.kind], number=row),
         _litres(low, high),
-        *(
-            ", ".join(fixed(1000 * value, 0) for value in corner)
-            for corner in (void.centroid_m, void.low_m, void.high_m)
-        ),
+        *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]
 

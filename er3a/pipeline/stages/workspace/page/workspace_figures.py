@@ -250,7 +250,7 @@ def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
 def void_label(number_: int, void: model.VoidSummary) -> Label:
     """The name of a void, at its place."""
     size = at_least(1000 * void.volume_m3.lower, "L")
-    name = tr("void, {size} L", size=size) if void.kind == "enclosed" else tr("open void, {size} L", size=size)
+    name = tr("void, {size} L", size=size)
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
