@@ -76,12 +76,12 @@ SHORT_NAMES = {
     "teach": N_("Teach panel"),
 }
 FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
-    "pass": N_("table confirmed"),
-    "fail": N_("table contradicted"),
-    "caution": N_("table partly open"),
-    "unsettled": N_("table open"),
-    "no_reference": N_("table unchecked"),
-    "not_computed": N_("table unchecked"),
+    "pass": N_("D-H table confirmed"),
+    "fail": N_("D-H table contradicted"),
+    "caution": N_("D-H table partly open"),
+    "unsettled": N_("D-H table open"),
+    "no_reference": N_("D-H table unchecked"),
+    "not_computed": N_("D-H table unchecked"),
 }
 
 SCRIPT_WORDS = {
@@ -365,7 +365,8 @@ def render(
             **context,
         )
     )
-    write_text(output, closed_up(html) if language.current() == "zh" else DEGREES.sub("°", html))
+    html = closed_up(html) if language.current() == "zh" else DEGREES.sub(lambda found: found[1] or "°", html)
+    write_text(output, html)
 
 
 class _Compiled(dict[str, bytes]):
@@ -478,6 +479,8 @@ def _tray_edges(study: Study, stored: Stored[Any]) -> str:
     return " × ".join(f"{edge:g}" for edge in study.section(CapabilitySettings).placement.box_mm)
 
 
+# "deg" in sentences that the command line says, too: pages have one sign for it; a file's own words stay.
+DEGREES = re.compile(r"(<code>[^<]*</code>)|(?<=[\d)])[ \u00a0]deg\b|(?<=[(> \u00a0])deg\b(?=[/)²³<;,. ])")
 BRACKETS = re.compile(r"(?<=>)(?<!<code>)([^<>()]{1,40}) \(([^<>()]{1,20})\)(?=</t[hd]>)")
 STOPS = re.compile(r"(</(?:a|code|em|strong)>)\.(?=[\s<])")
 BLANKS = re.compile(
@@ -485,8 +488,6 @@ BLANKS = re.compile(
     r"|(?<=[\u4e00-\u9fff]) +(?=[\u4e00-\u9fff])"  # between two characters
     r"|(?<=\d) +(?=°)"
 )
-# Pages write ° everywhere; texts, which terminals and recordings show too, have deg.
-DEGREES = re.compile(r"(?<=[\d)])(?: |\u00a0|&nbsp;)deg\b|(?<=[(>])deg(?=[/)<])")
 
 
 def closed_up(html: str) -> str:
