@@ -235,8 +235,8 @@ def labelled(
     seen = SeenArm(own_title(robot.title), "", kind, arm, lines)
     far, height = outer[outer[:, 0].argmax()]
     below = low[1] - BELOW * far
-    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), "right"))
-    over = dimension(far, below, height, "right")
+    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
+    over = dimension(far, below, height, kind)
     return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines, over=over)
 
 
