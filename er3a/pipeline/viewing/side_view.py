@@ -161,7 +161,7 @@ def side_view(
     if floor_mm is not None:
         parts.append(
             Markup('<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>').format(
-                low[0], -floor_mm, wide, max(0.0, floor_mm - low[1])
+                low[0] - wide, -floor_mm, 3 * wide, max(0.0, floor_mm - low[1] + tall)
             )
         )
     outline = Markup('<polygon class="{}" points="{}"/>')
