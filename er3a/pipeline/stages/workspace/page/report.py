@@ -76,9 +76,11 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: t
     enclosed = summary.enclosed_voids
     litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
     rest = tr("Void ≥ {size}.", size=litres) if enclosed else tr("No enclosed void.")
-    low, high = millimetres([reach.lowest]), millimetres([reach.highest])
     keys = [
-        (with_unit(tr("{low} to {high}", low=low, high=high), "mm"), tr("its height along axis 1")),
+        (
+            tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
+            tr("its height along axis 1"),
+        ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
             tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
@@ -131,6 +133,7 @@ def _context(robot: Robot, results: model.WorkspaceResults, placing: Placing | N
 def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
+        str(row),
         tr(workspace_figures.VOID_NAMES[void.kind], number=row),
         _litres(low, high),
         *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
