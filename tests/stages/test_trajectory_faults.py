@@ -161,7 +161,7 @@ def test_what_passes_and_is_no_pass_is_marked_on_the_index_and_told_on_its_page(
     assert cell_of(tmp_path / "index.html") == (status, f"{MARKS[status]} {passing}/1", "")
     run.show("report", "trajectory", study, ROBOT, results, tmp_path / "page.html")
     page = html.parse(str(tmp_path / "page.html"))
-    headline = "Not fully checked." if status == "caution" else f"{passing} of 1 paths may run."
+    headline = "Not fully checked." if status == "caution" else f"{passing} of 1 paths pass."
     assert page.xpath("string(//h1/span)") == headline
     assert page.xpath("string(//h1/span/@class)") == status
     ((row, note),) = ((each.get("class"), each.findtext(".//small")) for each in page.xpath("//*[@class='runs']//li"))

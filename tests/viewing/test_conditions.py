@@ -74,7 +74,6 @@ def test_what_nothing_confirms_is_named_entry_by_entry_or_as_a_whole():
 
 def test_a_table_without_evidence_is_a_condition_and_a_confirmed_one_is_none():
     assert condition((), ()).startswith("Run no path or program on the arm until its table is confirmed")
-    assert condition(FOUND.parts, (), "joint speeds").endswith(", joint speeds (assumed).")
     assert condition([part.but(settled=part.entries, up_to_signs=0, open=()) for part in FOUND.parts], ()) == ""
 
 

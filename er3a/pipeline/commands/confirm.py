@@ -71,7 +71,7 @@ def confirm(
         raise Er3aError("give a file of poses, or --plan for poses to read at the pendant")
     found = _confirmed(read.robot, poses, angles, units)
     nearest = _nearest(found.corrected, read.robot.name) if "another" in found.layers else ""
-    _print_found(found, read.robot, (robot, nearest), every=every, as_json=as_json)
+    _print_found(found, (robot, nearest), every=every, as_json=as_json)
     if output is not None:
         _write(found, output)
         if not as_json:
@@ -97,14 +97,14 @@ def _confirmed(robot: Robot, poses: str, angles: str | None, units: str | None) 
     return confirm_robot(robot, read_pairs(source, robot, text, angles=angles, units=units))
 
 
-def _print_found(found: Confirmation, robot: Robot, named: tuple[str, str], *, every: bool, as_json: bool) -> None:
+def _print_found(found: Confirmation, named: tuple[str, str], *, every: bool, as_json: bool) -> None:
     """Print an answer; ``named``: the robot as it was given, and the arm that the corrected table is."""
     from er3a.pipeline.messages.confirm import confirmation_record, lines_of
 
     if as_json:
         print_json(confirmation_record(found, *named))
     else:
-        print("\n".join(lines_of(found, robot, nearest=named[1], every=every)))
+        print("\n".join(lines_of(found, nearest=named[1], every=every)))
 
 
 def _nearest(corrected: Robot, own: str) -> str:

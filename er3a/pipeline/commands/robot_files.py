@@ -159,7 +159,7 @@ def _explained(path: Path, arm: Robot, rows: Sequence[Measurement]) -> list[str]
 
     seen = arm.without_tool() if rows[0].point == "flange" else arm
     with suppress(Er3aError):
-        return lines_of(confirm(seen, path), seen)
+        return lines_of(confirm(seen, path))
     return []
 
 

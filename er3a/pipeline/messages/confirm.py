@@ -66,12 +66,12 @@ ACCURACY = (
 )
 
 
-def lines_of(found: Confirmation, robot: Robot, *, nearest: str = "", every: bool = False) -> list[str]:
+def lines_of(found: Confirmation, *, nearest: str = "", every: bool = False) -> list[str]:
     """A confirmation as lines of text for a terminal.
 
     Parameters
     ----------
-    robot : as it is; nearest : the name of the arm that the corrected table is, if one is
+    nearest : the name of the arm that the corrected table is, if one is
     every : whether each pose is listed
     """
     fits = found.fits

@@ -76,7 +76,7 @@ GLOSSARY = terms(
         "tray": (
             "the space, as of a bin or a pallet's load, that the workspace page places where the tool reaches all of it"
         ),
-        "void": "a region that the tool point can't reach: enclosed, or an open pocket",
+        "void": "a region that the tool point can't reach: enclosed, or open to the outside",
         "undecided": "what the computed bounds can't decide; never called safe",
         "holding torque": "the torque or force by which a drive keeps a joint at rest in a pose",
         "RMS torque": "root-mean-square over a motion, which heats the motor; compared with the rated torque",

@@ -32,7 +32,6 @@ STATUS_WORDS = words(
         "open": "open",
         "gauge": "free choice",
         "given": "given",
-        "absent": "not given",
     }
 )
 STATUS_MEANINGS = words(

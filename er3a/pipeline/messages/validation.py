@@ -156,7 +156,7 @@ def settled_parts(found: Finding) -> str:
 PARTS = {column: PART_OF_GROUP[group] for column, group in GROUP_OF.items()}
 
 
-def unconfirmed(parts: Sequence[Finding], unbounded: Sequence[str] = ()) -> str:
+def unconfirmed(parts: Sequence[Finding], unbounded: Sequence[str]) -> str:
     """What of a table nothing settles: the entries by name, as far as they have one here, or how many more there are; a
     part of which none is settled as a whole. ``unbounded``: entries that only their own document speaks of."""
     left, named = list(unbounded), []
@@ -177,16 +177,11 @@ def unconfirmed(parts: Sequence[Finding], unbounded: Sequence[str] = ()) -> str:
     return joined([*named, shortened(left)], ", ")
 
 
-def condition(parts: Sequence[Finding], unbounded: Sequence[str], assumed: str = "") -> str:
-    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is.
-
-    ``assumed``: what is assumed besides, as no document gives it.
-    """
+def condition(parts: Sequence[Finding], unbounded: Sequence[str]) -> str:
+    """What has to be confirmed before anything that passes is run on the arm; empty where all of its table is."""
     if not parts:
         return tr("Run no path or program on the arm until its table is confirmed.")
     names = unconfirmed(parts, unbounded)
-    if names and assumed:
-        names = joined([names, bracketed(assumed, tr("assumed"))], ", ")
     return names and tr("Run no path or program on the arm until these are confirmed: {entries}.", entries=names)
 
 

@@ -22,7 +22,6 @@ KEY_FIGURES = words(
         "samples": "samples",
     }
 )
-VOID_KINDS = words({"enclosed": "enclosed", "open": "open pocket"})
 
 
 TEXTS = texts(
@@ -92,7 +91,7 @@ FORMATS["limit"] = lambda limit: _limit(limit, limit.limit)
 FORMATS["extended"] = lambda limit: _limit(limit, limit.extended)
 
 
-def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, served_from_m: float = 0.0) -> str:
+def reached_text(placement: model.PlacementSummary, served_from_m: float = 0.0) -> str:
     """How much of a tray the tool reaches, from a height above its underside on, how it is tilted there, and what was
     not checked."""
     axis, cone = placement.task.tool_direction, placement.task.cone_deg
@@ -103,8 +102,18 @@ def reached_text(placement: model.PlacementSummary, place: model.PlaceSummary, s
 
 def run_again_text(summary: Summary) -> str:
     """What to do before a motion is run beside the tray, or with a tool."""
-    bare = any(each.reason == "tool" for each in summary.assumed)
-    return sentence("box.run_again", bare=bare)
+    return sentence("box.run_again", bare=_is_bare(summary))
+
+
+def _is_bare(summary: Summary) -> bool:
+    """Whether no tool is given, so that the tool point is the flange."""
+    return any(each.reason == "tool" for each in summary.assumed)
+
+
+def reaches(summary: model.WorkspaceSummary) -> str:
+    """How far from axis 1 an arm reaches, and with which point: the flange where no tool is given."""
+    far = millimetres([summary.reach_m.furthest_from_axis])
+    return tr("flange reaches {far} mm", far=far) if _is_bare(summary) else tr("tool reaches {far} mm", far=far)
 
 
 def millimetres(values: Sequence[float]) -> str:
@@ -115,7 +124,7 @@ def millimetres(values: Sequence[float]) -> str:
 def stand_text(stand: model.StandSummary, placement: model.PlacementSummary) -> str:
     """Whether the tray can stand on a surface, and if not why."""
     if stand.place and stand.served_from_m is not None:
-        reached = reached_text(placement, stand.place, stand.served_from_m)
+        reached = reached_text(placement, stand.served_from_m)
         return sentence("stand.fits", name=stand.name, reached=reached, centre=millimetres(stand.place.centre_m))
     lengths = {"margin": as_text(placement.margin_mm, "g"), "lowest": as_text(placement.task.lowest_mm, "g")}
     why = {each: each == stand.why_none for each in ("too_low", "too_small", "out_of_reach", "in_the_way")}

@@ -45,17 +45,17 @@ def _(results: ValidationResults) -> Glance:
     if summary.verdict.status == "fail":
         return value, tr("another arm") if summary.is_beyond_correction else tr("{count} wrong", count=bad)
     return value, tr("sources disagree") if summary.conflicts else tr(
-        "{count} unconfirmed", count=open_
+        "{count} not settled", count=open_
     ) if open_ else ""
 
 
 @glance.register
 def _(results: WorkspaceResults) -> Glance:
     summary = results.summary
-    holes = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), "L"), "L")
+    enclosed = summary.enclosed_voids
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
     far = with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm")
-    return far, tr("hole {size}", size=litres) if holes else tr("no hole")
+    return far, tr("void {size}", size=litres) if enclosed else tr("no void")
 
 
 @glance.register

@@ -13,9 +13,9 @@ from er3a.finding import is_one
 from er3a.identifiability.entries import CONTINUOUS, column_of
 from er3a.identifiability.evidence import LIMITS
 from er3a.pipeline.code_digest import code_digest
-from er3a.pipeline.language import N_, own_title, tr, with_unit
-from er3a.pipeline.messages.numbers import fixed
+from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.say import joined
+from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.overview.glances import glance
 from er3a.pipeline.overview.search import places
 from er3a.pipeline.overview.tiles import first_with, motions_tile, table_tile, tray_tile
@@ -56,7 +56,7 @@ class RobotRow:
     ----------
     decision, use : what to do with it, in few words, and in one: ``plan``, ``never``, ``measure``
     cells : in the order of the stages; None where a stage was not asked for
-    seen : the arm and what it reaches, small
+    seen, reach : the arm and what it reaches, small, and how far in words
     outdated : what has changed since its results were computed; empty where nothing has
     """
 
@@ -66,6 +66,7 @@ class RobotRow:
     decision: str
     cells: Sequence[StageCell | None]
     seen: str
+    reach: str
     outdated: str
 
 
@@ -94,9 +95,8 @@ def write_index(study: Study, results: Path, folder: Path) -> None:
         stages=_asked(study),
         questions={name: stage.question for name, stage in STAGES.items()},
         arms=_picture(study, drawn, stored),
-        keys=_keys(drawn),
+        drawn=drawn,
         steps=_steps(chosen, stored[chosen.name]),
-        outdated=_by_text(entries),
         tiles=_tiles(study, ranked, drawn[-1].name, stored),
         article=study.article is not None,
         command=page.run_command(study, "index.html"),
@@ -115,15 +115,6 @@ def _changed_text(verdicts: Sequence[StageVerdict], robot: str) -> str:
     more = ["…"] if len(names) > MAX_CHANGED else []
     text = N_("Changed since, so what stands here tells of what was before (run the study again): {names}.")
     return tr(text, names=joined([*named, *more], ", "))
-
-
-def _by_text(entries: Sequence[RobotRow]) -> dict[str, list[str]]:
-    """Of which robots what has changed since they were computed."""
-    found: dict[str, list[str]] = {}
-    for entry in entries:
-        if entry.outdated:
-            found.setdefault(entry.outdated, []).append(entry.name)
-    return found
 
 
 def _computed(study: Study, name: str, folder: Path) -> Results:
@@ -148,8 +139,8 @@ def _entry(study: Study, name: str, stored: Results, outdated: str) -> RobotRow:
     ]
     use, said = _use(table, heads.get("validation"), failed)
     cells = [_cell(stage, heads, stored) if stage in study.stages(name) else None for stage in _asked(study)]
-    seen = side_view([_seen(study, name, use, stored)], ratio=1.0)
-    return RobotRow(name, own_title(study.robot(name).title), use, said, cells, seen, outdated)
+    arm = _seen(study, name, use, stored)
+    return RobotRow(name, arm.title, use, said, cells, side_view([arm], ratio=1.0), arm.note, outdated)
 
 
 def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str]:
@@ -208,18 +199,10 @@ def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
     robot, summary, kind = study.robot(name), _reach(stored), "wrong" if use == "never" else "right"
     note, lines = "", []
     if summary:
-        note = tr("reaches {far}", far=with_unit(fixed(1000 * summary.reach_m.furthest_from_axis, 0), "mm"))
+        note = reaches(summary)
         border = stored["workspace"].results.border
         lines = border_lines(border.arc, border.rho_m, border.z_m)
     return seen_arm(robot, own_title(robot.title), note, kind, lines)
-
-
-def _keys(drawn: Sequence[RobotRow]) -> list[tuple[str, str, str]]:
-    """Reach and checks of the arm that may be relied on; with each that of the wrong one."""
-    own, *other = ({cell.stage: cell.value for cell in row.cells if cell} for row in drawn)
-    named = {"workspace": tr("reach"), "validation": tr("checks")}
-    wrong = other[0] if other else {}
-    return [(name, own[stage], wrong.get(stage, "")) for stage, name in named.items() if stage in own]
 
 
 def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:

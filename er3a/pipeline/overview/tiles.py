@@ -15,7 +15,7 @@ from er3a.pipeline.stages.programs.model import ProgramsResults
 from er3a.pipeline.stages.programs.page.report import programs_answer
 from er3a.pipeline.stages.trajectory.page.report import paths_answer
 from er3a.pipeline.stages.validation.model import ValidationResults
-from er3a.pipeline.stages.validation.page.evidence_section import evidence_section
+from er3a.pipeline.stages.validation.page.evidence_section import evidence_section, known_alone
 from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import placing_of
 from er3a.pipeline.study import Study
@@ -23,7 +23,7 @@ from er3a.pipeline.viewing.answer import ListRow, Mark
 
 Results = Mapping[str, Stored[Any]]
 FEW = 6  # rows of a tile: so many are seen whole on the first screen
-LETTERS = 0.16  # of the reach, in the small view from above
+LETTERS = 0.14  # of the reach, in the small view from above
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,10 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
         return None
     evidence = results.summary.evidence
     robot, bad = study.robot(name), evidence.contradicted
-    count = sum(each.value is not None for each in evidence.entries)
     answer = (
-        tr("{count} of {all} contradicted.", count=bad, all=count)
+        tr("{count} of {all} contradicted.", count=bad, all=known_alone(evidence))
         if bad
-        else tr("{count} unconfirmed", count=len(evidence.unconfirmed))
+        else tr("{count} not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
     title, entries = own_title(robot.title), evidence_section(robot, evidence)
@@ -83,7 +82,7 @@ def motions_tile(study: Study, name: str, found: Stored[Any]) -> Tile:
     robot, results = study.robot(name), found.results
     programs = isinstance(results, ProgramsResults)
     said = programs_answer(robot, results) if programs else paths_answer(robot, results)
-    title = tr("Which programs may run?") if programs else tr("Which paths may run?")
+    title = tr("Which programs pass?") if programs else tr("Which paths pass?")
     sound: Mark = "pass" if found.results.summary.verdict.status == "pass" else "caution"
     rows = [row for group in said.groups for row in group.rows]
     few = _few(rows)
@@ -108,6 +107,6 @@ def tray_tile(study: Study, name: str, stored: Results) -> Tile | None:
     known = stored["dynamics"].results.summary if "dynamics" in stored else None
     carried, _ = payload_key(known, robot)
     answer = tr("Centre at {centre} mm.", centre=millimetres(placing.tray.place.centre_m))
-    rest = tr("{where}. Payload {kg}, {hole}.", where=placing.tray.where, kg=carried, hole=glance(results)[1])
+    rest = tr("{where}. Payload {kg}.", where=placing.tray.where, kg=carried)
     title = tr("Where does the tray go?")
     return Tile(title, answer, rest, "pass", f"{name}/workspace.html", drawing=drawing)

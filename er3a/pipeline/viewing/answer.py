@@ -113,7 +113,7 @@ def may_run(sound: int, due: int, caught: int, what: str) -> tuple[str, str]:
     -------
     headline, rest : of an :class:`Answer`
     """
-    return tr("{sound} of {due} {what} may run.", sound=sound, due=due, what=what), all_caught(caught)
+    return tr("{sound} of {due} {what} pass.", sound=sound, due=due, what=what), all_caught(caught)
 
 
 def all_caught(count: int) -> str:

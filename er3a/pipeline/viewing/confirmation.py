@@ -35,7 +35,7 @@ def write_confirmation(
     nearest : the name of the arm that the corrected table is, if one is
     command : that made it; files : what it was made from
     """
-    _, headline, *lines = lines_of(found, robot, nearest=nearest)
+    _, headline, *lines = lines_of(found, nearest=nearest)
     arms = [seen_arm(robot, own_title(robot.title), "model", "right" if found.verdict == "agrees" else "wrong")]
     if found.verdict not in ("agrees", "open"):
         arms.insert(0, seen_arm(found.corrected, "Controller", "", "right"))

@@ -65,7 +65,7 @@ VERDICT_WORDS = {
 
 PAGES = {stage.name: stage.title for stage in STAGES.values()} | {"teach": N_("teach panel")}
 SHORT_NAMES = {
-    "validation": N_("Table"),
+    "validation": N_("D-H table"),
     "workspace": N_("Reach"),
     "collision": N_("Collisions"),
     "inverse": N_("Poses"),
@@ -76,12 +76,12 @@ SHORT_NAMES = {
     "teach": N_("Teach panel"),
 }
 FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
-    "pass": N_("table confirmed"),
-    "fail": N_("table contradicted"),
-    "caution": N_("table partly open"),
-    "unsettled": N_("table open"),
-    "no_reference": N_("table unchecked"),
-    "not_computed": N_("table unchecked"),
+    "pass": N_("D-H table confirmed"),
+    "fail": N_("D-H table contradicted"),
+    "caution": N_("D-H table partly open"),
+    "unsettled": N_("D-H table open"),
+    "no_reference": N_("D-H table unchecked"),
+    "not_computed": N_("D-H table unchecked"),
 }
 
 SCRIPT_WORDS = {
@@ -440,7 +440,7 @@ def render_stage(
     """
     stage, framed = stored.stage, _framed(study, stored)
     head = framed["head"]
-    if head.status == "caution" and head.gaps:
+    if head.status == "caution" and head.gaps and stage != "validation":  # whose own headline says what is open
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:

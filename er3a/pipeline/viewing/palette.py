@@ -25,6 +25,7 @@ SHELL = "#eef2f6"
 BODY = "#9aa5b1"
 PLATE = "#4a5868"
 
+VOIDS = {"enclosed": HIGHLIGHT, "open": "#e39bb9"}  # one hue, as in the page's section
 TOUCHING, DOUBTFUL = "#e0392d", "#dd9a1a"  # of solids, which light darkens
 
 VERDICTS = {

@@ -24,10 +24,12 @@ UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
 LETTERS = 0.021  # of the height: of a joint's name at its arrow
 GAP = 0.045  # of the height, between two labels
+TICK = 0.02  # of a dimension, half of what ends it
 COLUMN = 0.1  # of the size of what is drawn, from there to a column of labels
 SEEN_MM = 2.0  # by which two arms differ in a drawing
 ON_AXIS_MM = 1e-6
 BONE, THINNER = 0.045, 0.6  # an arm's thickness, of the height of what is drawn, and a wrong arm's of that over another
+THICKEST = 0.13  # of the arm's own extent
 SCALES_MM = (100, 200, 500, 1000, 2000)
 
 
@@ -40,7 +42,7 @@ class SeenArm:
     title, note : in a corner of the drawing, in the arm's colour
     kind : of its colour
     points_mm : (k, 2), the joints' places from the base to the flange: forward, up
-    reach_mm : outlines (m, 2) of what the tool point reaches; that of a wrong arm may leave the drawing
+    reach_mm : outlines (m, 2) of what the tool point reaches
     """
 
     title: str
@@ -58,6 +60,7 @@ class Label:
     ----------
     name : by which an address on the page leads to it
     start : (2,), mm, from where a dashed line leads to the place; None for none
+    written_there : at its place, though others are in a column
     """
 
     text: str
@@ -65,6 +68,7 @@ class Label:
     kind: LabelKind
     name: str = ""
     start: Reals | None = None
+    written_there: bool = False
 
 
 def seen_arm(robot: Robot, title: str, note: str, kind: Kind, reach_mm: Sequence[Reals] = ()) -> SeenArm:
@@ -90,6 +94,15 @@ def flanges_off(arms: Sequence[SeenArm]) -> list[Label]:
     far = float(np.linalg.norm(right - wrong))
     off = tr("flange {off} off", off=with_unit(fixed(far, 0), "mm"))
     return [Label(off, right, "wrong", start=wrong)] if far > SEEN_MM else []
+
+
+def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[tuple[str, Reals]]:
+    """A dimension at the height ``low``, from axis 1 to ``far`` in front of it, with a tick at both ends, and a dashed
+    line from its end up to ``high``; all in mm. As ``over`` of :func:`side_view` takes it."""
+    tick = TICK * far
+    ends = [(x, low + side * tick) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
+    upwards = np.array([(far, low), (far, high)])
+    return [(f"dimension {kind}", np.array(ends)), (f"dimension far {kind}", upwards)]
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
@@ -126,12 +139,11 @@ def side_view(
     -------
     drawing : colours come from the page's style sheet
     """
-    right = [arm for arm in arms if arm.kind != "wrong"] or arms
     corners = np.concatenate(
         [
             *(arm.points_mm for arm in arms),
             *(line for _, line in over),
-            *(ring for arm in right for ring in arm.reach_mm),
+            *(ring for arm in arms for ring in arm.reach_mm),
         ]
     )
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -140,7 +152,7 @@ def side_view(
     tall = float(high[1] - low[1])
     low[1] -= SCALE * tall
     for label in labels:
-        high[0] = max(high[0], (label.at[0] if column_mm is None else column_mm) + LABEL * tall)
+        high[0] = max(high[0], _across(label, column_mm) + LABEL * tall)
     wide, tall = high - low
     spare = np.maximum(0.0, [ratio * tall - wide, wide / ratio - tall]) / 2
     low, high = low - spare, high + spare
@@ -149,14 +161,15 @@ def side_view(
     if floor_mm is not None:
         parts.append(
             Markup('<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>').format(
-                low[0], -floor_mm, wide, max(0.0, floor_mm - low[1])
+                low[0] - wide, -floor_mm, 3 * wide, max(0.0, floor_mm - low[1] + tall)
             )
         )
     outline = Markup('<polygon class="{}" points="{}"/>')
     parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed]
-    parts += [_arm(arm, BONE * tall * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
+    thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
+    parts += [_arm(arm, thick * (THINNER if k else 1.0)) for k, arm in enumerate(arms)]
     parts += [_over(kind, points, LETTERS * tall) for kind, points in over]
     said = joined(joined((arm.title, arm.note), ", ") for arm in arms)
     drawn = Markup('<svg viewBox="{:.0f} {:.0f} {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg>').format(
@@ -192,8 +205,12 @@ def _placed(labels: Sequence[Label], low: Reals, high: Reals, column_mm: float |
     below = low[1]
     for k in reversed(range(len(order))):
         below = heights[k] = max(below + gap, heights[k])
-    across = [label.at[0] if column_mm is None else column_mm for label in order]
-    return list(zip(order, np.column_stack([across, heights])))
+    return list(zip(order, np.column_stack([[_across(label, column_mm) for label in order], heights])))
+
+
+def _across(label: Label, column_mm: float | None) -> float:
+    """How far forward (mm) a label begins."""
+    return float(label.at[0]) if column_mm is None or label.written_there else column_mm
 
 
 def _lead(label: Label, place: Reals) -> Markup:
@@ -206,8 +223,8 @@ def _lead(label: Label, place: Reals) -> Markup:
 def _word(label: Label, share: Reals) -> Markup:
     """A label, at its place in parts of the drawing."""
     name = Markup(' id="{}"').format(label.name) if label.name else ""
-    return Markup('<span class="label {}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
-        label.kind, name, *(100 * share), label.text
+    return Markup('<span class="label {}{}"{} style="left: {:.1f}%; bottom: {:.1f}%">{}</span>').format(
+        label.kind, " there" if label.written_there else "", name, *(100 * share), label.text
     )
 
 

@@ -61,7 +61,7 @@ def _overlaps(rows: PathClearances) -> list[PlayedEvent]:
 def _inside(bodies: tuple[str, ...], clearance_mm: float) -> str:
     """How deep a body gets into another one while they overlap."""
     one, other = map(body_word, bodies)
-    return tr("{one} is up to {far} mm inside {other}", one=one, far=fixed(-clearance_mm, 0), other=other)
+    return tr("{one} is up to {far} mm inside {other}", one=one, far=fixed(-clearance_mm, 1), other=other)
 
 
 def _least(found: Closest) -> PlayedEvent:
@@ -88,4 +88,4 @@ def nearest(rows: PathClearances) -> list[Mark]:
 
 
 def _clearance(clearance_mm: float) -> str:
-    return tr("{clearance} mm", clearance=fixed(clearance_mm, 0))
+    return tr("{clearance} mm", clearance=fixed(clearance_mm, 1))

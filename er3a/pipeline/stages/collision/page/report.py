@@ -11,10 +11,10 @@ from markupsafe import Markup
 from er3a.collision.pairs import TRIED
 from er3a.collision.scene import Scene
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import tr, with_unit
+from er3a.pipeline.language import N_, tr, with_unit
 from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
-from er3a.pipeline.messages.say import say, word
+from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
 from er3a.pipeline.player.motions import address_of, bar_of
 from er3a.pipeline.player.player import drawing_head, player
@@ -23,20 +23,12 @@ from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part, all_caught
+from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.page import render_stage
 from er3a.pipeline.viewing.palette import MODEL, VERDICTS
 from er3a.robots.robot import Robot
 
 PLACE_PX = 5.0
-
-
-def most_often(pairs: model.PairShares) -> str:
-    """The pair that takes the largest part of joint space; empty where none takes any."""
-    if not len(pairs) or not pairs.ratio[0]:
-        return ""
-    worst, percent = say(pairs.between[0]), fixed(100 * pairs.ratio[0], 1)
-    return tr("{pair} overlap most often, in {percent} % of it.", pair=worst[:1].upper() + worst[1:], percent=percent)
 
 
 def _places(robot: Robot, results: model.CollisionResults, scene: Scene | None) -> Markup:
@@ -50,22 +42,6 @@ def _places(robot: Robot, results: model.CollisionResults, scene: Scene | None) 
     layers = [Layer(name, rows.middle_mm[own], colour, PLACE_PX, cut=True) for name, own, colour in groups if own.any()]
     return (
         turning_figure(layers, solids=surroundings(robot, scene), cut_m=float(robot.base[1, 3])) if layers else Markup()
-    )
-
-
-def _left(summary: model.CollisionSummary) -> str:
-    """How much of the reached places is left."""
-    found = summary.places
-    return tr(
-        "Each point is a cell of {cell:.0f} mm. Of {reached} reached, {clear} have a collision-free configuration, "
-        "{joined} of these connected to home. In the others none was found in {tries} tries, so {lost} L overestimate "
-        "the loss.",
-        cell=1000 * found.cell_m,
-        reached=found.reached,
-        clear=found.clear,
-        joined=found.joined,
-        tries=found.tries_in_lost,
-        lost=fixed(1000 * found.lost_m3, 0),
     )
 
 
@@ -92,9 +68,7 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
-        most_often=most_often(results.pairs),
         places=_places(robot, results, scene),
-        left=_left(summary),
         player=player(robot, [*played, *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg or ())),
@@ -111,55 +85,64 @@ def _answer(
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
-    What collides as its file expects is counted apart, and so is a path of which only a part was measured: that is
-    clear of nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
+    What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
+    nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
     page that says how to mend a path.
     """
     found = {figure.name: figure.value for figure in summary.figures}
     free, params = found.get("free_of_collisions"), summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    hit: list[ListRow] = []
-    clear: list[ListRow] = []
-    partly: list[ListRow] = []
-    for each in closest:
-        measured = each.kind == "target" or each.name not in unreached
-        own = hit if each.clearance_mm < 0 else clear if measured else partly
-        own.append(_row(each, measured, near, bars, advised))
-    caught = len(params.get("demonstrations", ()))
-    due = len(clear) + len(hit) + len(params.get("blocked", ())) - caught
+    rows = [_row(each, unreached, near, bars, advised, closest[-1].clearance_mm) for each in closest]
+    hit, clear, partly = (
+        [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
+    )
+    counted = (
+        (N_("{count} collide as expected."), len(params.get("demonstrations", ()))),
+        (N_("{count} can't be reached whole."), len(partly)),
+        (N_("{count} targets collide in every solution."), blocked := len(params.get("blocked", ()))),
+    )
+    due = len(rows) + blocked
     keys = [(with_unit(fixed(1000 * summary.places.lost_m3, 0), "L"), tr("reach lost to collisions, at most"))]
     if free is not None:
         keys.insert(0, (with_unit(fixed(float(free), 0), "%"), tr("of joint space is free")))
+    least = next((each for each in closest if each.clearance_mm >= 0), None)
+    if least:
+        keys.insert(0, (with_unit(fixed(least.clearance_mm, 1), "mm"), tr("least clearance: {name}", name=least.name)))
+    titled = ((tr("Collide"), hit), (tr("Clear, nearest first"), clear), (tr("Clear as far as reached"), partly))
     return Answer(
         tr("{count} of {due} cases are clear.", count=len(clear), due=due) if due else tr("Collisions checked."),
-        all_caught(caught),
-        tr("Reached in part, clear as far as measured: {count}.", count=len(partly)) if partly else "",
+        "",
+        joined([tr(text, count=count) for text, count in counted if count], " "),
         keys,
-        (
-            Group(tr("Collide"), hit[:MAX_ROWS]),
-            Group(tr("Clear"), clear[:MAX_ROWS]),
-            Group(tr("Not all of it is reached"), partly[:MAX_ROWS]),
-        ),
+        [Group(title, own[:MAX_ROWS]) for title, own in titled],
         next((row.fix for row in hit if row.fix), None),
     )
 
 
 def _row(
-    found: model.Closest, measured: bool, near: Sequence[str], bars: Mapping[str, Sequence[Part]], advised: bool
+    found: model.Closest,
+    unreached: set[str],
+    near: Sequence[str],
+    bars: Mapping[str, Sequence[Part]],
+    advised: bool,
+    most_mm: float,
 ) -> ListRow:
-    """A path with its bar, or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes;
-    ``measured``: all of it."""
+    """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
+    which only a part was measured.
+
+    What is clear has its clearance as a bar, in parts of ``most_mm``; a path that is not has the bar of its time."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
-    mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     of_path = found.kind == "path"
-    if mark == "pass" and not measured:
+    mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
+    if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    bar = bars[found.name] if of_path else ()
-    fix = None
+    length, bar, fix = float(of_path), bars.get(found.name, ()), None
+    if mark in ("pass", "caution"):
+        length, bar = found.clearance_mm / most_mm, ()
     if mark == "fail" and of_path and advised:
         asked = address_of("trajectory", found.name, found.t_s or 0.0, found.name)
         fix = Fix(tr("{name}: see what the page Paths advises.", name=found.name), asked, instead=False)
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), float(of_path), bar, fix)
+    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

@@ -41,9 +41,7 @@ def _diagnosis_story(diagnosis: model.SetDiagnosis, own_claims: bool) -> dict[st
         reference_set=diagnosis.reference_set,
         text=joined([typographic(say(diagnosis.conclusion)), tr(OWN_CLAIMS) if own_claims and best else ""], " "),
         against=_measured_against(diagnosis),
-        others_title=tr("Next best hypotheses")
-        if named
-        else tr("The best hypotheses, none of which explains the data"),
+        named=named,
         others=[_hypothesis_row(each) for each in diagnosis.hypotheses[1 if named else 0 : SHOWN_HYPOTHESES]],
         hypotheses_tried=diagnosis.hypotheses_tried,
     )
@@ -55,14 +53,7 @@ def _measured_against(diagnosis: model.SetDiagnosis) -> str:
     others = [own_title(title) for title in diagnosis.against if title not in diagnosis.from_table]
     text = tr("Residuals are measured against: {documents}.", documents=joined(others)) if others else ""
     if own:
-        template = (
-            N_("Also compared with {documents}: taken from the table, or the table from them, so no evidence for it.")
-            if others
-            else N_(
-                "Residuals are measured against {documents}: the table was taken from it or it from the table, so "
-                "they are no evidence for its numbers."
-            )
-        )
+        template = N_("No evidence for the table, which was taken from them or they from it: {documents}.")
         text = joined([text, tr(template, documents=joined(own))], " ")
     return text
 

@@ -10,7 +10,7 @@ from typing import Any
 from er3a.identifiability.entries import column_of
 from er3a.identifiability.entry_evidence import EntryEvidence, Status
 from er3a.pipeline.language import N_, tr, with_unit
-from er3a.pipeline.messages.numbers import fixed, number
+from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.references import STATUS_MEANINGS, STATUS_WORDS
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
@@ -37,7 +37,7 @@ COLUMNS = {
     "d": "d (mm)",
     "beta": "β (°)",
     "offset": N_("offset (°)"),
-    "direction": N_("direction"),
+    "direction": N_("dir."),
     "lower": N_("from (°)"),
     "upper": N_("to (°)"),
     "speed": N_("speed (°/s)"),
@@ -87,12 +87,12 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
         first=[ListRow("caution", each.entry, _tool_off(each), f"#entry-{each.entry}") for each in left[:FIRST]],
         left=len(evidence.unconfirmed) + evidence.contradicted,
-        unmet=not evidence.table_meets and evidence.other is None,
-        allowed=evidence.other is not None and evidence.other.code == "allowed",
-        tolerance=tr(
-            "{mm} mm and {deg} deg", mm=number(evidence.tolerance.mm, 2), deg=number(evidence.tolerance.deg, 2)
-        ),
     )
+
+
+def known_alone(evidence: TableEvidence) -> int:
+    """How many entries of a table mean something alone."""
+    return sum(each.value is not None and each.status != "gauge" for each in evidence.entries)
 
 
 def plain_table(robot: Robot) -> tuple[list[str], list[list[str]]]:
@@ -215,6 +215,8 @@ def _interval(each: EntryEvidence) -> str:
 def _off(mm: float, deg: float) -> str:
     if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
         return tr("turned by {deg} deg", deg=fixed(deg, 0 if deg >= 10 else 1))
+    if fixed(deg, 1) == "0.0":
+        return with_unit(fixed(mm, 0 if mm >= 10 else 1), "mm")
     return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -29,6 +30,7 @@ from er3a.pipeline.stages.validation.page import diagnosis_section
 from er3a.pipeline.stages.validation.page.evidence_section import (
     SETTLED,
     evidence_section,
+    known_alone,
     other_robot,
     plain_table,
 )
@@ -37,7 +39,6 @@ from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
-    status_word,
     text_address,
 )
 from er3a.pipeline.viewing.side_view import (
@@ -46,6 +47,7 @@ from er3a.pipeline.viewing.side_view import (
     Label,
     LabelKind,
     beyond,
+    dimension,
     entry_places,
     flanges_off,
     seen_arm,
@@ -59,7 +61,7 @@ SEEN_FROM_SIDE = 0.64  # of that: the half before an axis in the drawing's plane
 HEAD = 0.5  # of its radius, the length of its head
 TILT = 0.35  # of a circle around an axis in the drawing's plane, seen a little from above
 RADIUS = 0.045  # of such an arrow, of the size of the arm
-BELOW = 0.07  # of a reach: how far below the base its dimension is drawn
+BELOW = 0.1  # of a reach: from one line to the next below the base
 SEEN = "seen"  # address in the picture of what is to be done next
 DECIMALS = {"mm": 2, "deg": 2, "deg/s": 1, "mm/s": 1, "": 0}
 COLUMNS = (
@@ -84,11 +86,10 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
         for group in dict.fromkeys(check.group for check in own):
             part = [check for check in own if check.group == group]
             counted = Counter(check.status for check in part)
-            status = "fail" if counted["fail"] else "conflict" if counted["conflict"] else "pass"
             worst = max(part, key=lambda check: check.tolerances_off)
             off = with_unit(_value(worst.difference, worst), worst.unit)
             counts = counted["pass"], counted["fail"], counted["conflict"]
-            rows.append([title, word("group", GROUPS, group), status_word(status), *counts, say(worst.subject), off])
+            rows.append([title, word("group", GROUPS, group), *counts, say(worst.subject), off])
     return rows
 
 
@@ -147,7 +148,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         if summary.verdict.status == "fail" and stored.folder
         else None
     )
-    evidence, disputed = evidence_section(robot, summary.evidence), _disputed(robot, summary.conflicts)
+    evidence = evidence_section(robot, summary.evidence)
+    disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     render_stage(
         study,
         stored,
@@ -173,7 +175,9 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     )
 
 
-def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[Label]) -> Markup:
+def _both_arms(
+    robot: Robot, other: Robot | None, evidence: Mapping[str, Any], disputed: Sequence[model.Conflict]
+) -> Markup:
     """The arm of the table, with its doubtful entries, and the one that documents describe, from the side at one
     scale."""
     arms = [seen_arm(robot, own_title(robot.title), tr("this table"), "right")]
@@ -181,16 +185,15 @@ def _both_arms(robot: Robot, other: Robot | None, evidence: Mapping[str, Any], d
         arms.insert(0, seen_arm(other, tr("Documents"), tr("describe this arm"), "right"))
     off = flanges_off(arms)
     arms = [arms[0], replace(arms[-1], kind="wrong")] if off else arms[-1:]
-    labels = [*_entries_seen(robot, evidence), *off, *disputed]
-    column = max([beyond(arms), *((1 + COLUMN) * label.at[0] for label in disputed)])
+    reaches, dimensions = _dimensions(disputed)
+    labels = [*_entries_seen(robot, evidence), *off, *reaches]
+    column = max([beyond(arms), *((1 + COLUMN) * each.measured for each in disputed)])
     places, over = entry_places(robot), []
     radius = RADIUS * float(np.ptp(arms[-1].points_mm, axis=0).max())
     for joint, cells in evidence.get("rows", ()):
         if any(cell and column_of(cell["entry"]) == "direction" and _kind(cell["status"]) == "open" for cell in cells):
             over.append(_turn_arrow(robot, joint, places[f"d{joint}"], radius))
-    for label in disputed:
-        over += _dimension(label, float(places["1"][1]))
-    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column, over=over)
+    return side_view(arms, ratio=UPRIGHT, labels=labels, column_mm=column, over=[*over, *dimensions])
 
 
 def _turn_arrow(robot: Robot, joint: int, at: Reals, radius: float) -> tuple[str, Reals]:
@@ -207,27 +210,25 @@ def _turn_arrow(robot: Robot, joint: int, at: Reals, radius: float) -> tuple[str
     return f"turn J{joint}", at + radius * np.stack([*seen, tip + back + wide, tip, tip + back - wide])
 
 
-def _dimension(label: Label, height: float) -> list[tuple[str, Reals]]:
-    """A dimension below the base, from axis 1 to where the flange is farthest from it, at the ``height`` (mm) of axis
-    2: its line with a tick at both ends, and what is measured above it."""
-    far, low = label.at
-    tick = BELOW * far / 3
-    ends = [(x, low + side * tick) for x, sides in ((0.0, (-1, 1, 0)), (far, (0, 1, -1))) for side in sides]
-    return [("dimension", np.array(ends)), ("dimension far", np.array([(far, low), (far, height)]))]
+def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[tuple[str, Reals]]]:
+    """What documents contradict each other about: each reach that one states as a dimension of its own, below the base,
+    from axis 1 on; that of the table in its colour.
 
-
-def _disputed(robot: Robot, conflicts: Iterable[model.Conflict]) -> list[Label]:
-    """What documents contradict each other about: a reach, from axis 1, at the end of its dimension."""
-    return [
-        Label(
-            with_unit(tr(" or ").join(fixed(found.expected, 1) for found in each.statements), each.unit),
-            np.array([each.measured, -BELOW * each.measured]),
-            "open",
-            SEEN,
-        )
-        for each in conflicts
-        if is_one(each.subject, "reach") and each.subject.axis == 1
-    ]
+    Returns
+    -------
+    labels, lines : what is measured, then each value with its source, each over its line
+    """
+    labels, lines = [], []
+    for each in disputed:
+        step = BELOW * each.measured
+        labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
+        for row, stated in enumerate(each.statements, 2):
+            kind: LabelKind = "right" if stated.met else "open"
+            source = re.split("[,，]", own_title(stated.source))[0]
+            text = joined([with_unit(fixed(stated.expected, 1), each.unit), source], ": ")
+            labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
+            lines += dimension(stated.expected, -step * (row + 0.5), -1.5 * step, kind)
+    return labels, lines
 
 
 def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
@@ -236,9 +237,11 @@ def _entries_seen(robot: Robot, evidence: Mapping[str, Any]) -> list[Label]:
     for joint, cells in evidence.get("rows", ()):
         for cell in filter(None, cells):
             entry, given = cell["entry"], cell["gives"] or cell["value"] != "0"
-            if given if column_of(entry) in ("a", "d") else cell["status"] == "open" and column_of(entry) in ANGLES:
+            angle = column_of(entry) in ANGLES
+            if cell["status"] == "open" if angle else column_of(entry) in ("a", "d") and given:
                 kind, gives = _kind(cell["status"]), cell["gives"]
                 text = joined([f"{entry} = {cell['value']}", gives], " → " if kind == "wrong" else " / ")
+                text = with_unit(text, "deg" if angle else "mm")
                 found.append(Label(text, places.get(entry, places[str(joint)]), kind))
     return found
 
@@ -248,7 +251,7 @@ def _kind(status: str) -> LabelKind:
 
 
 def _answer(
-    study: Study, robot: str, summary: model.ValidationSummary, instead: str | None, disputed: Sequence[Label]
+    study: Study, robot: str, summary: model.ValidationSummary, instead: str | None, disputed: Sequence[model.Conflict]
 ) -> Answer:
     """How many checks pass, how much of the table is confirmed, and what to do."""
     found, counts = summary.verdict.finding, summary.counts.independent
@@ -256,24 +259,32 @@ def _answer(
     bad, unsure = (evidence.contradicted, len(evidence.unconfirmed)) if evidence else (0, 0)
     headline, rest = _headline(summary, bad, unsure)
     keys = [(f"{counts.passed}/{counts.total}", tr("independent checks pass"))] if counts.total else []
-    if bad:
-        keys.append((str(bad), tr("entries contradicted")))
-    elif evidence:
-        keys.append((str(unsure), tr("entries unconfirmed")))
+    below = ""
+    if evidence:
+        alone = known_alone(evidence)
+        count, what = (bad, tr("entries contradicted")) if bad else (alone - unsure, tr("entries settled by them"))
+        keys.append((f"{count}/{alone}", what))
+        if unsure and not bad:
+            below = tr("A check that other values would pass as well settles no entry.")
     if instead:
         fix = Fix(
             tr("use the table of {robot}.", robot=own_title(study.robot(instead).title)),
             f"../{instead}/validation.html",
         )
     elif disputed:
-        fix = Fix(joined([tr("measure the reach from axis 1"), disputed[0].text], tr(": ")), f"#{SEEN}", instead=False)
+        stated = joined([fixed(each.expected, 1) for each in disputed[0].statements], " or ")
+        fix = Fix(
+            tr("measure the {subject}: {values} mm?", subject=say(disputed[0].subject), values=stated),
+            f"#{SEEN}",
+            instead=False,
+        )
     elif is_one(found, "validation.left_open") and found.next_measurement:
         fix = Fix(say(found.next_measurement), f"#cell-{found.next_measurement.entry}", instead=False)
     elif is_one(found, "validation.no_reference"):
         fix = Fix(tr("read five poses at the pendant: er3a confirm {robot} --plan", robot=robot), instead=False)
     else:
         fix = None
-    return Answer(headline, rest, "", keys, (), fix)
+    return Answer(headline, rest, below, keys, (), fix)
 
 
 def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[str, str]:
@@ -283,11 +294,11 @@ def _headline(summary: model.ValidationSummary, bad: int, unsure: int) -> tuple[
         return tr("The same arm, defined otherwise."), tr("Correct zeros, directions, base or flange first.")
     if status == "fail":
         another = tr("Another arm's table.") if summary.is_beyond_correction else tr("This table is wrong.")
-        return another, tr("Entries contradicted: {count}.", count=bad) if bad else ""
+        return another, tr("Documents contradict {count} entries.", count=bad) if bad else ""
     if summary.conflicts:
         return tr("Sources disagree."), tr("Measure before you rely on it.")
     if status == "no_reference":
         return tr("Nothing to check against."), tr("Find documents or measure.")
     if unsure:
-        return tr("Nothing contradicts this table."), tr("Entries unconfirmed: {count}.", count=unsure)
-    return tr("This table is right."), tr("Documents confirm every entry.")
+        return tr("Partly settled."), tr("Nothing contradicts this D-H table.")
+    return tr("This D-H table is right."), tr("Documents settle every entry.")

@@ -18,12 +18,7 @@ from er3a.pipeline.language import tr
 from er3a.pipeline.messages.kinematics import branch_word
 from er3a.pipeline.messages.numbers import fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, say
-from er3a.pipeline.messages.workspace import (
-    millimetres,
-    reached_text,
-    run_again_text,
-    stand_text,
-)
+from er3a.pipeline.messages.workspace import millimetres, reached_text, run_again_text, stand_text
 from er3a.pipeline.player.motions import address_of
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, limit_text
@@ -42,8 +37,8 @@ def tray_rows(
 ) -> list[tuple[str, str]]:
     """What to know of the tray where it is put, each under a title; ``payload``: what is known of it."""
     tray, stand = placing.tray, placing.tray.below
-    place, served = tray.place, (stand.served_from_m if stand and stand.place else None) or 0.0
-    reached = page.whole_sentence(reached_text(placement, place, served))
+    served = (stand.served_from_m if stand and stand.place else None) or 0.0
+    reached = page.whole_sentence(reached_text(placement, served))
     return [
         (tr("Place"), joined([tr("{place}.", place=tray.line), reached], " ")),
         (tr("Motions"), _hindered(placing)),
@@ -75,12 +70,7 @@ def _sentence(links: Sequence[Markup], about: str = "") -> list[Markup]:
 
 
 def _room(place: model.PlaceSummary) -> str:
-    """How far the tray can be moved along its axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds.
-
-    Empty where it can't be moved.
-    """
-    if not any((*place.room_down_m, *place.room_up_m)):
-        return ""
+    """How far the tray can be moved along its axes, such as ``x ±25, y -50 to 0``, in whole mm that the room holds."""
     parts = []
     whole = (np.floor(1000 * np.array(room) + ROUNDING) for room in (place.room_down_m, place.room_up_m))
     for axis, down, up in zip("xyz", *whole):
@@ -118,7 +108,7 @@ def place_row(name: str, place: model.PlaceSummary, capability: model.Capability
         fixed(100 * place.manipulability_ratio, 1),
         limit_text(place),
         bracketed(fixed(place.clearance_mm, 0), say(place.clearance_pair) if place.clearance_pair is not None else ""),
-        _room(place) or fixed(0, 0),
+        _room(place) or "0",
     ]
 
 

@@ -16,8 +16,10 @@ from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import outlines
 from er3a.robots.robot import Robot
 
-AROUND = 1.15  # of the reach, that is shown to each side
+AROUND = 1.2  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
+LETTER = 0.3  # half the width of a letter, of its height
+FINE = 0.1  # letters, of the reach, up to which there is room for the limits of joint 1
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
@@ -45,7 +47,7 @@ def from_above(
             parts += [Markup('<polygon class="solid" points="{}"/>').format(_line(corners)) for corners in seen]
             around = np.concatenate(seen)
             at = np.array([around[:, 0].mean(), around[:, 1].max() + BASE * reach])
-            words.append(_word(at, height, own_title(solid.name), ""))
+            words.append(_word(at, height, own_title(solid.name), "", size))
     for number, tray in enumerate(trays, 1):
         (left, below), (right, above) = (1000 * corner[:2] for corner in tray.corners)
         kind = "tray other" if number > 1 else "tray"
@@ -53,16 +55,24 @@ def from_above(
         parts.append(Markup('<polygon class="{}" id="tray-{}" points="{}"/>').format(kind, number, _line(corners)))
         name = tray.name if len(trays) > 1 else tr("tray")
         at = np.array([(left + right) / 2, above + BASE * reach if number > 1 else below - height])
-        words.append(_word(at, height, name, kind))
+        words.append(_word(at, height, name, kind, size))
     gap = 2 * np.pi - (high - low)
     if gap > DEAD:
-        middle = high + gap / 2
-        words.append(_word(0.78 * reach * np.array([np.cos(middle), np.sin(middle)]), height, tr("dead zone"), ""))
+        parts.append(Markup('<path class="dead" d="{}"/>').format(_sector(reach, high, high + gap)))
+        words.append(_word(0.85 * reach * _way(high + gap / 2), height, tr("dead zone"), "", size))
+        for limit, aside in ((low, height), (high, -height)) if letters < FINE else ():
+            named = f"J1 {fixed(np.degrees(limit), 0)}°"
+            words.append(_word(1.08 * reach * _way(limit + aside / reach), height, named, "", size))
     parts.append(Markup('<circle class="base" cx="0" cy="0" r="{:.0f}"/>').format(BASE * reach))
     box = f"{-size:.0f} {-size:.0f} {2 * size:.0f} {2 * size:.0f}"
     said = tr("From above: what axis 1 sweeps, what stands there, and the tray, {far} mm at most", far=fixed(reach, 0))
     drawing = '<svg class="plan-view" viewBox="{}" role="img" aria-label="{}">{}</svg>'
     return Markup(drawing).format(box, said, Markup("").join([*parts, *words]))
+
+
+def _way(angle: float) -> Reals:
+    """The direction (2,) at an angle, rad, about axis 1."""
+    return np.array([np.cos(angle), np.sin(angle)])
 
 
 def _sector(radius: float, low: float, high: float) -> str:
@@ -77,7 +87,9 @@ def _line(points: Reals) -> str:
     return " ".join(f"{x:.0f},{-y:.0f}" for x, y in points)
 
 
-def _word(at: Reals, letters: float, text: str, kind: str) -> Markup:
+def _word(at: Reals, letters: float, text: str, kind: str, size: float) -> Markup:
+    """A word in the middle of a place (2,), or as near to it as it is whole in a drawing of ``size`` to each side."""
+    room = max(0.0, size - LETTER * letters * len(text))
     return Markup('<text class="{}" x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(
-        kind, at[0], -at[1], letters, text
+        kind, np.clip(at[0], -room, room), -at[1], letters, text
     )

@@ -14,21 +14,20 @@ from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.arm import mesh
-from er3a.pipeline.viewing.palette import HIGHLIGHT, MUTED, REFERENCE, rgb
+from er3a.pipeline.viewing.palette import MUTED, VERDICTS, VOIDS, rgb
 from er3a.pipeline.viewing.recording import Logged, record_stage
 
 POINT_SHARE = 0.16  # radius of a point of the cloud, of the mean distance between points
 ALONG = 0.99  # of an axis that points along y nearly
 DIMMEST = 0.4  # of the colour scale: darker points can't be seen on the viewer's ground
-_COLOURS = {"enclosed": HIGHLIGHT, "open": REFERENCE}
 
 
 NOTE = """# Workspace of {title}
-**Look first** at the voids, below: enclosed ones in magenta, open pockets in orange, the border of the reach in grey.
+**Look first** at the voids, below: enclosed ones in magenta, open ones in pink, the border of the reach in grey.
 
 {findings}
 
-- magenta box: where the tray goes, on its stand; grey solids: the scene
+- green box: where the tray goes, on its stand; grey solids: the scene
 - above: tool positions, the half between you and the arm cut away; yellow: high manipulability, dark: near-singular.
   `/workspace/cloud/near` is the rest"""
 
@@ -60,7 +59,7 @@ def _tray(placing: Placing | None) -> dict[str, Logged]:
     if tray.floor is not None:
         corners.append((np.array([*tray.low[:2], tray.floor]), np.array([*tray.high[:2], tray.low[2]])))
     middles, sizes = ([f(low, high) for low, high in corners] for f in (lambda a, b: (a + b) / 2, lambda a, b: b - a))
-    colours = [(*rgb(HIGHLIGHT), 160), (*rgb(MUTED), 90)][: len(corners)]
+    colours = [(*rgb(VERDICTS["pass"]), 160), (*rgb(MUTED), 90)][: len(corners)]
     box = rr.Boxes3D(centers=middles, sizes=sizes, colors=colours, labels=["tray", "stand"][: len(corners)])
     return {"tray": box}
 
@@ -97,4 +96,4 @@ def _voids(results: model.WorkspaceResults) -> Iterator[tuple[str, Logged]]:
         faces = triangles.corners[triangles.void == number]
         if len(faces):
             corners = vertices.point_m[vertices.void == number]
-            yield f"voids/{void.kind}_{number}", mesh(corners, faces, rgb(_COLOURS[void.kind]))
+            yield f"voids/{void.kind}_{number}", mesh(corners, faces, rgb(VOIDS[void.kind]))

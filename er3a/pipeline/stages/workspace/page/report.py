@@ -11,8 +11,8 @@ from er3a.collision.scene import Scene
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.dynamics import payload_key, payload_text
 from er3a.pipeline.messages.numbers import at_least, at_most, fixed, number
-from er3a.pipeline.messages.say import bracketed, joined, say, sentence, word
-from er3a.pipeline.messages.workspace import VOID_KINDS, millimetres
+from er3a.pipeline.messages.say import joined, say, sentence
+from er3a.pipeline.messages.workspace import millimetres, reaches
 from er3a.pipeline.player.player import drawing_head, floor_of
 from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.registry import STAGES
@@ -23,7 +23,7 @@ from er3a.pipeline.stages.workspace.page.from_above import from_above
 from er3a.pipeline.stages.workspace.page.tray import Placing, placing_of
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow
-from er3a.pipeline.viewing.page import Picture, render_stage
+from er3a.pipeline.viewing.page import Picture, render_stage, whole_sentence
 from er3a.pipeline.viewing.side_view import Kind
 from er3a.robots.robot import Robot
 
@@ -43,13 +43,12 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     context = _context(robot, results, placing, payload)
     if contradicted:
         context["nowhere"] = sentence("box.contradicted")
-    bare = any(each.reason == "tool" for each in summary.assumed)
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, placing, payload_key(known, robot), bare=bare),
-        at_side=True,
+        _answer(summary, placing, payload_key(known, robot)),
+        at_side=placing,  # the plan of the tray
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
         labelled=_labelled(robot, results, scene, placing, "wrong" if contradicted else "right"),
         turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
@@ -71,44 +70,39 @@ def _labelled(
     return workspace_figures.labelled(robot, results, floor_mm, trays, kind)
 
 
-def _answer(
-    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], *, bare: bool
-) -> Answer:
-    """How far the arm reaches, its holes, where the tray goes, and the ``payload``; ``bare``: without a tool."""
+def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str]) -> Answer:
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload``."""
     reach, volume = summary.reach_m, summary.volume_m3
-    far = with_unit(fixed(1000 * reach.furthest_from_axis, 0), "mm")
-    holes = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in holes), "L"), "L")
-    rest = (
-        tr("One hole, ≥ {size}.", size=litres)
-        if len(holes) == 1
-        else tr("{count} holes, ≥ {size}.", count=len(holes), size=litres)
-    )
-    heights = [fixed(1000 * value, 0) for value in (reach.lowest, reach.highest)]
+    enclosed = summary.enclosed_voids
+    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
+    rest = tr("Void ≥ {size}.", size=litres) if enclosed else tr("No enclosed void.")
     keys = [
-        (with_unit(tr("{low} to {high}", low=heights[0], high=heights[1]), "mm"), tr("height along axis 1")),
+        (
+            tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
+            tr("its height along axis 1"),
+        ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
             tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
         payload,
     ]
-    # The hole that the headline names and the picture shows comes first.
+    # The void that the headline names and the picture shows comes first.
     voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
     groups = (
-        Group(tr("Holes and pockets"), [_void_as_row(*each) for each in voids]),
+        Group(tr("Voids"), [_void_as_row(*each) for each in voids]),
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
     )
-    point = tr("Of the flange: no tool is given.") if bare else ""
-    return Answer(tr("Reaches {far}.", far=far), rest if holes else tr("No holes."), point, keys, groups)
+    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     """A void: what kind, how large."""
-    kind = word("workspace.void_kind", VOID_KINDS, void.kind)
     size = _litres(1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper)
-    note = joined([with_unit(size, "L"), tr("at the shoulder: normal") if void.holds_shoulder else ""], ", ")
-    return ListRow("none", tr("{number}: {kind}", number=number_, kind=kind), note, f"#hole-{number_}")
+    of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
+    where = tr("at the shoulder: normal") if void.holds_shoulder else tr("in the dead zone") if of_one else ""
+    note = joined([with_unit(size, "L"), where], ", ")
+    return ListRow("none", tr(workspace_figures.VOID_NAMES[void.kind], number=number_), note, f"#hole-{number_}")
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -140,12 +134,9 @@ def _void_row(row: int, void: model.VoidSummary) -> list[str]:
     low, high = 1000 * void.volume_m3.lower, 1000 * void.volume_m3.upper
     return [
         str(row),
-        bracketed(word("workspace.void_kind", VOID_KINDS, void.kind), tr("shoulder") if void.holds_shoulder else ""),
+        tr(workspace_figures.VOID_NAMES[void.kind], number=row),
         _litres(low, high),
-        *(
-            ", ".join(fixed(1000 * value, 0) for value in corner)
-            for corner in (void.centroid_m, void.low_m, void.high_m)
-        ),
+        *map(millimetres, (void.centroid_m, void.low_m, void.high_m)),
         say(void.cause),
     ]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,13 +21,14 @@ from er3a.kinematics.forward import skeleton
 from er3a.numerics.arrays import Flags, Integers, Reals
 from er3a.pipeline.language import N_, own_title, tr
 from er3a.pipeline.messages.numbers import at_least, fixed, number
+from er3a.pipeline.messages.workspace import reaches
 from er3a.pipeline.player.turning import ColourScale, Layer, Solids, surroundings, turning_figure
 from er3a.pipeline.stages.workspace import model
 from er3a.pipeline.stages.workspace.page.tray import Tray
 from er3a.pipeline.viewing.drawn import drawn_scene
 from er3a.pipeline.viewing.figures import equal_scale, new_figure
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, JOINTS, MUTED, REFERENCE, VERDICTS
-from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, side_view
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MUTED, VERDICTS, VOIDS
+from er3a.pipeline.viewing.side_view import Kind, Label, SeenArm, border_lines, dimension, side_view
 from er3a.robots.robot import Robot
 from er3a.workspace.cell_frame import cell_frame
 from er3a.workspace.voids import Blocks
@@ -42,6 +42,7 @@ PROOF = {
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
+BELOW = 0.08  # of the reach, from what is reached down to its dimension
 STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
@@ -145,8 +146,7 @@ def _on_arcs(azimuth: Reals, arcs: Reals) -> Flags:
 
 
 CLOUD_POINTS = 12_000
-_COLOURS = {"enclosed": (HIGHLIGHT, JOINTS[6]), "open": (REFERENCE, JOINTS[8])}  # in turns, so that two stand apart
-_NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
+VOID_NAMES = {"enclosed": N_("void {number} (enclosed)"), "open": N_("void {number} (open)")}
 
 
 BODY_BLOCKS = (36, 56, 60)  # of the reached body, along radius, height and around
@@ -164,15 +164,12 @@ def in_space(robot: Robot, results: model.WorkspaceResults, scene: Scene | None,
         Layer(tr("reachable"), 1000 * body, PROOF["reachable"], faces=faces, cut=True),
         Layer(tr("cloud"), points, width=1.6, shade=shade, cut=True),
     ]
-    drawn: Counter[str] = Counter()
     for i, void in enumerate(results.summary.voids, start=1):
         faces = triangles.corners[triangles.void == i]
         if len(faces):
-            name = tr(_NAMES[void.kind], number=i)
+            name = tr(VOID_NAMES[void.kind], number=i)
             corners = 1000 * _smoothed(vertices.point_m[vertices.void == i], faces)
-            colour = _COLOURS[void.kind][drawn[void.kind] % 2]
-            layers.append(Layer(name, corners, colour, faces=faces))
-            drawn[void.kind] += 1
+            layers.append(Layer(name, corners, VOIDS[void.kind], faces=faces))
     scale = ColourScale("viridis", tr("manipulability (m³)"), [(0.0, "0"), (1.0, number(most, 2))])
     solids = surroundings(robot, scene)
     if tray:
@@ -223,7 +220,6 @@ def labelled(
     summary, border = results.summary, results.border
     points = skeleton(robot, np.zeros(robot.joints)) - summary.axis.point_m
     arm = 1000 * np.stack([points[:, 0], points @ summary.axis.direction], axis=1)
-    far = tr("reaches {far} mm", far=fixed(1000 * summary.reach_m.furthest_from_axis, 0))
     lines = border_lines(border.arc, border.rho_m, border.z_m)
     outer = np.concatenate(lines)
     low, high = outer.min(axis=0), outer.max(axis=0)
@@ -236,8 +232,12 @@ def labelled(
         corners = _tray_corners(tray)
         outlines.append(("tray", corners))
         labels.append(Label(tray.name, corners[1], "tray"))
-    seen = SeenArm(own_title(robot.title), far, kind, arm, lines)
-    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines)
+    seen = SeenArm(own_title(robot.title), "", kind, arm, lines)
+    far, height = outer[outer[:, 0].argmax()]
+    below = low[1] - BELOW * far
+    labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
+    over = dimension(far, below, height, kind)
+    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines, over=over)
 
 
 def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
@@ -250,7 +250,7 @@ def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
 def void_label(number_: int, void: model.VoidSummary) -> Label:
     """The name of a void, at its place."""
     size = at_least(1000 * void.volume_m3.lower, "L")
-    name = tr("hole, {size} L", size=size) if void.kind == "enclosed" else tr("pocket, {size} L", size=size)
+    name = tr("void, {size} L", size=size)
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
