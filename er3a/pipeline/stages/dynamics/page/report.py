@@ -172,13 +172,7 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     if idle := order[len(rows) :]:
         names = joined((f"J{motor.joint}" for motor in idle), ", ")
         rows.append(ListRow("none", names, _sized(0.0, idle[0].unit), "#motors"))
-    still = [
-        ListRow(
-            "none", name, _sized(each.holding, each.unit), f"#{name}", (name, 0.0), 1.0, _filled(each.holding / longest)
-        )
-        for each in order
-        if each.holding >= LEAST and (name := holding_name(each.joint))
-    ]
+    still = [_held_row(each, longest) for each in order if each.holding >= LEAST]
     return Answer(
         headline,
         "",
