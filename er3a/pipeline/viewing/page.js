@@ -754,11 +754,13 @@ const rows = [...document.querySelectorAll(".runs:not(.plain) a")];
 const fix = rows.some((row) => row.dataset.fix) && document.querySelector(".hero .fix"); // it follows the row
 const mark = (shown) => {
   rows.forEach((row) => (row === shown ? row.setAttribute("aria-current", "true") : row.removeAttribute("aria-current")));
-  if (!fix || fix.toggleAttribute("hidden", !shown?.dataset.fix)) return;
-  fix.querySelector("b").textContent = shown.dataset.lead;
-  fix.querySelector("span").lastChild.data = ` ${shown.dataset.fix}`;
-  const lead = Object.assign(fix.querySelector("a"), { href: shown.dataset.instead });
-  lead.hidden = lead.hash === shown.hash && !shown.dataset.instead.includes("?"); // nothing else is there to be shown
+  if (!fix || fix.toggleAttribute("hidden", !shown)) return;
+  const { lead, fix: advice, instead } = shown.dataset; // without advice it says what the row does: the list stays in its place
+  fix.querySelector("b").textContent = lead ?? shown.querySelector("b").textContent;
+  fix.querySelector("span").lastChild.data = ` ${advice ?? shown.querySelector("small").textContent}`;
+  const link = fix.querySelector("a");
+  if (instead) link.href = instead;
+  link.hidden = !instead || (link.hash === shown.hash && !instead.includes("?")); // nothing else is there to be shown
 };
 const pick = (row, name = decodeURIComponent(row.hash.slice(1))) => {
   mark(row);
