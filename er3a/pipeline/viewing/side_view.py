@@ -136,7 +136,7 @@ def side_view(
     labels : moved up or down where they would be on each other
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
     over : lines over the arms: kind, and points (k, 2), mm; an arrow that a joint turns by (``turn J1``) has its name
-        above it
+        at its upper left
 
     Returns
     -------
@@ -156,11 +156,8 @@ def side_view(
     wide, tall = high - low
     parts = [_reach(arm) for arm in arms]
     if floor_mm is not None:
-        parts.append(
-            Markup('<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>').format(
-                low[0] - wide, -floor_mm, 3 * wide, max(0.0, floor_mm - low[1] + tall)
-            )
-        )
+        floor = '<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>'
+        parts.append(Markup(floor).format(low[0] - wide, -floor_mm, 3 * wide, 3 * tall))
         below = np.array([low[0], floor_mm - GAP * tall])
         labels = [*labels, Label(tr("floor"), below, "floor", written_there=True)]
     placed = _placed(labels, low, high, column_mm)
@@ -183,10 +180,7 @@ def side_view(
 
 
 def _over(kind: str, points: Reals, letters: float) -> Markup:
-    low, size = points.min(axis=0), np.ptp(points, axis=0)
-    x, z = low + size * [0.5, 1.0] + [0.0, letters / 3]
-    if size.min() > size.max() / 2:  # around an axis across the drawing: beside it, where no other joint is near
-        x, z = low + size * [0.0, 0.5] + letters * np.array([-0.7, -0.3])
+    x, z = points[:, 0].min() - letters / 2, points[:, 1].max()  # beside the joint, and that of a neighbour
     name = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(x, -z, letters, kind[5:])
     line = Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points))
     return line + name if kind.startswith("turn ") else line
