@@ -180,7 +180,7 @@ def side_view(
 
 
 def _over(kind: str, points: Reals, letters: float) -> Markup:
-    x, z = points[:, 0].min() - letters / 2, points[:, 1].max()  # beside the joint, and that of a neighbour
+    x, z = points[:, 0].min() - letters / 2, points[:, 1].max() + letters / 3  # clear of joints, its own and the next
     name = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(x, -z, letters, kind[5:])
     line = Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points))
     return line + name if kind.startswith("turn ") else line

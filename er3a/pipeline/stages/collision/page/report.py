@@ -123,7 +123,7 @@ def _advice(folder: Path | None) -> dict[str, Fix | None]:
 
     Parameters
     ----------
-    folder : of the stage's results, beside that of the paths'
+    folder : of the stage's results, in that of the robot's
     """
     paths = folder.parent / "trajectory" if folder else None
     if paths is None or not is_computed(paths):
