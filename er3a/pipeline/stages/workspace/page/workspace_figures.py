@@ -36,7 +36,7 @@ PROOF = {
     N_("reachable"): "#9ecae1",
     N_("reachable except a wedge"): "#d6e6f2",
     N_("undecided"): HIGHLIGHT,
-    N_("unreachable"): "#ffffff",
+    N_("unreachable"): "none",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
