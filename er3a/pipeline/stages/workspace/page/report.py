@@ -83,7 +83,7 @@ def _answer(
         ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
-            tr("volume, ± {half} m³ (proven for this table)", half=fixed((volume.upper - volume.lower) / 2, 2)),
+            tr("± {half} m³, proven for this table", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
         payload,
     ]
@@ -117,7 +117,7 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     for number_, tried in enumerate(placing.tried, start=1):
         blocked = sum(map(len, placing.hindered(tried).values()))
         centre = millimetres(tried.tray.place.centre_m)
-        note = tr("{centre} mm; blocks {count} of {all} motions", centre=centre, count=blocked, all=placing.passing)
+        note = tr("{centre} mm; blocks {count}/{all} motions", centre=centre, count=blocked, all=placing.passing)
         rows.append(ListRow("caution" if blocked else "pass", tried.tray.name, note, f"#tray-{number_}"))
     return rows
 
