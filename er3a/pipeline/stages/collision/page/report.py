@@ -16,7 +16,6 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import fix_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
 from er3a.pipeline.results import Stored, is_computed, read_stage
@@ -80,12 +79,12 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
-    advice: Mapping[str, Fix | None],
+    advice: Mapping[str, Fix],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``advice``: how to mend a path, by its name.
+    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
     """
     found = {figure.name: figure.value for figure in summary.figures}
     free, params = found.get("free_of_collisions"), summary.verdict.finding.params
@@ -118,8 +117,9 @@ def _answer(
     )
 
 
-def _advice(folder: Path | None) -> dict[str, Fix | None]:
-    """How to mend each path that may not be run, by its name, as the page of paths says it.
+def _advice(folder: Path | None) -> dict[str, Fix]:
+    """What may be run instead of each path that may not, by its name: the part or the repair that the page of paths
+    shows.
 
     Parameters
     ----------
@@ -128,14 +128,15 @@ def _advice(folder: Path | None) -> dict[str, Fix | None]:
     paths = folder.parent / "trajectory" if folder else None
     if paths is None or not is_computed(paths):
         return {}
-    return {fault.name: fix_of([fault]) for fault in faults(read_stage(paths, STAGES["trajectory"]).results)}
+    found = faults(read_stage(paths, STAGES["trajectory"]).results)
+    return {fault.name: Fix(*fault.instead) for fault in found if fault.instead}
 
 
 def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
-    advice: Mapping[str, Fix | None],
+    advice: Mapping[str, Fix],
     most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
