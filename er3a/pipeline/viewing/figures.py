@@ -171,6 +171,7 @@ CHINESE_FONTS = (
 STYLE: dict[RcKeyType, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": MUTED,
+    "axes.facecolor": "none",
     "axes.grid": True,
     "axes.labelcolor": INK,
     "axes.prop_cycle": cycler(color=SIX_JOINTS),
@@ -180,7 +181,7 @@ STYLE: dict[RcKeyType, Any] = {
     "axes.titlesize": 11,
     "axes.titleweight": "bold",
     "figure.constrained_layout.use": True,
-    "figure.facecolor": "white",
+    "figure.facecolor": "none",
     "font.family": "sans-serif",
     "font.sans-serif": FONTS,
     "font.size": 10,

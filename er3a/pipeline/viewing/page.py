@@ -78,8 +78,8 @@ SHORT_NAMES = {
 FOUNDATION_WORDS = {  # of validation's foundation, for the mark in a page's header
     "pass": N_("D-H table confirmed"),
     "fail": N_("D-H table contradicted"),
-    "caution": N_("D-H table partly open"),
-    "unsettled": N_("D-H table open"),
+    "caution": N_("D-H table partly settled"),
+    "unsettled": N_("D-H table not settled"),
     "no_reference": N_("D-H table unchecked"),
     "not_computed": N_("D-H table unchecked"),
 }

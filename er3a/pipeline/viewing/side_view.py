@@ -18,7 +18,7 @@ from er3a.pipeline.messages.say import joined
 from er3a.robots.robot import Robot
 
 Kind = Literal["right", "wrong"]
-LabelKind = Literal["wrong", "open", "hole", "tray", "right", "sound"]
+LabelKind = Literal["wrong", "open", "hole", "right", "sound", "floor"]
 MARGIN = 0.06  # of the larger side
 UPRIGHT = 0.83  # width of a drawing, of its height
 LABEL, SCALE = 0.3, 0.05  # of the height: room for labels at the right, for the scale below
@@ -106,10 +106,15 @@ def dimension(far: float, low: float, high: float, kind: LabelKind) -> list[tupl
 
 
 def beyond(arms: Sequence[SeenArm]) -> float:
-    """How far forward (mm) there is room for words: beyond the arms and what they reach, so that no outline crosses
-    a word."""
-    corners = np.concatenate([outline for arm in arms for outline in (arm.points_mm, *arm.reach_mm)])
+    """How far forward (mm) there is room for words: beyond the arms and what the first reaches, so that no outline of
+    these crosses a word."""
+    corners = _corners(arms)
     return float(corners[:, 0].max() + COLUMN * np.ptp(corners, axis=0).max())
+
+
+def _corners(arms: Sequence[SeenArm]) -> Reals:
+    """All arms' points and what the first reaches (k, 2), mm: what further ones reach may go beyond the drawing."""
+    return np.concatenate([*(arm.points_mm for arm in arms), *arms[0].reach_mm])
 
 
 def side_view(
@@ -118,7 +123,6 @@ def side_view(
     *,
     ratio: float,
     labels: Sequence[Label] = (),
-    outlines: Sequence[tuple[str, Reals]] = (),
     column_mm: float | None = None,
     over: Sequence[tuple[str, Reals]] = (),
 ) -> Markup:
@@ -130,22 +134,15 @@ def side_view(
     floor_mm : height of the floor; None where there is none
     ratio : width of the drawing, of its height
     labels : moved up or down where they would be on each other
-    outlines : of what is drawn behind the arms: kind, and corners (k, 2), mm
     column_mm : how far forward all labels begin, each with a line to its place; None for labels at their places
     over : lines over the arms: kind, and points (k, 2), mm; an arrow that a joint turns by (``turn J1``) has its name
-        above it
+        at its upper left
 
     Returns
     -------
     drawing : colours come from the page's style sheet
     """
-    corners = np.concatenate(
-        [
-            *(arm.points_mm for arm in arms),
-            *(line for _, line in over),
-            *(ring for arm in arms for ring in arm.reach_mm),
-        ]
-    )
+    corners = np.concatenate([_corners(arms), *(line for _, line in over)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = MARGIN * float(max(high - low))
     low, high = low - margin, high + margin
@@ -159,13 +156,10 @@ def side_view(
     wide, tall = high - low
     parts = [_reach(arm) for arm in arms]
     if floor_mm is not None:
-        parts.append(
-            Markup('<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>').format(
-                low[0] - wide, -floor_mm, 3 * wide, max(0.0, floor_mm - low[1] + tall)
-            )
-        )
-    outline = Markup('<polygon class="{}" points="{}"/>')
-    parts += [outline.format(kind, _line(corners)) for kind, corners in outlines]
+        floor = '<rect class="floor" x="{:.0f}" y="{:.0f}" width="{:.0f}" height="{:.0f}"/>'
+        parts.append(Markup(floor).format(low[0] - wide, -floor_mm, 3 * wide, 3 * tall))
+        below = np.array([low[0], floor_mm - GAP * tall])
+        labels = [*labels, Label(tr("floor"), below, "floor", written_there=True)]
     placed = _placed(labels, low, high, column_mm)
     parts += [_lead(label, place) for label, place in placed]
     thick = min(BONE * tall, THICKEST * float(np.ptp(arms[0].points_mm, axis=0).max()))
@@ -186,7 +180,7 @@ def side_view(
 
 
 def _over(kind: str, points: Reals, letters: float) -> Markup:
-    x, z = points.mean(axis=0)[0], points[:, 1].max() + letters / 3
+    x, z = points[:, 0].min() - letters / 2, points[:, 1].max() + letters / 3  # clear of joints, its own and the next
     name = Markup('<text x="{:.0f}" y="{:.0f}" font-size="{:.0f}">{}</text>').format(x, -z, letters, kind[5:])
     line = Markup('<polyline class="{}" points="{}"/>').format(kind, _line(points))
     return line + name if kind.startswith("turn ") else line

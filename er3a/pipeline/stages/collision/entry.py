@@ -44,5 +44,6 @@ STAGE = Stage(
     settings={"collision": CollisionSettings, "trajectory": TrajectorySettings},
     inputs=_inputs,
     rests_on=("validation",),
+    shows=("trajectory",),
     obstacles=True,
 )

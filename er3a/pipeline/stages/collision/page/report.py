@@ -16,12 +16,13 @@ from er3a.pipeline.messages.collision import HOMES, state_word, why
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.messages.scope import body_word
-from er3a.pipeline.player.motions import address_of, bar_of
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.player.turning import Layer, surroundings, turning_figure
-from er3a.pipeline.results import Stored
+from er3a.pipeline.results import Stored, is_computed, read_stage
 from er3a.pipeline.stages.collision import model
 from er3a.pipeline.stages.collision.page.played import motions, poses
+from er3a.pipeline.stages.registry import STAGES
+from er3a.pipeline.stages.trajectory.page.played import faults
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.page import render_stage
@@ -56,20 +57,18 @@ def report(study: Study, stored: Stored[model.CollisionResults], output: Path) -
     scene = study.scene(name, stored.stage)
     closest = sorted(summary.closest, key=lambda found: found.clearance_mm)
     worst = next(((found.name, found.t_s) for found in closest if found.t_s is not None), None)
-    played, ends = motions(robot, results), dict(zip(results.paths.path.tolist(), results.paths.t_s.tolist()))
-    bars = {motion.name: bar_of(motion, ends[motion.name]) for motion in played}
     # A path of which a part can't be reached is clear of nothing.
     unreached = set(results.paths.path[np.isnan(results.paths.q_deg).any(axis=1)].tolist())
     render_stage(
         study,
         stored,
         output,
-        _answer(summary, closest, unreached, bars, "trajectory" in study.pages(name)),
+        _answer(summary, closest, unreached, _advice(stored.folder)),
         matrix=_matrix(robot, results.matrix),
         never_met=int((results.matrix.state == "never").sum()),
         tried=TRIED,
         places=_places(robot, results, scene),
-        player=player(robot, [*played, *poses(robot, results)], scene, opened=worst),
+        player=player(robot, [*motions(robot, results), *poses(robot, results)], scene, opened=worst),
         drawing_head=drawing_head(),
         home=_angles(robot, np.array(summary.home_deg or ())),
         home_from=word("collision.home", HOMES, summary.home_from),
@@ -80,19 +79,18 @@ def _answer(
     summary: model.CollisionSummary,
     closest: Sequence[model.Closest],
     unreached: set[str],
-    bars: Mapping[str, Sequence[Part]],
-    advised: bool,
+    advice: Mapping[str, Fix],
 ) -> Answer:
     """How many paths and chosen solutions are clear of everything, and how near each comes.
 
     What collides as its file expects is named, and so is a path of which only a part was measured: that is clear of
-    nothing. ``unreached``: these; ``bars``: of paths, by their names; ``advised``: whether the robot has a
-    page that says how to mend a path.
+    nothing. ``unreached``: these; ``advice``: what may be run instead of a path, by its name.
     """
     found = {figure.name: figure.value for figure in summary.figures}
     free, params = found.get("free_of_collisions"), summary.verdict.finding.params
     near = summary.verdict.shapes.near if summary.verdict.shapes else ()
-    rows = [_row(each, unreached, near, bars, advised, closest[-1].clearance_mm) for each in closest]
+    most = max((abs(each.clearance_mm) for each in closest), default=1.0)
+    rows = [_row(each, unreached, near, advice, most) for each in closest]
     hit, clear, partly = (
         [row for row in rows if row.mark in marks] for marks in (("fail",), ("pass", "caution"), ("none",))
     )
@@ -119,30 +117,42 @@ def _answer(
     )
 
 
+def _advice(folder: Path | None) -> dict[str, Fix]:
+    """What may be run instead of each path that may not, by its name: the part or the repair that the page of paths
+    shows.
+
+    Parameters
+    ----------
+    folder : of the stage's results, in that of the robot's
+    """
+    paths = folder.parent / "trajectory" if folder else None
+    if paths is None or not is_computed(paths):
+        return {}
+    found = faults(read_stage(paths, STAGES["trajectory"]).results)
+    return {fault.name: Fix(*fault.instead) for fault in found if fault.instead}
+
+
 def _row(
     found: model.Closest,
     unreached: set[str],
     near: Sequence[str],
-    bars: Mapping[str, Sequence[Part]],
-    advised: bool,
+    advice: Mapping[str, Fix],
     most_mm: float,
 ) -> ListRow:
     """A path or a chosen solution: how near it comes, and to what; ``near``: to assumed shapes; ``unreached``: paths of
     which only a part was measured.
 
-    What is clear has its clearance as a bar, in parts of ``most_mm``; a path that is not has the bar of its time."""
+    The bar is the clearance, or in red the overlap, in parts of ``most_mm``."""
     note = tr("{far} mm: {pair}", far=fixed(found.clearance_mm, 1), pair=say(found.between))
     of_path = found.kind == "path"
     mark: Mark = "fail" if found.clearance_mm < 0 else "caution" if found.name in near else "pass"
     if of_path and found.name in unreached and mark != "fail":
         mark = "none"
-    length, bar, fix = float(of_path), bars.get(found.name, ()), None
-    if mark in ("pass", "caution"):
-        length, bar = found.clearance_mm / most_mm, ()
-    if mark == "fail" and of_path and advised:
-        asked = address_of("trajectory", found.name, found.t_s or 0.0, found.name)
-        fix = Fix(tr("{name}: see what the page Paths advises.", name=found.name), asked, instead=False)
-    return ListRow(mark, found.name, note, "", (found.name, found.t_s or 0.0), length, bar, fix)
+    bar = [Part(0.0, 1.0, mark)] if mark in ("fail", "none") else []
+    fix = advice.get(found.name) if mark == "fail" and of_path else None
+    return ListRow(
+        mark, found.name, note, "", (found.name, found.t_s or 0.0), abs(found.clearance_mm) / most_mm, bar, fix
+    )
 
 
 def _matrix(robot: Robot, rows: model.MatrixRows) -> list[list[str]]:

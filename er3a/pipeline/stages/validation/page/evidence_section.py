@@ -16,7 +16,6 @@ from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
 from er3a.references.quantities import MM
-from er3a.references.reference import NO_DOCUMENT
 from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
@@ -58,7 +57,7 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
@@ -71,12 +70,12 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
     everything = [*evidence.entries, *evidence.combinations]
     numbers = [each for each in everything if each.value is not None]
     left = [each for each in numbers if each.status not in SETTLED]
-    left.sort(key=lambda each: (not each.off.moves, each.status == "consistent", -each.off.mm, -each.off.deg))
+    left.sort(key=lambda each: (not each.off.moves, _unbounded(each), -each.off.mm, -each.off.deg))
     proposals = {proposal.entry: say(proposal) for proposal in evidence.proposals}
     present = {each.status for each in numbers}
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -85,7 +84,15 @@ def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, 
         open_columns=OPEN_COLUMNS,
         open_rows=[[*_row(each), _tool_off(each), _fits(each), proposals.get(each.entry, "–")] for each in left],
         settled_rows=[_row(each) for each in numbers if each.status in SETTLED],
-        first=[ListRow("caution", each.entry, _tool_off(each), f"#entry-{each.entry}") for each in left[:FIRST]],
+        first=[
+            ListRow(
+                "fail" if each.status == "contradicted" else "caution",
+                each.entry,
+                _tool_off(each),
+                f"#entry-{each.entry}",
+            )
+            for each in left[:FIRST]
+        ],
         left=len(evidence.unconfirmed) + evidence.contradicted,
     )
 
@@ -152,15 +159,15 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(robot: Robot, each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
-    """An entry in the table; where evidence contradicts one that its own source doesn't state there is no value."""
+def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+    """An entry in the table, with its value also where its own source states none and evidence contradicts it."""
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     gives = _gives(each, evidence) or _alone(each)
-    unstated = each.status == "contradicted" and robot.origins.get(each.entry) == NO_DOCUMENT
-    value = "–" if unstated else _value(each)
-    return dict(entry=each.entry, value=value, status=each.status, mark=MARKS[each.status], title=title, gives=gives)
+    return dict(
+        entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title, gives=gives
+    )
 
 
 def _marked(status: Status) -> str:
@@ -190,8 +197,13 @@ def _row(each: EntryEvidence) -> list[str]:
     ]
 
 
+def _unbounded(each: EntryEvidence) -> bool:
+    """Whether an entry could be anything but for its one document; a direction is 1 or -1 all the same."""
+    return each.status == "consistent" and column_of(each.entry) != "direction"
+
+
 def _tool_off(each: EntryEvidence) -> str:
-    if each.status == "consistent":
+    if _unbounded(each):
         return tr("no bound")
     if not each.off.moves:
         return "–"

@@ -47,10 +47,10 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
         study,
         stored,
         output,
-        _answer(summary, placing, payload_key(known, robot)),
+        _answer(summary, placing, payload_key(known, robot), stored.rests_on.get("validation") == "unsettled"),
         at_side=placing,  # the plan of the tray
         plan=from_above(robot, results, scene, [each.tray for each in placing.tried], LETTERS) if placing else "",
-        labelled=_labelled(robot, results, scene, placing, "wrong" if contradicted else "right"),
+        labelled=_labelled(robot, results, scene, "wrong" if contradicted else "right"),
         turning=workspace_figures.in_space(robot, results, scene, placing.tray if placing else None),
         drawing_head=drawing_head(),
         void_rows=[_void_row(n, void) for n, void in enumerate(summary.voids, start=1)],
@@ -58,20 +58,20 @@ def report(study: Study, stored: Stored[model.WorkspaceResults], output: Path) -
     )
 
 
-def _labelled(
-    robot: Robot, results: model.WorkspaceResults, scene: Scene | None, placing: Placing | None, kind: Kind
-) -> Markup | None:
+def _labelled(robot: Robot, results: model.WorkspaceResults, scene: Scene | None, kind: Kind) -> Markup | None:
     """The arm in what it reaches, with names; None of an arm that slides along its first axis."""
     if results.summary.proof.bars or results.summary.is_flat:
         return None
     floor = floor_of(scene)
     floor_mm = None if floor is None else 1000 * (floor - float(robot.base[2, 3]))
-    trays = [each.tray for each in placing.tried] if placing else []
-    return workspace_figures.labelled(robot, results, floor_mm, trays, kind)
+    return workspace_figures.labelled(robot, results, floor_mm, kind)
 
 
-def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str]) -> Answer:
-    """How far the arm reaches, its voids, where the tray goes, and the ``payload``."""
+def _answer(
+    summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str], unsettled: bool
+) -> Answer:
+    """How far the arm reaches, its voids, where the tray goes, and the ``payload``; ``unsettled``: whether documents
+    settle nothing of the table that all this holds for."""
     reach, volume = summary.reach_m, summary.volume_m3
     enclosed = summary.enclosed_voids
     litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
@@ -83,7 +83,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: t
         ),
         (
             with_unit(fixed((volume.lower + volume.upper) / 2, 2), "m³"),
-            tr("volume, ± {half} m³ (proven)", half=fixed((volume.upper - volume.lower) / 2, 2)),
+            tr("± {half} m³, proven for this table", half=fixed((volume.upper - volume.lower) / 2, 2)),
         ),
         payload,
     ]
@@ -93,7 +93,10 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: t
         Group(tr("Voids"), [_void_as_row(*each) for each in voids]),
         Group(tr("Where the tray goes"), _tray_as_rows(placing)),
     )
-    return Answer(whole_sentence(reaches(summary)), rest, tr("Distances are from axis 1."), keys, groups)
+    reach_text = reaches(summary)
+    if unsettled:
+        reach_text = tr("{reach} with this table", reach=reach_text)
+    return Answer(whole_sentence(reach_text), rest, tr("Distances are from axis 1."), keys, groups)
 
 
 def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
@@ -102,7 +105,8 @@ def _void_as_row(number_: int, void: model.VoidSummary) -> ListRow:
     of_one = {joint for limit in void.cause.params.get("limits", ()) for joint in limit.joints} == {1}
     where = tr("at the shoulder: normal") if void.holds_shoulder else tr("in the dead zone") if of_one else ""
     note = joined([with_unit(size, "L"), where], ", ")
-    return ListRow("none", tr(workspace_figures.VOID_NAMES[void.kind], number=number_), note, f"#hole-{number_}")
+    address = f"#hole-{number_}" if void.kind == "enclosed" else f"#void-{number_}"
+    return ListRow("none", tr(workspace_figures.VOID_NAMES[void.kind], number=number_), note, address)
 
 
 def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
@@ -112,7 +116,8 @@ def _tray_as_rows(placing: Placing | None) -> list[ListRow]:
     rows = []
     for number_, tried in enumerate(placing.tried, start=1):
         blocked = sum(map(len, placing.hindered(tried).values()))
-        note = tr("{centre} mm; blocks {count} motions", centre=millimetres(tried.tray.place.centre_m), count=blocked)
+        centre = millimetres(tried.tray.place.centre_m)
+        note = tr("{centre} mm; blocks {count}/{all} motions", centre=centre, count=blocked, all=placing.passing)
         rows.append(ListRow("caution" if blocked else "pass", tried.tray.name, note, f"#tray-{number_}"))
     return rows
 

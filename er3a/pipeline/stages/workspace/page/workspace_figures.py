@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from scipy.spatial import ConvexHull
 
 from er3a.collision.scene import Scene
 from er3a.geometry.vectors import TURN
@@ -38,12 +36,11 @@ PROOF = {
     N_("reachable"): "#9ecae1",
     N_("reachable except a wedge"): "#d6e6f2",
     N_("undecided"): HIGHLIGHT,
-    N_("unreachable"): "#ffffff",
+    N_("unreachable"): "none",
 }
 FILLED, WEDGE, UNDECIDED, EMPTY = range(4)
 ASIDE = (0.12, 0.2)  # of the reach, from a void before axis 1 to its name
 BELOW = 0.08  # of the reach, from what is reached down to its dimension
-STAND_M = 0.005  # half the width of a drawn stand
 PANEL_IN, AROUND_PANEL_IN = 5.6, 1.6  # the panel's width; what stands above and below, in
 
 
@@ -202,15 +199,13 @@ def _smoothed(points: Reals, faces: Integers) -> Reals:
     return points
 
 
-def labelled(
-    robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, trays: Sequence[Tray], kind: Kind
-) -> Markup:
-    """The arm in what it reaches, seen across axis 1, with names: reach, voids, floor, trays.
+def labelled(robot: Robot, results: model.WorkspaceResults, floor_mm: float | None, kind: Kind) -> Markup:
+    """The arm in what it reaches, seen across axis 1, with names: reach, floor, and the voids all around
+    axis 1. An open one and a tray are elsewhere: the view from above shows them.
 
     Parameters
     ----------
     floor_mm : height of the floor in the base's frame; None where there is none
-    trays : where they are placed; the first, which is proposed, is drawn, turned into view
     kind : of the arm: in red where its table is wrong
 
     Returns
@@ -226,25 +221,14 @@ def labelled(
     labels = []
     for number_, void in enumerate(summary.voids, 1):
         label = void_label(number_, void)
-        labels.append(replace(label, at=label.at + high * ASIDE if label.at[0] > 0 else low, start=label.at))
-    outlines = [("pocket", _pocket(results, k)) for k, void in enumerate(summary.voids, 1) if void.kind == "open"]
-    for tray in trays[:1]:
-        corners = _tray_corners(tray)
-        outlines.append(("tray", corners))
-        labels.append(Label(tray.name, corners[1], "tray"))
+        if void.kind == "enclosed":
+            labels.append(replace(label, at=label.at + high * ASIDE, start=label.at))
     seen = SeenArm(own_title(robot.title), "", kind, arm, lines)
     far, height = outer[outer[:, 0].argmax()]
     below = low[1] - BELOW * far
     labels.append(Label(reaches(summary), np.array([0.0, below - BELOW * far / 2]), kind))
     over = dimension(far, below, height, kind)
-    return side_view([seen], floor_mm, ratio=1.2, labels=labels, outlines=outlines, over=over)
-
-
-def _pocket(results: model.WorkspaceResults, number_: int) -> Reals:
-    """The outline (k, 2), mm, of an open pocket, seen along y."""
-    own = results.void_vertices.void == number_
-    seen = 1000 * (results.void_vertices.point_m[own] - results.summary.axis.point_m)[:, ::2]
-    return seen[ConvexHull(seen).vertices] if len(seen) > 2 else seen
+    return side_view([seen], floor_mm, ratio=1.2, labels=labels, over=over)
 
 
 def void_label(number_: int, void: model.VoidSummary) -> Label:
@@ -254,15 +238,3 @@ def void_label(number_: int, void: model.VoidSummary) -> Label:
     low, high = void.low_m[0], void.high_m[0]
     across = high / 2 if low < 0 < high else (low + high) / 2  # of one about axis 1 the side before it
     return Label(name, 1000 * np.array([across, void.centroid_m[2]]), "hole", f"hole-{number_}")
-
-
-def _tray_corners(tray: Tray) -> Reals:
-    """The outline (k, 2), mm, of a tray and its stand, turned about axis 1 into view."""
-    x, y, height = tray.place.centre_m
-    wide_x, wide_y, tall = tray.place.size_m
-    away = float(np.hypot(x, y))
-    half = (abs(x) * wide_x + abs(y) * wide_y) / max(2 * away, 1e-3)  # along the line from the axis to it
-    low, high = height - tall / 2, height + tall / 2
-    foot = low if tray.floor is None else tray.floor
-    stand = [(away + STAND_M, low), (away + STAND_M, foot), (away - STAND_M, foot), (away - STAND_M, low)]
-    return 1000 * np.array([(away - half, high), (away + half, high), (away + half, low), *stand, (away - half, low)])
