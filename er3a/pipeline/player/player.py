@@ -31,10 +31,10 @@ TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
-MARGIN = 1.08  # of the picture, of what is to be seen in it
+MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
-TURN_COSTS = 0.1  # by which a rad is worse than none, in parts of the arm
+HIDDEN_COSTS, TURN_COSTS = 3.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
 FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -175,8 +175,8 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) 
     length = data["size"]
     for _ in range(4):  # what is nearer is larger
         nearer = DISTANCE * length / (DISTANCE * length + across[:, 2])
-        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0)
-        length = MARGIN * 2 * FIELD / DISTANCE * max(width / WIDE, height)
+        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0) + MARGIN * data["size"]
+        length = 2 * FIELD / DISTANCE * max(width / WIDE, height)
     return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
@@ -189,18 +189,20 @@ def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
     """
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
     bodies = [_corners(shape) for shape in data["scene"] if "pale" not in shape]
+    points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
+    margin = MARGIN * data["size"] / 2
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
     best = []
     for turn in TURNS:
         axes = axes_of(AZIMUTH + turn, ELEVATION).T
-        seen = joints @ axes
-        long = np.linalg.norm(np.diff(seen[..., :2], axis=1), axis=2).sum() / whole
+        seen = points @ axes
+        long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
         hidden = np.zeros(seen.shape[:2], dtype=bool)
         for corners in bodies:
             own = corners @ axes
-            within = (own.min(axis=0) < seen) & (seen < own.max(axis=0))
+            within = (own.min(axis=0) - margin < seen) & (seen < own.max(axis=0) + margin)
             hidden |= within[..., :2].all(axis=2) & (seen[..., 2] > own[:, 2].mean())
-        best.append(long - hidden.mean() - TURN_COSTS * abs(turn))
+        best.append(long - HIDDEN_COSTS * hidden.mean() - TURN_COSTS * abs(turn))
     return float(TURNS[np.argmax(best)])
 
 
