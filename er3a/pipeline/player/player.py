@@ -34,7 +34,7 @@ FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be
 MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
 TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
-HIDDEN_COSTS, TURN_COSTS = 3.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
+HIDDEN_COSTS, TURN_COSTS = 2.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
 FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
@@ -188,7 +188,7 @@ def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
     q : (n,) each, rad or m, of the poses that are drawn
     """
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
-    bodies = [_corners(shape) for shape in data["scene"] if "pale" not in shape]
+    bodies = [_corners(shape) for shape in data["scene"] if "pale" not in shape and not shape.get("large")]
     points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
     margin = MARGIN * data["size"] / 2
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()

@@ -585,20 +585,6 @@ def _preview(picture: Path) -> str | None:
     return "data:image/webp;base64," + base64.b64encode(content).decode("ascii") if content else None
 
 
-def status_word(status: str) -> str:
-    """A verdict's status as a page shows it.
-
-    Parameters
-    ----------
-    status : a key of ``VERDICT_WORDS``
-
-    Returns
-    -------
-    word : in the page's language
-    """
-    return tr(VERDICT_WORDS[status])
-
-
 def _versions() -> dict[str, str]:
     found = {"python": platform.python_version(), "er3a": __version__}
     for name in SHOWN_VERSIONS:
