@@ -6,14 +6,12 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
@@ -65,7 +63,7 @@ def player(
 
     Parameters
     ----------
-    opened : the motion and the time (s) that it opens at; None for the worst contact, or else the first start
+    opened : the motion and the time (s) that it opens at; None for the first motion's start
     beside : further arms, which move at the same time; their bases say where they stand
     added : shapes of ``viewing/drawn.py`` around the arm, or in its tool's frame, that nothing collides with
     signs : what is written below the base of each arm, the first included; nothing if empty
@@ -77,14 +75,13 @@ def player(
     for shape in added:
         data["carried" if shape["frame"] else "scene"].append(shape)
     named = {motion.name: motion for motion in shown}
-    data["opened"] = opened if opened and opened[0] in named else _worst(robot, shown)
+    data["opened"] = opened if opened and opened[0] in named else (shown[0].name, float(shown[0].t[0]))
     first = named[data["opened"][0]]
     robots = (robot, *beside)
     data["turned"] = TURNED if beside else _turned(robot, [_at(first, first.q, data["opened"][1]), *first.ghosts], data)
+    data |= _frame(data, robots, first)
     for own, motion in zip(data["motions"], shown):
         own |= _frame(data, robots, motion)
-        if motion is first:
-            data |= {key: own[key] for key in ("length", "target")}
     return Markup(
         page_environment(_HERE)
         .get_template("player.html.j2")
@@ -209,20 +206,6 @@ def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
 def _at(motion: PlayedMotion, q: Reals, t: float) -> Reals:
     """Joint values (n,) of a motion at a time, s."""
     return np.array([np.interp(t, motion.t, own) for own in q.T])
-
-
-def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
-    """The first contact that a motion fails by, rather with what is around the arm than with itself; or else the first
-    motion's start."""
-    arm = {link_label(link) for link in range(robot.rows + 1)}
-    contacts = [
-        (set(event.bodies) <= arm, motion.name, event.t)
-        for motion in motions
-        for event in motion.events
-        if event.status == "fail" and event.bodies
-    ]
-    _, name, t = min(contacts, key=itemgetter(0), default=(True, motions[0].name, float(motions[0].t[0])))
-    return name, t
 
 
 def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:

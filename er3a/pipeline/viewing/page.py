@@ -444,8 +444,8 @@ def render_stage(
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
-        rows = [row for group in answer.groups for row in group.rows if row.play]
-        rows = [replace(row, mark="no_verdict", note="", parts=(), fix=None) for row in rows]
+        grey = partial(replace, mark="no_verdict", note="", parts=(), fix=None)
+        rows = [grey(row) for group in answer.groups for row in group.rows if row.play]
         groups = [Group(tr("Not judged"), rows)]
         answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups)
     box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""

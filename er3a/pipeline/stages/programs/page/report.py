@@ -78,10 +78,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
         ListRow(
             "pass",
             each.name,
-            _cost(
-                float(shown[each.name].t[-1]),
-                each.least_clearance_mm if each.least_clearance_mm is not None else np.inf,
-            ),
+            _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
             (each.name, 0.0),
             bars.get(each.name, 0.0),
@@ -101,10 +98,10 @@ def _note(fault: Fault) -> str:
     return tr("{where}: {text}", where=line, text=what) if line else what
 
 
-def _cost(time_s: float, clear_mm: float) -> str:
-    """How long something takes, and how near it comes to anything; infinite where that is not known."""
+def _cost(time_s: float, clear_mm: float | None) -> str:
+    """How long something takes, and how near it comes to anything; infinite or None where that is not known."""
     parts = [tr("{time} s", time=fixed(time_s, 2))] if np.isfinite(time_s) else []
-    if 0 <= clear_mm < np.inf:  # else a finding says how deep
+    if clear_mm is not None and 0 <= clear_mm < np.inf:  # else a finding says how deep
         parts.append(tr("{far} mm clear", far=fixed(clear_mm, 0)))
     return " · ".join(parts)
 
