@@ -178,14 +178,14 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) 
 
 
 def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
-    """By how much (rad) the eye is turned to see the arm from its side, with no body before its joints.
+    """By how much (rad) the eye is turned to see the arm from its side, walls along them, and no body before it.
 
     Parameters
     ----------
     q : (n,) each, rad or m, of the poses that are drawn
     """
     joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
-    bodies = [_corners(shape) for shape in data["scene"] if "pale" not in shape and not shape.get("large")]
+    bodies = [(_corners(shape), shape.get("large")) for shape in data["scene"] if "pale" not in shape]
     points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
     margin = MARGIN * data["size"] / 2
     whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
@@ -195,10 +195,13 @@ def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
         seen = points @ axes
         long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
         hidden = np.zeros(seen.shape[:2], dtype=bool)
-        for corners in bodies:
+        for corners, large in bodies:
             own = corners @ axes
             within = (own.min(axis=0) - margin < seen) & (seen < own.max(axis=0) + margin)
-            hidden |= within[..., :2].all(axis=2) & (seen[..., 2] > own[:, 2].mean())
+            if large:  # what a wall meets is seen along it
+                long -= np.ptp(own[:, 0]) / np.ptp(corners)
+            else:  # what an arm reaches into does not hide it
+                hidden |= within[..., :2].all(axis=2) & (seen[..., 2] > own[:, 2].max())
         best.append(long - HIDDEN_COSTS * hidden.mean() - TURN_COSTS * abs(turn))
     return float(TURNS[np.argmax(best)])
 
