@@ -148,7 +148,7 @@ function draw() {
   }
   if (arms.length === 1) nameEnds(motion.trails[0]);
   for (const { text, at } of data.signs) space.word(text, at);
-  space.names(surroundings, touching, hiding);
+  space.names(surroundings, touching);
   space.end();
 }
 

@@ -234,8 +234,8 @@ export class Space extends Orbit {
     this.#svg("text", { x: u, y: share === null ? v : v - 0.4 * size, fill: css, stroke: this.page.halo, "font-size": size }, text);
   }
 
-  /** The names of what is around the arm: those of `needed` in a colour of their own, those of `faint` bodies, then others as far as there is room. */
-  names(meshes, needed = new Set(), faint = new Set()) {
+  /** The names of what is around the arm: those of `needed` in a colour of their own, then others as far as there is room. */
+  names(meshes, needed = new Set()) {
     const named = meshes.filter(({ shape }) => !shape.pale || needed.has(shape.name)).sort((a, b) => needed.has(b.shape.name) - needed.has(a.shape.name));
     const places = named.map(({ geometry, matrixWorld }) => {
       if (!geometry.boundingSphere) geometry.computeBoundingSphere();
@@ -243,7 +243,7 @@ export class Space extends Orbit {
       if (radius < SMALL * this.length) this.keepClear([center.toArray()], radius);
       return center.toArray();
     });
-    named.forEach(({ shape: { name } }, k) => this.word(name, places[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name) || faint.has(named[k])));
+    named.forEach(({ shape: { name } }, k) => this.word(name, places[k], needed.has(name) ? this.page.touching : this.page.ink, needed.has(name)));
   }
 
   #light() {
