@@ -87,7 +87,8 @@ def page(browser, tmp_path):
 
 
 def clock(browser) -> str:
-    return browser.find_element(By.CSS_SELECTOR, ".player .clock").text
+    """What it says, which is hidden while the arm rests."""
+    return browser.find_element(By.CSS_SELECTOR, ".player .clock").get_attribute("textContent")
 
 
 def told(browser) -> str:
@@ -284,6 +285,7 @@ def test_another_motion_starts_at_its_start(page):
     )
     until(page, lambda: told(page) == "It stands.")
     assert clock(page) == "0.000 of 1.000 s"
+    assert not page.find_element(By.CSS_SELECTOR, ".player .play").is_displayed()  # it has nothing to play
     assert not page.find_element(By.CSS_SELECTOR, ".cursor").is_displayed()
 
 

@@ -88,7 +88,9 @@ def _(results: DynamicsResults) -> Glance:
     motors = results.summary.motors
     if not motors:
         return "–", tr("masses unknown")
-    worst = max(motors, key=lambda motor: motor.peak)
+    worst = max(motors, key=lambda motor: max(motor.peak, motor.holding))
+    if worst.holding > worst.peak:
+        return with_unit(number(worst.holding, 2), worst.unit), tr("J{joint} holding", joint=worst.joint)
     return with_unit(number(worst.peak, 2), worst.unit), tr("J{joint} moving", joint=worst.joint)
 
 

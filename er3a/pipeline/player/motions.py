@@ -169,16 +169,21 @@ def row_of(fault: Fault, motion: PlayedMotion | None, duration_s: float, length:
     duration_s : of the whole motion, s
     length : of its bar, in parts of the longest
     note : in few words why; its verdict if empty
+
+    Returns
+    -------
+    row : without a bar where no moment of the motion is known to fail
     """
     seen, motion = fault.moments[0].seen_s, motion if motion and len(motion.t) > 1 else None
+    parts = bar_of(motion, duration_s) if motion else []
     return ListRow(
         "fail" if fault.status == "fail" else "caution",
         fault.name,
         note or fault.verdict,
         f"#{fault.name}",
         (fault.name, seen or 0.0) if motion else None,
-        length if motion else 0.0,
-        bar_of(motion, duration_s) if motion else (),
+        length if parts else 0.0,
+        parts,
         fix_of([fault]),
     )
 

@@ -113,11 +113,12 @@ function draw() {
   const touching = new Set([...colours.keys()].filter((name) => colours.get(name) === data.colours.touching));
   const poses = arms.map((arm, k) => posesOf(arm, valuesAt(motion.times, motion.values[k], t)));
   const { page } = space;
+  if (space.target !== motion.target) Object.assign(space, { target: motion.target, distance: (space.distance * motion.length) / space.length, length: motion.length });
   space.begin();
   space.floor(column(table.base, 3), data.size / 10, floor);
   arms.forEach(({ shown }, k) => shown.show(poses[k], colours, part("looks")?.value));
   const others = motion.ghosts.map((q) => posesOf(arms[0], q));
-  others.forEach((own, k) => sticks(own, { fail: page.touching, caution: page.doubtful }[motion.events[k]?.status] ?? page.accent, poses[0]));
+  others.forEach((own, k) => sticks(own, data.solutions[k], poses[0]));
   const hiding = space.hiding(surroundings, poses.flat());
   space.place(surroundings, [WORLD], colours, (mesh) => (hiding.has(mesh) || mesh.shape.large) && FAINT);
   motion.trails ??= arms.map((arm, k) => motion.values[k].map((q) => column(posesOf(arm, q).at(-1), 3)));
@@ -133,6 +134,7 @@ function draw() {
   for (const j of new Set(now.flatMap(({ axes }) => axes))) singularAxis(j, poses[0][j]);
   const marks = motion.marks.filter(({ t0, t1 }) => t >= t0 && t <= t1 && !(t === t1 && t0 < t1 && t1 < end())); // where two meet, the later one
   space.keepClear(poses.flatMap(alongArm), ARM * data.size);
+  for (const { T, radius, length = 0 } of data.scene.filter((shape) => shape.radius)) space.keepClear([-0.5, -0.25, 0, 0.25, 0.5].map((part) => moved(T, [0, 0, part * length])), radius);
   space.keepClear([motion.trails[0][0], motion.trails[0].at(-1), ...marks.map(({ from }) => from)], DOT * data.size);
   for (const { from, to, text } of marks) {
     const css = touching.size ? page.touching : page.ink;
@@ -191,7 +193,8 @@ function nameEnds(trail) {
 function tell() {
   if (bar.dataset.motion !== motion.name) newMotion();
   bar.value = String(t);
-  clock.textContent = words.clock.replace("{t}", fixed(t, 3)).replace("{end}", fixed(end(), 3));
+  const [at, last, said] = motion.ghosts.length > 1 ? [String(Math.floor(t) + 1), String(motion.events.length), words.solution] : [fixed(t), fixed(end()), words.clock];
+  clock.textContent = said.replace("{t}", at).replace("{end}", last);
   bar.setAttribute("aria-valuetext", clock.textContent);
   const now = motion.events.filter(isNow).sort((a, b) => GRAVEST.indexOf(a.status) - GRAVEST.indexOf(b.status));
   const ends = playedUntil() < end() ? words.ends.replace("{t}", fixed(playedUntil())) : motion.text;
@@ -245,6 +248,7 @@ function show(element, text) {
 
 function newMotion() {
   bar.dataset.motion = chooser.value = motion.name;
+  part("controls").classList.toggle("rests", new Set(motion.values.flat().map(String)).size === arms.length);
   Object.assign(bar, { min: String(start()), max: String(whole()), step: "any" });
   const beyond = { t: end(), until: whole(), status: "none", text: motion.events.at(-1)?.text || motion.name };
   const ticks = [...(whole() > end() ? [beyond] : []), ...motion.events].map((event) => {
@@ -296,12 +300,15 @@ function withCursors(figure) {
   };
 }
 
-/** Scrolls each listing to what is shown of it. */
+/** Scrolls each listing to what is shown of it, from the start of a line on; the blank below the last one makes room for that. */
 function listed() {
   for (const row of document.querySelectorAll(".listing .now")) {
-    const [box, own] = [row.closest(".listing"), row.getBoundingClientRect()];
-    const { top, bottom } = box.getBoundingClientRect();
-    if (own.top < top || own.bottom > bottom) box.scrollTop += own.top - top;
+    const [box, table] = [row.closest(".listing"), row.closest("table")];
+    const end = row.offsetTop + row.offsetHeight;
+    if (row.offsetTop >= box.scrollTop && end <= box.scrollTop + box.clientHeight) continue;
+    const { offsetTop } = [...table.rows].find((each) => end - each.offsetTop <= box.clientHeight) ?? row;
+    table.style.marginBottom = `${Math.max(0, offsetTop + box.clientHeight - table.offsetHeight)}px`;
+    box.scrollTop = offsetTop;
   }
 }
 

@@ -6,23 +6,20 @@ import base64
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
-from itertools import combinations
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
-from er3a.collision.pairs import link_label
 from er3a.collision.scene import Scene
 from er3a.kinematics.forward import forward
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
 from er3a.pipeline.player.motions import PlayedMotion
-from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at
+from er3a.pipeline.viewing.drawn import Shape, drawn_arm, drawn_scene, drawn_size, floor_of, poses_at, stand
 from er3a.pipeline.viewing.page import packed_text, page_environment
-from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, TOUCHING
+from er3a.pipeline.viewing.palette import DOUBTFUL, INK, REFERENCE, SOLUTIONS, TOUCHING
 from er3a.pipeline.viewing.still import AZIMUTH, DISTANCE, ELEVATION, FIELD, WIDE, axes_of, scene_still, triangles_of
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
@@ -32,10 +29,11 @@ TEACH, VIEWING = _HERE.with_name("teach"), _HERE.with_name("viewing")
 MAX_FRAMES, FRAMES_IN_ALL, MIN_FRAMES = 240, 6000, 40  # of a motion, of all, and of one among many
 COLOURS = {"caution": DOUBTFUL, "fail": TOUCHING}
 FARTHEST = 1.15  # of the arm's size, from its base: what is farther need not be in the picture
-MARGIN = 1.08  # of the picture, of what is to be seen in it
+MARGIN = 0.12  # of the arm's size, around what is to be seen: links are thick
 TURNED = 0.7  # rad, by which the eye looks at arms along y from another side
-TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which solutions differ most
-ALIKE = 0.02  # of the arm's size: solutions that are nowhere farther from each other look like one
+TURNS = np.linspace(-np.pi / 2, np.pi / 2, 37)  # of which that is taken from which the arm is seen best
+HIDDEN_COSTS, TURN_COSTS = 2.0, 0.05  # by which a view is worse: of the arm that is hidden, and of a rad
+FRAMED = 9  # moments of a motion that the picture holds
 AXES = ("#b42318", "#18794e", "#0b5c94")
 TABLE = (
     *("a", "alpha", "d", "beta", "direction", "offset", "sliding"),
@@ -65,7 +63,7 @@ def player(
 
     Parameters
     ----------
-    opened : the motion and the time (s) that it opens at; None for the worst contact, or else the first start
+    opened : the motion and the time (s) that it opens at; None for the first motion's start
     beside : further arms, which move at the same time; their bases say where they stand
     added : shapes of ``viewing/drawn.py`` around the arm, or in its tool's frame, that nothing collides with
     signs : what is written below the base of each arm, the first included; nothing if empty
@@ -77,11 +75,13 @@ def player(
     for shape in added:
         data["carried" if shape["frame"] else "scene"].append(shape)
     named = {motion.name: motion for motion in shown}
-    data["opened"] = opened if opened and opened[0] in named else _worst(robot, shown)
+    data["opened"] = opened if opened and opened[0] in named else (shown[0].name, float(shown[0].t[0]))
     first = named[data["opened"][0]]
     robots = (robot, *beside)
-    data["turned"] = TURNED if beside else _turned(robot, first)
-    _frame(data, robots, shown)
+    data["turned"] = TURNED if beside else _turned(robot, [_at(first, first.q, data["opened"][1]), *first.ghosts], data)
+    data |= _frame(data, robots, first)
+    for own, motion in zip(data["motions"], shown):
+        own |= _frame(data, robots, motion)
     return Markup(
         page_environment(_HERE)
         .get_template("player.html.j2")
@@ -125,18 +125,21 @@ def _data(
     beside: Sequence[Robot],
     signs: Sequence[str],
 ) -> dict[str, Any]:
-    size = drawn_size(robot)
+    size, floor, arm = drawn_size(robot), floor_of(scene), drawn_arm(robot)
+    for look in arm["looks"].values():
+        look += stand(robot, floor)
     bases = [arm.base[:3, 3] for arm in (robot, *beside)]
     most = min(MAX_FRAMES, max(MIN_FRAMES, FRAMES_IN_ALL // len(motions)))
     return {
         "table": table_data(robot),
         "size": size,
-        **drawn_arm(robot),
+        **arm,
         "others": [{"table": table_data(arm), **drawn_arm(arm)} for arm in beside],
         "signs": [{"text": text, "at": (at - [0, 0, 0.1 * size]).tolist()} for text, at in zip(signs, bases)],
         "colours": {"mark": INK, "sight": REFERENCE, "touching": TOUCHING, **COLOURS},
         "axes": AXES,
-        "floor": floor_of(scene),
+        "floor": floor,
+        "solutions": SOLUTIONS,
         "scene": drawn_scene(scene.solids if scene else (), robot),
         "carried": drawn_scene(scene.carried if scene else (), robot, robot.rows + 1),
         "motions": [_motion(motion, most) for motion in motions],
@@ -144,14 +147,22 @@ def _data(
     }
 
 
-def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[PlayedMotion]) -> None:
-    """Has the picture hold the arms on their ways and what is around them, as far as that is near."""
+def _corners(shape: Shape) -> Reals:
+    """Corners (N, 3) of a body of the scene, m, in the world."""
+    T = np.array(shape["T"])
+    corners: Reals = triangles_of(shape)[0] @ T[:3, :3].T + T[:3, 3]
+    return corners
+
+
+def _frame(data: dict[str, Any], robots: Sequence[Robot], motion: PlayedMotion) -> dict[str, Any]:
+    """How much has to be seen (m), and around which point, for the picture to hold the arms on their ways and what is
+    around them, as far as that is near."""
     bodies = [each for each in data["scene"] if not each.get("large") and ("pale" not in each or "own" in each)]
-    placed = [(triangles_of(shape)[0], np.array(shape["T"])) for shape in bodies]
-    points = [corners @ T[:3, :3].T + T[:3, 3] for corners, T in placed]
-    for robot, *ways in zip(robots, *((motion.q, *motion.beside) for motion in motions)):
-        points += [poses_at(robot, q[k])[:, :3, 3] for q in ways for k in (0, len(q) // 2, -1)]
-    points += [np.array([mark.start]) for motion in motions for mark in motion.marks]
+    points = [_corners(shape) for shape in bodies]
+    for robot, q in zip(robots, (motion.q, *motion.beside)):
+        points += [poses_at(robot, q[k])[:, :3, 3] for k in np.linspace(0, len(q) - 1, FRAMED).astype(int)]
+    points += [poses_at(robots[0], q)[:, :3, 3] for q in motion.ghosts]
+    points += [np.array([mark.start]) for mark in motion.marks]
     middle, far = robots[0].base[:3, 3], FARTHEST * data["size"] + np.ptp([each.base[:3, 3] for each in robots], axis=0)
     seen = np.clip(np.concatenate(points), middle - far, middle + far)
     axes = axes_of(AZIMUTH + data["turned"], ELEVATION)
@@ -161,35 +172,43 @@ def _frame(data: dict[str, Any], robots: Sequence[Robot], motions: Sequence[Play
     length = data["size"]
     for _ in range(4):  # what is nearer is larger
         nearer = DISTANCE * length / (DISTANCE * length + across[:, 2])
-        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0)
-        length = MARGIN * 2 * FIELD / DISTANCE * max(width / WIDE, height)
-    data |= {"length": float(length), "target": (middle @ axes).tolist()}
+        width, height, _ = np.abs(across * nearer[:, None]).max(axis=0) + MARGIN * data["size"]
+        length = 2 * FIELD / DISTANCE * max(width / WIDE, height)
+    return {"length": float(length), "target": (middle @ axes).tolist()}
 
 
-def _turned(robot: Robot, motion: PlayedMotion) -> float:
-    """By how much (rad) the eye is turned so that the two solutions drawn that look most alike differ most."""
-    poses = [poses_at(robot, q)[:, :3, 3] for q in motion.ghosts]
-    between = np.array([one - other for one, other in combinations(poses, 2)])
-    if len(between):
-        between = between[np.linalg.norm(between, axis=2).max(axis=1) > ALIKE * drawn_size(robot)]
-    if not len(between):
-        return 0.0
-    seen = np.array([between @ axes_of(AZIMUTH + turn, ELEVATION)[:2].T for turn in TURNS])
-    return float(TURNS[np.linalg.norm(seen, axis=-1).max(axis=2).min(axis=1).argmax()])
+def _turned(robot: Robot, q: Sequence[Reals], data: dict[str, Any]) -> float:
+    """By how much (rad) the eye is turned to see the arm from its side, walls along them, and no body before it.
+
+    Parameters
+    ----------
+    q : (n,) each, rad or m, of the poses that are drawn
+    """
+    joints = np.array([poses_at(robot, each)[:, :3, 3] for each in q])
+    bodies = [(_corners(shape), shape.get("large")) for shape in data["scene"] if "pale" not in shape]
+    points = np.concatenate([joints, (joints[:, 1:] + joints[:, :-1]) / 2], axis=1)
+    margin = MARGIN * data["size"] / 2
+    whole = np.linalg.norm(np.diff(joints, axis=1), axis=2).sum()
+    best = []
+    for turn in TURNS:
+        axes = axes_of(AZIMUTH + turn, ELEVATION).T
+        seen = points @ axes
+        long = np.linalg.norm(np.diff((joints @ axes)[..., :2], axis=1), axis=2).sum() / whole
+        hidden = np.zeros(seen.shape[:2], dtype=bool)
+        for corners, large in bodies:
+            own = corners @ axes
+            within = (own.min(axis=0) - margin < seen) & (seen < own.max(axis=0) + margin)
+            if large:  # what a wall meets is seen along it
+                long -= np.ptp(own[:, 0]) / np.ptp(corners)
+            else:  # what an arm reaches into does not hide it
+                hidden |= within[..., :2].all(axis=2) & (seen[..., 2] > own[:, 2].max())
+        best.append(long - HIDDEN_COSTS * hidden.mean() - TURN_COSTS * abs(turn))
+    return float(TURNS[np.argmax(best)])
 
 
-def _worst(robot: Robot, motions: Sequence[PlayedMotion]) -> tuple[str, float]:
-    """The first contact that a motion fails by, rather with what is around the arm than with itself; or else the first
-    motion's start."""
-    arm = {link_label(link) for link in range(robot.rows + 1)}
-    contacts = [
-        (set(event.bodies) <= arm, motion.name, event.t)
-        for motion in motions
-        for event in motion.events
-        if event.status == "fail" and event.bodies
-    ]
-    _, name, t = min(contacts, key=itemgetter(0), default=(True, motions[0].name, float(motions[0].t[0])))
-    return name, t
+def _at(motion: PlayedMotion, q: Reals, t: float) -> Reals:
+    """Joint values (n,) of a motion at a time, s."""
+    return np.array([np.interp(t, motion.t, own) for own in q.T])
 
 
 def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) -> Markup:
@@ -198,11 +217,10 @@ def _still(robots: Sequence[Robot], motion: PlayedMotion, data: dict[str, Any]) 
     now = [event for event in motion.events if event.t <= t <= event.until]
     colours = {name: COLOURS.get(event.status, TOUCHING) for event in now for name in event.bodies}
     values = (motion.q, *motion.beside)
-    at = [np.array([np.interp(t, motion.t, own) for own in q.T]) for q in values]
-    poses = [poses_at(robot, q) for robot, q in zip(robots, at)]
+    poses = [poses_at(robot, _at(motion, q, t)) for robot, q in zip(robots, values)]
     picture = scene_still(data, poses, colours, data["turned"])
-    for q in motion.ghosts:
-        picture.line(poses_at(robots[0], q)[:, :3, 3], AXES[2], 3.0)
+    for q, colour in zip(motion.ghosts, SOLUTIONS):
+        picture.line(poses_at(robots[0], q)[:, :3, 3], colour, 3.0)
     for robot, q in zip(robots, values):
         picture.line(forward(robot, q[_shown(motion, MAX_FRAMES)])[:, :3, 3], INK, 2.0)
     for mark in motion.marks:

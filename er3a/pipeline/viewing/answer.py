@@ -8,7 +8,7 @@ from typing import Literal
 
 from er3a.pipeline.language import tr
 
-Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "none"]
+Mark = Literal["pass", "caution", "fail", "conflict", "no_reference", "no_verdict", "none"]
 PartMark = Literal["pass", "caution", "fail", "none", "rest"]
 """Of a stretch of a bar; ``rest`` is what the bar leaves empty."""
 NARROWEST = 0.015  # of a bar, at which a moment is still seen
@@ -128,3 +128,10 @@ def lengths(durations_s: Iterable[float]) -> list[float]:
     durations = list(durations_s)
     longest = max(durations, default=0.0) or 1.0
     return [max(0.1, each / longest) for each in durations]
+
+
+def judged(rows: Sequence[ListRow], repairable: Sequence[ListRow] = ()) -> list[Group]:
+    """Motions by what came of them, those that fail first; ``repairable`` are rows of their own group."""
+    titles: dict[Mark, str] = {"fail": tr("Don't run as they are"), "caution": tr("Doubts"), "pass": tr("Pass")}
+    groups = [Group(title, [row for row in rows if row.mark == mark]) for mark, title in titles.items()]
+    return [groups[0], Group(tr("Can be repaired"), repairable), *groups[1:]]

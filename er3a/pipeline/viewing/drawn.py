@@ -181,6 +181,15 @@ def floor_of(scene: Scene | None) -> float | None:
     return max((s.offset for s in solids if isinstance(s, Plane) and s.normal[2] > 1 - LEVEL), default=None)
 
 
+def stand(robot: Robot, floor: float | None) -> list[Shape]:
+    """What an upright arm above a floor (m) may stand on: pale, because nothing collides with it."""
+    height = 0.0 if floor is None or robot.base[2, 2] < 1 - LEVEL else float(robot.base[2, 3]) - floor
+    if height < PLATE_HEIGHT * drawn_size(robot):
+        return []
+    rod = _rod(0, np.array([0.0, 0.0, -height]), np.zeros(3), PLATE_RADIUS * drawn_size(robot) / 2, PLATE)
+    return [{**rod, "kind": "cylinder", "name": "", "pale": True, "own": PLATE}]
+
+
 def drawn_scene(solids: Sequence[Solid], robot: Robot, frame: int = 0) -> list[Shape]:
     """Solids in the world, or in a frame of the arm that carries them; planes are pale squares near the arm's base."""
     return [{"frame": frame, "name": solid.name, "colour": SCENE_COLOUR, **_measures(solid, robot)} for solid in solids]

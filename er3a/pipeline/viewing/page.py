@@ -45,7 +45,7 @@ from er3a.pipeline.results import (
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.workspace.entry import CapabilitySettings
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer
+from er3a.pipeline.viewing.answer import Answer, Group
 from er3a.version import __version__
 
 if TYPE_CHECKING:
@@ -444,7 +444,10 @@ def render_stage(
         below = joined([whole_sentence(joined(head.gaps, ", ")), answer.below], " ")
         answer = replace(answer, headline=tr("Not fully checked."), rest=answer.headline, below=below)
     if head.no_verdict:
-        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."))
+        grey = partial(replace, mark="no_verdict", note="", parts=(), fix=None)
+        rows = [grey(row) for group in answer.groups for row in group.rows if row.play]
+        groups = [Group(tr("Not judged"), rows)]
+        answer = Answer(tr("Another arm's table."), tr("Nothing here holds for this robot."), groups=groups)
     box = _tray_edges(study, stored) if STAGES[stage].obstacles else ""
     template = _HERE.parent / "stages" / stage / "page" / "report.html.j2"
     render(template, output, head.summary, answer=answer, never=never_text(stage), box=box, **framed | context)
@@ -580,20 +583,6 @@ def _preview(picture: Path) -> str | None:
     """The preview of a recording as a data address; None where there is none or none could be drawn."""
     content = picture.read_bytes() if picture.is_file() else b""
     return "data:image/webp;base64," + base64.b64encode(content).decode("ascii") if content else None
-
-
-def status_word(status: str) -> str:
-    """A verdict's status as a page shows it.
-
-    Parameters
-    ----------
-    status : a key of ``VERDICT_WORDS``
-
-    Returns
-    -------
-    word : in the page's language
-    """
-    return tr(VERDICT_WORDS[status])
 
 
 def _versions() -> dict[str, str]:

@@ -21,6 +21,7 @@ MODEL = "#0072b2"
 REFERENCE = "#d55e00"
 HIGHLIGHT = "#c2185b"
 LINK = "#c9d1d9"
+SOLUTIONS = (*SIX_JOINTS, "#7b4fa3", HIGHLIGHT)  # drawn at a time
 SHELL = "#eef2f6"
 BODY = "#9aa5b1"
 PLATE = "#4a5868"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of, fixed, number
 from er3a.pipeline.player.motions import Mark, PlayedEvent, PlayedMotion, at_rest
-from er3a.pipeline.stages.dynamics.model import DynamicsResults, HoldingTorque, JointLoad, MassesUsed
+from er3a.pipeline.stages.dynamics.model import DynamicsResults, HoldingTorque, JointLoad, LinkEntry, MassesUsed
 from er3a.pipeline.viewing.drawn import poses_at
 from er3a.robots.joint_limits import meant
 from er3a.robots.robot import Robot
@@ -50,16 +53,34 @@ def held(robot: Robot, results: DynamicsResults) -> list[PlayedMotion]:
     ]
 
 
-def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> list[Mark]:
-    """What a joint with a level axis holds: the weight, and its level distance from the axis."""
+def hanging(
+    robot: Robot, masses: MassesUsed | None, held: HoldingTorque
+) -> tuple[Sequence[LinkEntry], Reals, Reals, Reals]:
+    """What a joint with a level axis holds, if that is nothing but links.
+
+    Returns
+    -------
+    links : k links with a mass, none for other joints
+    axis : (3,), m, a point of the axis
+    kg : (k,)
+    off : (k, 3), m, the level way from the axis to each centre
+    """
     poses = poses_at(robot, meant(robot, np.array(held.q)))
     axis, at = poses[held.joint, :3, 2], poses[held.joint, :3, 3]
-    moved = [each for each in masses.links if each.link >= held.joint and each.mass_kg] if masses else []
-    kg = np.array([each.mass_kg for each in moved])
-    if not masses or masses.load_kg or not moved or abs(axis[2]) > LEVEL:
+    links = [each for each in masses.links if each.link >= held.joint and each.mass_kg] if masses else []
+    if not masses or masses.load_kg or abs(axis[2]) > LEVEL or robot.slides[held.joint - 1]:
+        links = []
+    ways = np.array([(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM - at for each in links]).reshape(-1, 3)
+    off = (ways - np.outer(ways @ axis, axis)) * [1, 1, 0]
+    return links, at, np.array([each.mass_kg for each in links]), off
+
+
+def _weight(robot: Robot, masses: MassesUsed | None, held: HoldingTorque) -> list[Mark]:
+    """The weight that a joint holds, and its level distance from the axis."""
+    links, at, kg, off = hanging(robot, masses, held)
+    if not links:
         return []
-    centre = kg @ [(poses[each.link] @ [*each.centre_mm, MM])[:3] / MM for each in moved] / kg.sum()
-    lever = (centre - at - (centre - at) @ axis * axis) * [1, 1, 0]
+    lever = kg @ off / kg.sum()
     end = tuple(at + lever)
     far, heavy = with_unit(fixed(MM * float(np.linalg.norm(lever)), 0), "mm"), with_unit(number(kg.sum(), 3), "kg")
     return [Mark(0.0, 1.0, tuple(at), end, far), Mark(0.0, 1.0, end, (*end[:2], end[2] - DROP_M), heavy)]

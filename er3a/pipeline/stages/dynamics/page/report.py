@@ -17,12 +17,12 @@ from er3a.pipeline.player.motions import at_rest
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.dynamics import model
-from er3a.pipeline.stages.dynamics.page.played import held, holding_name, motions, within
+from er3a.pipeline.stages.dynamics.page.played import hanging, held, holding_name, motions, within
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Mark, Part
 from er3a.pipeline.viewing.figures import axis_label, new_figure
 from er3a.pipeline.viewing.page import Picture, panel_link, render_stage
-from er3a.pipeline.viewing.palette import INK, JOINTS, LINK, MUTED, VERDICTS
+from er3a.pipeline.viewing.palette import INK, JOINTS
 from er3a.robots.robot import Robot
 
 DRAWN = 161
@@ -67,27 +67,25 @@ def torque_figure(path: model.PathLoad, rows: model.TorqueRows) -> Picture:
     return Picture(figure, alt, caption, [(ax, path.name) for ax in (torque, parts)])
 
 
-def held_figure(summary: model.DynamicsSummary, shown: model.HoldingTorque) -> Picture:
-    """What each joint holds at most, that of the pose shown in its colour, beside its limit where that is known."""
+def held_figure(robot: Robot, masses: model.MassesUsed | None, held: model.HoldingTorque) -> Picture | None:
+    """What each link adds to what a joint holds, its mass times its level distance; None where more than links hang."""
+    links, _, kg, off = hanging(robot, masses, held)
+    if not links:
+        return None
+    lever = kg @ off
+    far = off @ lever / np.linalg.norm(lever)
+    torques = abs(held.torque) * kg * far / (kg @ far)
     figure, ax = new_figure(width=5.2, height=3.5)
-    places, unit = [each.joint for each in summary.holding], model.shared_unit(each.unit for each in summary.holding)
-    torques = np.array([abs(each.torque) for each in summary.holding])
-    spread = [each.tolerance for each in summary.holding]
-    colours = [JOINTS[(each.joint - 1) % len(JOINTS)] if each is shown else LINK for each in summary.holding]
-    ax.barh(places, torques, 0.6, xerr=spread, color=colours, ecolor=MUTED)
-    limits = [(motor.peak_limit, motor.joint) for motor in summary.motors if motor.peak_limit is not None]
-    if limits:
-        ax.plot(*zip(*limits), "D", color=VERDICTS["fail"], label=tr("peak limit ({unit})", unit=unit))
-        ax.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1), **KEY)
-    for k, each in enumerate(summary.holding):
-        end = torques[k] + spread[k], each.joint
-        ax.annotate(_sized(torques[k], each.unit), end, (7, 0), textcoords="offset points", va="center")
-    ax.set_yticks(places, [f"J{each.joint}" for each in summary.holding])
+    places = np.arange(len(links))
+    ax.barh(places, torques, 0.6, color=[JOINTS[each.link - 1] for each in links])
+    for place, torque, mass, way in zip(places, torques, kg, far):
+        text = f"{with_unit(number(mass, 3), 'kg')} × {with_unit(fixed(1000 * way, 0), 'mm')}"
+        ax.annotate(text, (max(torque, 0.0), place), (7, 0), textcoords="offset points", va="center")
+    ax.set_yticks(places, [tr("link {number}", number=each.link) for each in links])
     ax.invert_yaxis()
-    ax.margins(x=0.22)
-    ax.set_xlim(left=0.0)
-    ax.set_xlabel(axis_label(model.TorqueRows, "torque", unit))
-    caption = tr("Greatest torque of each joint in any pose. Lines: tolerance of the masses.")
+    ax.margins(x=0.35)
+    ax.set_xlabel(axis_label(model.TorqueRows, "torque", held.unit))
+    caption = tr("What each link adds to J{joint}: its mass times its level distance.", joint=held.joint)
     return Picture(figure, caption, caption)
 
 
@@ -105,7 +103,9 @@ def report(study: Study, stored: Stored[model.DynamicsResults], output: Path) ->
         for path in summary.paths
         if path.complete
     ]
-    figures += [(holding_name(each.joint), held_figure(summary, each)) for each in summary.holding]
+    for each in summary.holding:
+        if drawn := held_figure(robot, summary.masses, each):
+            figures.append((holding_name(each.joint), drawn))
     render_stage(
         study,
         stored,

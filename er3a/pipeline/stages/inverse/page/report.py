@@ -24,6 +24,7 @@ from er3a.pipeline.stages.inverse.page.played import SHOWN_S, refusal_in_short, 
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part, all_caught
 from er3a.pipeline.viewing.page import panel_link, render_stage
+from er3a.pipeline.viewing.palette import SOLUTIONS
 from er3a.robots.joint_limits import shown
 from er3a.robots.robot import Robot
 
@@ -51,6 +52,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],
         units=_units(robot),
+        colours=SOLUTIONS,
     )
 
 
@@ -218,7 +220,7 @@ def _branch_rows(rows: model.SolutionRows, branches: model.SolutionRows) -> list
 def _outcome(branches: model.SolutionRows, k: int, place: int, turns: int) -> str:
     if branches.refusal[k] is not None:
         return refusal_in_short(branches.refusal[k])
-    taken = tr("chosen") if branches.rank[k] == 1 else tr("place {place}", place=place)
+    taken = tr("chosen") if branches.rank[k] == 1 else tr("choice {place}", place=place)
     if turns > 1:
         taken = tr("{taken}; {turns} ways, ±360°", taken=taken, turns=turns)
     if (freed := float(branches.freed_turn_deg[k])) > SAME:

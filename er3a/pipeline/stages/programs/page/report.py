@@ -16,7 +16,7 @@ from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.player.motions import fix_of, opened, row_of
+from er3a.pipeline.player.motions import Fault, fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -33,7 +33,7 @@ from er3a.pipeline.stages.programs.page.played import (
 )
 from er3a.pipeline.stages.workspace.page.tray import compared_with_tray, in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, ListRow, judged, lengths, may_run
 from er3a.pipeline.viewing.page import render_stage
 from er3a.program_check.program_check_findings import Level, worst_of
 from er3a.programs.languages import LANGUAGES
@@ -69,33 +69,39 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
-    notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
-    bad = {each.name: row_of(each, shown[each.name], 0.0, 1.0, notes[each.name]) for each in wrong}
+    notes = {each.name: _note(each) for each in wrong}
+    moved = [each for each in shown if (results.motion.program == each).any()]
+    bars = dict(zip(moved, lengths(float(shown[each].t[-1]) for each in moved)))
+    bad = {each.name: row_of(each, shown[each.name], 0.0, bars.get(each.name, 0.0), notes[each.name]) for each in wrong}
     good = [each for each in summary.programs if each.name not in bad]
-    times = [float(shown[each.name].t[-1]) for each in good]
     sound = [
         ListRow(
             "pass",
             each.name,
-            _cost(time, each.least_clearance_mm if each.least_clearance_mm is not None else np.inf),
+            _cost(float(shown[each.name].t[-1]), each.least_clearance_mm),
             f"#{each.name}",
             (each.name, 0.0),
-            length,
+            bars.get(each.name, 0.0),
         )
-        for each, time, length in zip(good, times, lengths(times))
+        for each in good
     ]
     caught = sum(fault.meant for fault in wrong)
     headline, rest = may_run(len(sound), len(summary.programs) - caught, caught, tr("programs"))
     clear = [each.least_clearance_mm for each in good if each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    groups = (Group(tr("Don't run as they are"), list(bad.values())), Group(tr("May run"), sound))
-    return Answer(headline, rest, "", keys, groups, fix_of(wrong))
+    return Answer(headline, rest, "", keys, judged([*bad.values(), *sound]), fix_of(wrong))
 
 
-def _cost(time_s: float, clear_mm: float) -> str:
-    """How long something takes, and how near it comes to anything; infinite where that is not known."""
+def _note(fault: Fault) -> str:
+    """What is wrong with a program, in few words, after its line."""
+    line, what = re.split("[,，]", fault.when)[0], in_few_words(fault.moments[0].what)
+    return tr("{where}: {text}", where=line, text=what) if line else what
+
+
+def _cost(time_s: float, clear_mm: float | None) -> str:
+    """How long something takes, and how near it comes to anything; infinite or None where that is not known."""
     parts = [tr("{time} s", time=fixed(time_s, 2))] if np.isfinite(time_s) else []
-    if 0 <= clear_mm < np.inf:  # else a finding says how deep
+    if clear_mm is not None and 0 <= clear_mm < np.inf:  # else a finding says how deep
         parts.append(tr("{far} mm clear", far=fixed(clear_mm, 0)))
     return " · ".join(parts)
 

@@ -40,7 +40,7 @@ from er3a.pipeline.stages.trajectory.page.played import (
 from er3a.pipeline.stages.trajectory.written_programs import repair_name
 from er3a.pipeline.stages.workspace.page.tray import Meeting, compared_with_tray, linked, met_in_tray
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, lengths, may_run
+from er3a.pipeline.viewing.answer import Answer, Fix, ListRow, judged, lengths, may_run
 from er3a.pipeline.viewing.conditions import program_head
 from er3a.pipeline.viewing.page import Picture, packed_text, render_stage, whole_sentence
 from er3a.programs.languages import titles_unwritten
@@ -131,17 +131,15 @@ def answer_of(
         for path in others
         if path.expect and not is_met(path)
     ]
-    groups = (
-        Group(tr("Don't run as they are"), [*unlike, *(row for row in fault_rows.values() if row not in repairable)]),
-        Group(tr("Can be repaired"), repairable),
-        Group(tr("May run"), [_sound_row(path, shares[path.name], limits) for path in sound]),
-    )
+    rows = [*unlike, *(row for row in fault_rows.values() if row not in repairable)]
+    groups = judged([*rows, *(_sound_row(path, shares[path.name], limits) for path in sound)], repairable)
     caught = sum(fault.meant for fault in wrong.values())
     headline, rest = may_run(len(sound), len(paths) - caught, caught, tr("paths"))
     clear = [path.clearance.least_mm for path in sound if path.clearance]
     speeds = [path.max_joint_speed_ratio for path in sound if path.max_joint_speed_ratio]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
-    keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), tr("of a joint's speed limit"))] if speeds else []
+    limit = tr("of assumed speed limits") if any(limits.speed_assumed) else tr("of a joint's speed limit")
+    keys += [(with_unit(fixed(100 * max(speeds), 0), "%"), limit)] if speeds else []
     fix = fix_of(fault for name, fault in wrong.items() if name not in hindered)
     return Answer(headline, rest, "", keys, groups, fix)
 
