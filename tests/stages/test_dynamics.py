@@ -579,7 +579,7 @@ def test_forces_of_joints_that_slide_are_not_called_torques_in_newton_metres(ful
     mixed = replace(summary, holding=tuple(slid), paths=tuple(paths), motors=tuple(motors))
     report(study, replace(found, results=replace(found.results, summary=mixed)), tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    for text in ("peak (N m or N)", "speed (deg/s or mm/s)", "load inertia (kg m² or kg)", "J3 (slides)"):
+    for text in ("peak (N m or N)", "speed (°/s or mm/s)", "load inertia (kg m² or kg)", "J3 (slides)"):
         assert text in page
     report(study, found, tmp_path / "plain.html")
     assert "N m or N" not in (tmp_path / "plain.html").read_text(encoding="utf-8")

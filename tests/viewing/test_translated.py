@@ -64,7 +64,9 @@ def own_texts(small_study):
     data = small_study.folder / "data"
     files = {path.relative_to(small_study.folder).as_posix() for path in data.rglob("*.*")}
     names = {*ROBOTS, "GOAL"}  # as KRL reads it
-    return files | texts_from_files(data) | texts_from_files(small_study.folder / "config") | names
+    texts = texts_from_files(data) | texts_from_files(small_study.folder / "config")
+    shortened = {re.split("[,，]", text)[0] for text in texts}  # titles of documents, in drawings
+    return files | texts | shortened | names
 
 
 # All stages of one arm; of others what it has not: a table that evidence contradicts, a drawing of the workspace.

@@ -60,7 +60,7 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
     results = stored["validation"].results if "validation" in stored else None
     if not isinstance(results, ValidationResults) or results.summary.evidence is None:
         return None
-    evidence = results.summary.evidence
+    robot, evidence = study.robot(name), results.summary.evidence
     bad = evidence.contradicted
     answer = (
         tr("{count} of {all} contradicted.", count=bad, all=known_alone(evidence))
@@ -68,7 +68,7 @@ def table_tile(study: Study, name: str, stored: Results) -> Tile | None:
         else tr("{count} not settled", count=len(evidence.unconfirmed))
     )
     mark: Mark = "fail" if bad else "caution" if evidence.unconfirmed else "pass"
-    title, entries = own_title(study.robot(name).title), evidence_section(evidence)
+    title, entries = own_title(robot.title), evidence_section(robot, evidence)
     return Tile(tr("Which numbers are wrong?"), answer, title, mark, f"{name}/validation.html", entries)
 
 

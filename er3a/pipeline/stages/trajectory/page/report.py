@@ -70,7 +70,7 @@ def report(study: Study, stored: Stored[model.TrajectoryResults], output: Path) 
         links = _programs(path, files, lines, met or {})
         drawn = _figure(robot, path, rows, summary.near) if i < count else None
         measured = results.clearance.take(results.clearance.path == path.name)
-        nearness = nearness_picture(path, measured, summary.verdict.shapes) if i < count and len(measured) else None
+        nearness = nearness_picture(path, measured, summary.verdict.shapes) if i < count and path.clearance else None
         sections.append({**_section(path, drawn, links, summary), "near_over_time": nearness})
     assumed = [f"J{j + 1}" for j, is_assumed in enumerate(summary.joint_limits.speed_assumed) if is_assumed]
     render_stage(

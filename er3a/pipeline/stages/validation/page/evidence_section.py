@@ -16,6 +16,7 @@ from er3a.pipeline.messages.say import joined, say, word
 from er3a.pipeline.stages.validation.model import OtherTableFound, TableEvidence
 from er3a.pipeline.viewing.answer import ListRow
 from er3a.references.quantities import MM
+from er3a.references.reference import NO_DOCUMENT
 from er3a.robots.robot import Robot
 
 MARKS: Mapping[Status, str] = {
@@ -57,7 +58,7 @@ DIFFERS = 2e-3
 IN_UNIT = {"a": MM, "d": MM, "direction": 1.0} | dict.fromkeys(("alpha", "beta", "offset", *LIMITS), 180 / pi)
 
 
-def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
+def evidence_section(robot: Robot, evidence: TableEvidence | None) -> dict[str, Any] | None:
     """What the page shows of a table's evidence: the table by rows (a cell is None where it has no such entry), its
     legend, and the entries in words; rows of entries begin with the name, which is the address on the page. Those
     not settled come by how far the tool may be off, then those without a bound, then those that don't move it;
@@ -75,7 +76,7 @@ def evidence_section(evidence: TableEvidence | None) -> dict[str, Any] | None:
     present = {each.status for each in numbers}
     return dict(
         columns=[tr(COLUMNS[kind]) for kind in kinds],
-        rows=[(joint, [_cell(by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
+        rows=[(joint, [_cell(robot, by_name.get(f"{kind}{joint}"), evidence) for kind in kinds]) for joint in joints],
         legend=[
             (status, _marked(status), word("status_meaning", STATUS_MEANINGS, status))
             for status in MARKS
@@ -159,15 +160,15 @@ def other_robot(robot: Robot, evidence: TableEvidence | None) -> Robot | None:
     return robot.replace(**asdict(evidence.other.table)) if evidence and evidence.other else None
 
 
-def _cell(each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
-    """An entry in the table, with its value also where its own source states none and evidence contradicts it."""
+def _cell(robot: Robot, each: EntryEvidence | None, evidence: TableEvidence) -> dict[str, Any] | None:
+    """An entry in the table; where evidence contradicts one that its own source doesn't state there is no value."""
     if each is None or each.value is None:
         return None
     title = tr("{entry}: {status}", entry=each.entry, status=_status(each.status))
     gives = _gives(each, evidence) or _alone(each)
-    return dict(
-        entry=each.entry, value=_value(each), status=each.status, mark=MARKS[each.status], title=title, gives=gives
-    )
+    unstated = each.status == "contradicted" and robot.origins.get(each.entry) == NO_DOCUMENT
+    value = "–" if unstated else _value(each)
+    return dict(entry=each.entry, value=value, status=each.status, mark=MARKS[each.status], title=title, gives=gives)
 
 
 def _marked(status: Status) -> str:

@@ -148,7 +148,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         if summary.verdict.status == "fail" and stored.folder
         else None
     )
-    evidence = evidence_section(summary.evidence)
+    evidence = evidence_section(robot, summary.evidence)
     disputed = [each for each in summary.conflicts if is_one(each.subject, "reach") and each.subject.axis == 1]
     render_stage(
         study,
