@@ -16,7 +16,7 @@ from er3a.pipeline.messages.expectations import as_expected
 from er3a.pipeline.messages.numbers import fixed
 from er3a.pipeline.messages.programs import cycle_text, level_word, remedies, remedy, singular_cause
 from er3a.pipeline.messages.say import bracketed, say
-from er3a.pipeline.player.motions import Fault, fix_of, opened, row_of
+from er3a.pipeline.player.motions import fix_of, opened, row_of
 from er3a.pipeline.player.player import drawing_head, moment, player, stretch
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.programs import model
@@ -69,7 +69,7 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     """How many programs may be run, each with its bar over time, and what to do about the first of the others."""
     summary, wrong = results.summary, faults(results)
     shown = {motion.name: motion for motion in motions(robot, results)}
-    notes = {each.name: _note(each) for each in wrong}
+    notes = {each.name: in_few_words(each.moments[0].what) for each in wrong}
     moved = [each for each in shown if (results.motion.program == each).any()]
     bars = dict(zip(moved, lengths(float(shown[each].t[-1]) for each in moved)))
     bad = {each.name: row_of(each, shown[each.name], 0.0, bars.get(each.name, 0.0), notes[each.name]) for each in wrong}
@@ -90,12 +90,6 @@ def programs_answer(robot: Robot, results: model.ProgramsResults) -> Answer:
     clear = [each.least_clearance_mm for each in good if each.least_clearance_mm]
     keys = [(with_unit(fixed(min(clear), 1), "mm"), tr("least clearance"))] if clear else []
     return Answer(headline, rest, "", keys, judged([*bad.values(), *sound]), fix_of(wrong))
-
-
-def _note(fault: Fault) -> str:
-    """What is wrong with a program, in few words, after its line."""
-    line, what = re.split("[,，]", fault.when)[0], in_few_words(fault.moments[0].what)
-    return tr("{where}: {text}", where=line, text=what) if line else what
 
 
 def _cost(time_s: float, clear_mm: float | None) -> str:
