@@ -158,7 +158,7 @@ def _use(table: str, head: Head | None, failed: Sequence[str]) -> tuple[str, str
     if table == "caution" and is_one(finding, "validation.left_open") and not finding.contradiction:
         settled = [part.settled or part.up_to_signs for part in finding.parts if part.part == "geometry"]
         if any(settled):  # by independent documents, of lengths and twists
-            return "plan", tr("partly settled")
+            return "plan", tr("plan only")
     return "measure", tr("don't rely on it yet")
 
 
