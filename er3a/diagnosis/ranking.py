@@ -293,8 +293,9 @@ def case_of(robot: Robot, stated: tuple[Reference, ...]) -> Case:
     """
     expected, _ = expected_of(stated)
     asked = quantities_of(stated)
-    distinct = {repr(each): each for each in asked}
-    column = np.array([list(distinct).index(repr(each)) for each in asked], dtype=np.int64)
+    measured = [(type(each), *vars(each).values()) for each in asked]  # all fields: some don't count for equality
+    distinct = dict(zip(measured, asked))
+    column = np.array([list(distinct).index(each) for each in measured], dtype=np.int64)
 
     def difference(tables: Tables) -> Reals:
         return predict_tables(tables, robot, list(distinct.values()))[:, column] - expected

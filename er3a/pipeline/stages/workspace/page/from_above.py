@@ -19,7 +19,7 @@ from er3a.robots.robot import Robot
 AROUND = 1.2  # of the reach, that is shown to each side
 DEAD = 0.2  # rad that axis 1 does not turn to: there is room for a word
 LETTER = 0.3  # half the width of a letter, of its height
-FINE = 0.1  # letters, of the reach, up to which there is room for the limits of joint 1
+FINE = 0.1  # of the reach: letters below this leave room for the limits of joint 1
 BASE = 0.06  # of the reach: radius of the dot at axis 1
 
 
