@@ -44,6 +44,7 @@ from er3a.robots.robot import Robot
 
 DAY_S = 86_400.0
 MOST_ROWS = 10  # that are printed of a program's findings unless all are asked for
+MOST_RANGES = 6  # of lines that a finding names; --all prints each
 MOST_TEXTS = 4  # of what is not followed for one reason
 NEEDED: Mapping[Check, str] = {
     "scene": "scene (none given: --scene)",
@@ -294,14 +295,15 @@ def missed_checks(missed: tuple[Open, ...]) -> tuple[Coverage, ...]:
 
 
 def _line_ranges(lines: Iterable[int]) -> str:
-    """``12-14, 20`` of 12, 13, 14 and 20."""
+    """``12-14, 20`` of 12, 13, 14 and 20; of many the first and the last."""
     ranges: list[list[int]] = []
     for line in sorted(set(lines)):
         if ranges and line == ranges[-1][1] + 1:
             ranges[-1][1] = line
         else:
             ranges.append([line, line])
-    return ", ".join(f"{first}-{last}" if last > first else f"{first}" for first, last in ranges)
+    texts = [f"{first}-{last}" if last > first else f"{first}" for first, last in ranges]
+    return ", ".join(texts if len(texts) <= MOST_RANGES else [*texts[: MOST_RANGES - 2], "...", texts[-1]])
 
 
 def json_of(checked: Iterable[CheckedFile]) -> list[dict[str, Any]]:

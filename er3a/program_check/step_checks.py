@@ -164,7 +164,10 @@ class Judge:
         arm, base = self._arm(motion.tool), motion.base.pose
         if base is None and not motion.base.name:
             base = np.eye(4)
-        placed = None if base is None else self.robot.base @ base
+        outer = ", ".join(
+            {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
+        )
+        placed = None if base is None or outer else self.robot.base @ base  # such axes may carry arm or workpiece
         checked = CheckedMotion(motion, arm or self.robot, placed, before)
         target, of_tool = motion.target, motion.kind != "joint"
         if isinstance(target, UnresolvedTarget):
@@ -172,11 +175,14 @@ class Judge:
             text, reason = (motion.tool.name, "tool") if by_tool else (target.text, target.reason)
             checked.add(fact("not_followed", text=text, reason=reason))
             return checked
-        _say_of(checked)
+        if outer:
+            checked.add(fact("not_followed", text=outer, reason="external_axes"))
+        if motion.not_followed:
+            checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
         if arm is None and (of_tool or isinstance(target, PoseTarget)):
             checked.add(fact("not_followed", text=motion.tool.name, reason="tool"))
         elif placed is None and isinstance(target, PoseTarget):
-            checked.add(fact("not_followed", text=motion.base.name, reason="base"))
+            checked.add(*(() if outer else (fact("not_followed", text=motion.base.name, reason="base"),)))
         elif of_tool:
             self._along_tool_path(checked, target)
         else:
@@ -298,16 +304,6 @@ def _rounded(joints: Reals | None) -> bytes:
 def _configuration(target: Target) -> str:
     given = target.configuration if isinstance(target, PoseTarget) else ()
     return ", ".join(f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}" for key, value in given)
-
-
-def _say_of(checked: CheckedMotion) -> None:
-    """Findings on a motion that do not depend on the arm."""
-    motion = checked.motion
-    outer = {name: None for each in (motion.target, motion.via) for name, _ in getattr(each, "external", ())}
-    if outer:
-        checked.add(fact("not_followed", text=", ".join(outer), reason="external_axes"))
-    if motion.not_followed:
-        checked.add(fact("not_followed", text=motion.not_followed, reason="setting"))
 
 
 class Obstacles:

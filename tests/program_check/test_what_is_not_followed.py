@@ -65,6 +65,12 @@ def test_a_motion_that_depends_on_it_is_no_pass(case, tmp_path):
     assert not verdicts[-1].followed
 
 
+def test_a_pose_beside_a_track_is_no_fail(tmp_path):
+    far = "{X 5000, Y 0, Z 500, A 0, B 90, C 0"
+    on_track, alone = (checked(tmp_path, krl(f"{AXES}\nPTP {far}{outer}}}")) for outer in (", E1 4500", ""))
+    assert [each.level for each in (on_track.verdicts[-1], alone.verdicts[-1])] == ["caution", "fail"]
+
+
 def test_without_it_the_motions_pass(tmp_path):
     check = checked(tmp_path, krl(f"{AXES}\nN=10\n{LINE}\nPTP {{A1 N}}"))
     assert [(each.level in ("pass", "note"), each.followed) for each in check.verdicts] == [(True, True)] * 3

@@ -51,7 +51,7 @@ REASONS: dict[NotFollowedReason, str] = words(
         "tool": "this tool is not given",
         "base": "this base is not given",
         "turns_with_path": "it turns the tool with its path (CirPathMode)",
-        "external_axes": "these axes were taken to rest",
+        "external_axes": "these axes may carry the arm or the workpiece",
         "arc_angle": "the arc does not end at its target",
         "half_turn": "the tool turns by half a turn, either way round",
         "redundant": "the arm can move along it in more ways than one",

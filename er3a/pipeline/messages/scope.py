@@ -77,7 +77,6 @@ ASSUMED: Mapping[str, str] = words(
         "solutions_complete": "the solutions found are all",
         "program_starts": "where programs start from",
         "program_load": "loads that programs name",
-        "outer_axes": "axes beside the arm's rest",
         "capability": "tool directions were not computed",
         "places": "no place for the tray was looked for",
         "tray_nowhere": "no place for the tray was found",

@@ -113,9 +113,6 @@ def _assumed(programs: Sequence[model.ProgramSummary], unknown_starts: Sequence[
     if unknown_starts:
         yield Open("program_starts", tuple(unknown_starts))
     found = [(each.name, at.finding) for each in programs for at in each.findings]
-    outer = {name: None for name, one in found if is_one(one, "not_followed") and one.reason == "external_axes"}
-    if outer:
-        yield Open("outer_axes", tuple(outer))
     said = (f"{name}: {load.mass_kg:g} kg" for name, load in found if is_one(load, "load_above_payload"))
     if texts := tuple(dict.fromkeys(said)):
         yield Open("program_load", texts)
