@@ -49,7 +49,7 @@ from er3a.program_check.motion_checks import (
 )
 from er3a.program_check.program_check_findings import Level
 from er3a.programs.instructions import ArmMotion, JointTarget, NamedFrame, PoseTarget, Target, UnresolvedTarget, Zone
-from er3a.programs.solving import solutions_meant
+from er3a.programs.solving import rows_meant, solutions_meant
 from er3a.robots.joint_limits import equivalents_within
 from er3a.robots.robot import Robot
 
@@ -284,10 +284,9 @@ class Judge:
             return None
         rows, _ = equivalents_within(checked.arm, rows, reference)
         if (checked.motion.kind == "joint" or before is None) and target.branch is not None:
-            met = solutions_meant(target.branch, checked.arm, rows)
-            if not met.any():
+            rows, met = rows_meant(target.branch, checked.arm, pose, rows)
+            if not met:
                 checked.add(fact("configuration_not_met", text=_configuration(target)))
-            rows = rows[met] if met.any() else rows
         away = np.abs(rows - reference).max(axis=1)
         said = checked.motion.kind == "joint" and target.branch is None and bool(target.configuration)
         if (near is None or said) and (different := len(np.unique(np.round(rows, SAME_DIGITS), axis=0))) > 1:

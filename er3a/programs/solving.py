@@ -9,7 +9,7 @@ import numpy as np
 from er3a.errors import PoseError
 from er3a.geometry.vectors import wrap_to_pi
 from er3a.kinematics.batch import inverse_batch
-from er3a.kinematics.forward import forward
+from er3a.kinematics.forward import forward, jacobian
 from er3a.kinematics.singularity import factors_where_defined
 from er3a.numerics.arrays import Flags, Reals
 from er3a.planning.moves import Segment, line
@@ -24,6 +24,8 @@ MAX_STEPS = 10_000  # on a way that no arm can take
 WIDE_STEP = 0.15  # rad or m, of a joint from one pose to the next, which are near to each other
 ON_POSE = 1e-6  # m, and of the elements of a rotation matrix
 AT_A_CHANGE = math.radians(1.0)
+ROUNDED = 1e-5  # m, and of the elements of a rotation matrix that a program gives with six digits
+TURNS = np.linspace(-2 * np.pi, 2 * np.pi, 65)  # four in each quarter
 NO_SIDE = 1e-9  # m or rad, of a signed distance that is on no side
 Frames = tuple[NamedFrame, NamedFrame]
 
@@ -115,6 +117,36 @@ def solutions_meant(branch: MeantSolution, robot: Robot, rows: Reals) -> Flags:
     return met
 
 
+def rows_meant(branch: MeantSolution, robot: Robot, pose: Reals, rows: Reals) -> tuple[Reals, bool]:
+    """The solutions of a pose that are meant.
+
+    Parameters
+    ----------
+    pose : (4, 4), T_world_tool, m
+    rows : (k, n), rad or m, its solutions
+
+    Returns
+    -------
+    rows, met : those that are meant, or all if none is, and whether there are any
+
+    Notes
+    -----
+    With two axes in line only the sum of their joints follows from the pose. A program that rounds its numbers misses
+    such a pose by its last digit, and one solution is left of all. So joints turn against each other, too, in the
+    direction that moves the tool least, as long as the pose stays the same but for those digits.
+    """
+    met = solutions_meant(branch, robot, rows)
+    if not met.any():
+        least = np.linalg.svd(jacobian(robot, rows))[2][:, -1]
+        turns = TURNS[:, None, None] * least / np.abs(least).max(axis=1, keepdims=True)
+        turned = (rows + turns).reshape(-1, robot.joints)
+        stays = np.abs(forward(robot, turned) - pose).max(axis=(1, 2)) < ROUNDED
+        turned = turned[stays & within(robot, turned)]
+        if len(turned) and (met := solutions_meant(branch, robot, turned)).any():
+            rows = turned
+    return (rows[met], True) if met.any() else (rows, False)
+
+
 class Resolver:
     """Follows a sequence and knows where the arm is; joints are solved when they are needed.
 
@@ -204,12 +236,13 @@ class Resolver:
             return None
         reference = np.zeros(self.arm.joints) if near is None else near
         try:
-            found = inverse_batch(self.arm, (base.pose @ pose @ np.linalg.inv(tool.pose))[None], reference)
+            at_flange = base.pose @ pose @ np.linalg.inv(tool.pose)
+            found = inverse_batch(self.arm, at_flange[None], reference)
         except PoseError:
             return None
         rows = found.q[0][found.solved[0] & found.within_limits[0]]
-        if branch is not None and len(rows) and (met := solutions_meant(branch, self.arm, rows)).any():
-            rows = rows[met]
+        if branch is not None and len(rows):
+            rows, _ = rows_meant(branch, self.arm, at_flange, rows)
         return rows[int(np.abs(rows - reference).max(axis=1).argmin())] if len(rows) else None
 
     def _end(self, motion: ArmMotion, pose_before: Reals | None, before: Reals | None) -> Reals | None:

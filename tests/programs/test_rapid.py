@@ -357,6 +357,27 @@ def test_of_several_solutions_the_one_with_the_configuration_is_taken(tmp_path):
         assert bool(motions(execute(program))[-1].target.configuration) == (not supervised)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_with_the_wrist_in_line_any_share_of_its_joints_has_the_configuration(seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    q = np.radians([rng.uniform(-80, 80), -20.0, 15.0, rng.uniform(-170, 170), 0.0, rng.uniform(-170, 170)])
+    pose = forward(ROBOT, q)
+    turn = ",".join(f"{each:.6g}" for each in Rotation.from_matrix(pose[:3, :3]).as_quat()[[3, 0, 1, 2]])
+    xyz = ",".join(f"{each * 1000:.2f}" for each in pose[:3, 3])
+    for turned in (0.0, np.pi / 2, np.pi):  # of the first joint a quarter or half a turn off: no solution is there
+        quarters = np.floor((q + [turned, 0, 0, 0, 0, 0])[[0, 3, 5]] / (np.pi / 2)).astype(int).tolist()
+        program = read_program(
+            saved(tmp_path, f"MoveJ [[{xyz}],[{turn}],[{quarters[0]},{quarters[1]},{quarters[2]},0],{NONE}],@;")
+        )
+        check = check_program(program, ROBOT, CheckOptions(start=np.zeros(6)))
+        codes = {each.finding.code for each in check.findings}
+        assert ("configuration_not_met" in codes) == (turned > 0)
+        end = check.motions[check.main[0]].end
+        assert np.abs(forward(ROBOT, end) - pose).max() < 2e-5
+        if not turned:
+            assert np.floor(end[[0, 3, 5]] / (np.pi / 2)).astype(int).tolist() == quarters
+
+
 def test_a_line_that_arrives_in_another_configuration_is_named(tmp_path):
     q = np.radians([10.0, -20.0, 15.0, 5.0, -60.0, 20.0])
     end = forward(ROBOT, q)
