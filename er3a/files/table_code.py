@@ -188,7 +188,7 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
     name = found[1] if found else ""
-    in_table = _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of(name.split("_")))
+    in_table = _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
     if name and in_table and (changed := re.search(_CHANGED.replace("NAME", name), code.text)):
         problem = f"'{changed[0].strip(' ;')[:60]}' changes '{name}'"
         raise InputError(None, f"line {code.line(changed.end())}", problem, "Write what the program makes of it")
@@ -553,13 +553,14 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$",
+            group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
             r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
         )
-        if group.bracket == "(" or name is None or rows:
+        if name is None or rows or (group.bracket == "(" and group.before.rstrip()[-1] != "="):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
@@ -577,7 +578,7 @@ def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
     header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
-        heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
+        heading = next(filter(None, map(heading_of, (name, bare, name.rpartition("_")[2]))), None)
         if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
             continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
