@@ -253,7 +253,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
         elif open_one:
             filled = [cell for cell in cells if cell]
             header = tables[-1][0][1]
-            if len(tables[-1]) == 1 and filled and all(_unit_in(cell) for cell in filled) and len(filled) > 1:
+            if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
                 tables[-1][0] = line, _with_units(header, cells)
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line

@@ -16,6 +16,7 @@ _COMMENT = re.compile(
 )
 _BLOCK = re.compile(
     r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
+    r"|\(\*\s.{0,5000}?\s\*\)"
 )
 _AS_RECORDS = (
     (r"(?<=[\w\"'])[ \t]+(?=\w+=[\"'][^\"'\n]*[\"'][^<>\n]*/>)", ", "),
@@ -53,6 +54,7 @@ _UNPACKED = re.compile(
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _ADDED = r"(?m)\.extend\(|\)\s*\]\s*\*\s*\d|^\s*(\w+)[\[({]\d+[\])}]\s*=\s*\1[\[({]\d+[\])}]\s*(?:;|$)"
 """Links that no call makes: of another list, ``[...] * 2``, ``L(2) = L(1)``."""
+_LISTED = re.compile(r"[\[{(]((?:\s*[\"']\w+[\"']\s*,?){3,9})[\])}]")
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
 
 
@@ -159,7 +161,11 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
     name = found[1] if found else ""
-    in_table = name and _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+    in_table = (
+        name and _matrix(code, group)
+        if is_matrix
+        else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+    )
     if not in_table or not group.inside.strip():
         return
     changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
@@ -209,6 +215,7 @@ def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
         cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
         plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
         if cells and plainly and (toolbox or named[2] == "DH") and _from_lists(code, cells):
+            _check_taken(code, each, cells)
             runs.append(each)
         elif cells and (toolbox or _says_numbers(code, cells)):
             target = re.sub(r"\s", "", named[1] or "")
@@ -254,7 +261,9 @@ def _record(group: CodeGroup) -> dict[str, str]:
 
 
 _BOUND = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)")
-_ELEMENT = re.compile(r"(?:[\w.]+\[[\"']|(?:\w+\.)*)(\w+)(?:[\"']\])?\s*[\[(]\s*(\w+)\s*(?:,[\s\d:]+|\]\s*\[\s*\d+\s*)?[\])]")
+_ELEMENT = re.compile(
+    r"(?:[\w.]+\[[\"']|(?:\w+\.)*)(\w+)(?:[\"']\])?\s*[\[(]\s*(\w+)\s*(?:,[\s\d:]+|\]\s*\[\s*\d+\s*)?[\])]"
+)
 
 
 def _from_lists(code: Code, cells: dict[str, str]) -> bool:
@@ -265,6 +274,23 @@ def _from_lists(code: Code, cells: dict[str, str]) -> bool:
     found = [_ELEMENT.fullmatch(text) for text in texts]
     numbers = {each[2] for each in found if each}
     return bool(used) or (len(numbers) == 1 and all(found) and ("row" in cells or len(found) > 1))
+
+
+_TAKEN = re.compile(r"(?:(?:\w+\.)*(?:deg2rad|radians)\()?([^\W\d][\w.]*(?:\s*[\[(][\w:,\"' ]*[\])])*(?:\.\w+)?)\)?")
+
+
+def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
+    """Refuse a link that works out its numbers, or takes one for another: ``d=-p["a"]``."""
+    lists = _zipped(code)
+    for name, cell in cells.items():
+        if name in ("row", "type", "convention", "theta") or cell.strip("0.") == "":
+            continue
+        taken = _TAKEN.fullmatch(cell)
+        words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
+        own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
+        if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
+            problem = f"'{cell}' is worked out for each link"
+            raise InputError(None, f"line {code.line(call.start)}", problem, "Write a row for each joint")
 
 
 def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
@@ -289,7 +315,9 @@ def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
     counts = dict(re.findall(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$", code.text))
     over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), over)
     numbers = {*re.findall(r"\b\d+\b", re.sub(r"^\s*[01]\s*[:;]|\(0,|,\s*1\)", "", over))}
-    return numbers <= {str(rows)} and not re.search(r"reversed|sorted|[-+]\s*\d", over) and not re.search(r"\bif\b", loop)
+    return (
+        numbers <= {str(rows)} and not re.search(r"reversed|sorted|[-+]\s*\d", over) and not re.search(r"\bif\b", loop)
+    )
 
 
 def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
@@ -320,7 +348,7 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
-        if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
+        if each.bracket != "{" and named and len(found) == 4 and {"theta", "d", "a", "alpha"} == {*map(_place, found)}:
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
@@ -341,7 +369,7 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
-    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in texts):
+    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts):
         return False
     given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
     return any(
@@ -403,10 +431,8 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     if len(given) == 1 and given[0].startswith("["):
         order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
-        if _ELEMENT.fullmatch(" ".join(given)):
-            return {"row": given[0]}
         if len(given) < 4:
-            return None
+            return {"row": given[0]} if _ELEMENT.fullmatch(" ".join(given)) else None
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
         cells |= dict(zip(_ORDERS[low], given))
@@ -538,7 +564,14 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
     )
     used = _columns_in(
-        [*map(",".join, typed), *_UNPACKED.findall(code.text), *_ENUM.findall(code.text), *_indexed(code)], width
+        [
+            *map(",".join, typed),
+            *_UNPACKED.findall(code.text),
+            *_ENUM.findall(code.text),
+            *_LISTED.findall(code.text),
+            *_indexed(code),
+        ],
+        width,
     )
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
         problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
@@ -572,13 +605,16 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     return next(iter(found.values())) if len(found) == 1 else []
 
 
+def _zipped(code: Code) -> dict[str, str]:
+    """The list that each variable of a loop over ``zip`` goes through, as its element."""
+    loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
+    pairs = [zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1]) for names, lists in loops]
+    return {name: f"{one}[i]" for each in pairs for name, one in each}
+
+
 def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
     """The names of a row's parts and what calls give for them, of a variable of ``zip`` its list."""
-    pairs = [
-        zip(re.findall(r"\w+", names), re.findall(r"[\w.]+", lists))
-        for names, lists in re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
-    ]
-    lists = {name: f"{one}[i]" for each in pairs for name, one in each}
+    lists = _zipped(code)
     for each in code.groups:
         call = re.search(r"(\w+)\s*$", each.before)
         if each.bracket != "(" or call is None:
@@ -617,14 +653,14 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$",
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c)?[\"']?$",
             group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
             r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
         )
-        if name is None or rows or (group.bracket == "(" and group.before.rstrip()[-1] != "="):
+        if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
@@ -683,10 +719,12 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
     pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(pattern, re.sub(r"\bDH_?(\d+)_([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I):
+    for each in re.finditer(
+        pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I
+    ):
         found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
     if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
         return  # they may be in a matrix of these symbols
