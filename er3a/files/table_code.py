@@ -417,13 +417,13 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         key, is_named, value = part.partition("=")
         quoted = re.fullmatch(r"""["'](\w*)["']""", part)
         if is_named and re.fullmatch(r"\w+\s*", key):
-            cells[key.strip().lower()] = value.strip(" \"'")
+            cells[_argument(key)] = value.strip(" \"'")
         elif pending:
             cells[pending], pending = part, ""
         elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
         elif quoted and toolbox:
-            pending = quoted[1].lower()
+            pending = _argument(quoted[1])
         elif part:
             given.append(part)
     if toolbox is None:
@@ -439,6 +439,13 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
     elif given or (low == "link" and not cells):
         return None
     return _of_toolbox(low, words, cells)
+
+
+def _argument(key: str) -> str:
+    """The name of an argument, ``α`` and ``link_length`` as that of their quantity; letters mean what they are."""
+    own = heading_of(key)
+    named = own and own.quantity in _OF_LINK and (len(key.strip()) > 1 or not key.isascii())
+    return own.quantity if own and named else key.strip().lower()
 
 
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
@@ -482,18 +489,22 @@ def _is_row(cells: Iterable[str]) -> bool:
 def _records(code: Code) -> list[Grid]:
     """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
     such keys hold lists, these are columns (:func:`_vectors`)."""
-    rows = [(0, {})]
+    tables = [[(0, dict[str, str]())]]
+    level = 0
     for number, line in enumerate(code.text.split("\n"), 1):
-        found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
+        found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
-        key = found[2].lower()
-        if found[1] or key in rows[-1][1] or not found[3]:
-            rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
-        if found[3]:
-            rows[-1][1][key] = found[3].strip(" \"'")
-    full = [row for row in rows if _is_row(row[1])]
-    return [_grid(full)] if len(full) > 1 else []
+        key, rows = found[3].lower(), tables[-1]
+        if len(found[1]) < level and not found[4] and not re.search(r"\d", key):  # the name of another list
+            tables.append([(number, {})])
+        elif found[2] or key in rows[-1][1] or not found[4]:
+            rows.append((number, {"joint": key} if not found[4] and re.search(r"\d", key) else {}))
+            level = len(found[1])
+        if found[4]:
+            rows[-1][1][key] = found[4].strip(" \"'")
+    full = [[row for row in rows if _is_row(row[1])] for rows in tables]
+    return [_grid(rows) for rows in full if len(rows) > 1]
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:

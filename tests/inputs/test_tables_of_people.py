@@ -574,6 +574,7 @@ MATLAB_FIELDS += "dh(2).a = 0.27; dh(2).alpha = 0; dh(2).d = 0; dh(2).offset = -
     "text",
     [
         MATLAB_FIELDS,
+        "L = [DHLink(α=-π/2, d=0.29, link_length=0, offset=0),\nDHLink(a=0.27, α=0, d=0, theta_offset=-π/2)]\n",
         '<arm><joint id="1" a="0" alpha="-90" d="290" offset="0"/>\n'
         '<joint id="2" a="270" alpha="0" d="0" offset="-90"/></arm>\n',
         "Joint 1: a=0, alpha=-90, d=290, offset=0\nJoint 2: a=270, alpha=0, d=0, offset=-90\n",
@@ -604,8 +605,14 @@ def test_rows_are_read_in_further_languages(tmp_path, text):
             "one of them",
         ),
         (
-            "def mdh(a):\n  return [[ct, -st*ca, st*sa, a*ct]]\n# a alpha d theta\nM = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]",
+            "def mdh(a):\n  return [[ct, -st*ca, st*sa, a*ct]]\n# a alpha d theta\n"
+            "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]",
             "standard and modified",
+        ),
+        (
+            "one:\n - a: 0\n   alpha: 0\n   d: 1\n - a: 1\n   alpha: 0\n   d: 0\ntwo:\n - a: 0\n   alpha: 0\n   d: 2\n"
+            " - a: 1\n   alpha: 0\n   d: 0\n",
+            "one of them",
         ),
         ("i,a (m),α,d (m),θ\n1,0,0,0.7,q1\n2,0.3,0,0,0\n3,1,0,0,0\n4,0,0,1,0\n", "may be joints"),
     ],
