@@ -189,8 +189,9 @@ def _matters(slip: Slip, robot: Robot, tolerances: mechanism.Tolerances) -> bool
         return bool(np.abs(wrap_to_pi(meant.offset))[inner].max(initial=0.0) > tolerances.angle)
     if robot.sliding[list(slip.rows)].any() and (slip.code == "rows_exchanged" or slip.columns == ("d",)):
         return slip.amount != 0
-    gaps = [np.abs(getattr(meant, name) - getattr(robot, name)).max() for name in slip.columns]
-    return not slip.columns or max(gaps) > tolerances.length
+    gaps = {name: getattr(meant, name) - getattr(robot, name) for name in slip.columns}
+    turned = (gap if name in ("a", "d") else wrap_to_pi(gap) for name, gap in gaps.items())  # -180 deg is 180 deg
+    return not gaps or max(np.abs(gap).max() for gap in turned) > tolerances.length
 
 
 def _scales(one: Robot, other: Robot) -> Iterator[_Edit]:

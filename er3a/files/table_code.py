@@ -432,7 +432,8 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
-            return {"row": given[0]} if _ELEMENT.fullmatch(" ".join(given)) else None
+            whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
+            return {"row": given[0]} if whole else None
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
         cells |= dict(zip(_ORDERS[low], given))
