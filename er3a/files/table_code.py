@@ -300,10 +300,19 @@ def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
     rows = len(grids[0]) - 1 if grids else 0
     used = [int(found[2]) for each in runs for found in list(_ELEMENT.finditer(each.inside))[-1:] if found[2].isdigit()]
     one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
-    if grids and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
+    given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
+    left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
+    if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
         return
     problem = f"'{' '.join(runs[0].inside.split())[:60]}': links of another program, or of a loop, are added"
     raise InputError(None, f"line {code.line(runs[0].start)}", problem, "Write a row for each joint")
+
+
+def _turns(grid: Grid) -> bool:
+    """Whether a table has angles theta, or offsets, that are not 0."""
+    columns = zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
+    cells = [cell for name, column in columns if heading_of(name) and _place(name) == "theta" for cell in column]
+    return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
 
 
 def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:

@@ -745,6 +745,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         (f"{LISTS}L = [RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-off[i]) for i in range(2)]\n", "worked out"),
         (f"{RECORDS}L = [RevoluteDH(d=p['a'], a=p['d'], alpha=p['alpha']) for p in dh]\n", "worked out"),
         (f"{LINES}L = [RevoluteDH(d=d[i], a=a[i], alpha=pi / 2) for i in range(2)]\n", "worked out"),
+        (f"{RECORDS}L = [RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
         (f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "of a loop"),
         (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
         (
