@@ -100,7 +100,8 @@ def explain(one: Robot, other: Robot, found: mechanism.Match, tolerances: mechan
         order = np.argsort(guesses, kind="stable")
         kept = [tried[k] for k in order[:KEPT]]
         likely = [k for k in order if guesses[k] <= price]
-        for own in (tried[k] for k in likely[:MATCHED]):
+        for k in likely[:MATCHED]:
+            own = tried[k]
             match = mechanism.match(*_mechanisms(one, other, own), tolerances)
             cost = _price(own) + match.cost
             if match.cost and not _is_plain(one, match, found, own):
@@ -189,7 +190,8 @@ def _matters(slip: Slip, robot: Robot, tolerances: mechanism.Tolerances) -> bool
         return bool(np.abs(wrap_to_pi(meant.offset))[inner].max(initial=0.0) > tolerances.angle)
     if robot.sliding[list(slip.rows)].any() and (slip.code == "rows_exchanged" or slip.columns == ("d",)):
         return slip.amount != 0
-    gaps = [np.abs(getattr(meant, name) - getattr(robot, name)).max() for name in slip.columns]
+    # -180 deg is 180 deg; no arm has a length of 2 pi m, which this would miss.
+    gaps = [np.abs(wrap_to_pi(getattr(meant, name) - getattr(robot, name))).max() for name in slip.columns]
     return not slip.columns or max(gaps) > tolerances.length
 
 

@@ -253,7 +253,7 @@ def _headed(grid: Grid, columns: Sequence[str]) -> list[Grid]:
         elif open_one:
             filled = [cell for cell in cells if cell]
             header = tables[-1][0][1]
-            if len(tables[-1]) == 1 and filled and all(_unit_in(cell) for cell in filled) and len(filled) > 1:
+            if len(tables[-1]) == 1 and filled and all(map(_unit_in, filled)) and len(cells) == len(header):
                 tables[-1][0] = line, _with_units(header, cells)
             elif len(filled) < 2 or all("=" in cell for cell in filled):
                 broken = line
@@ -345,7 +345,7 @@ class _Table:
         if "theta_deg" in self.header and not {"type", "offset_deg"} & set(self.header):
             found[self.header.index("theta_deg")] = Heading("theta", "deg", False)
         labels = [k for k, own in found.items() if own.quantity == "joint"]
-        self.headings = {k: own for k, own in found.items() if k not in labels[:-1]}
+        self.headings = {k: own for k, own in found.items() if k not in labels[1:]}
         self.column = {own.quantity: k for k, own in self.headings.items()}
         self._check_headings()
         self.convention = self._stated(Code(text).text if from_code else "", text)
@@ -393,6 +393,9 @@ class _Table:
         library = {each for library, (_, each) in LIBRARIES.items() if each and re.search(library, text)}
         for part in (program, near, text):
             said = library | {name for name, sign in SIGNS.items() if sign.search(part)}
+            if len(said) > 1 and part is not text:
+                remedy = "Leave one of them, or add a column convention"
+                raise InputError(self.path, "convention", "the text says standard and modified D-H", remedy)
             for one in CONVENTIONS if len(said) == 1 else ():
                 if one in said:
                     self.notes.append(f"the text says {one} D-H, and was read so")
@@ -531,6 +534,10 @@ class _Table:
                 problem = f"'{name}' is {_KINDS[said[1].lower()]} by its name, and {kind} by its variable"
                 self._refuse(row, self.column["joint"], problem, "Write the variable into theta or d")
             found.append(kind)
+        still = next((row for row in range(len(found)) if found[row : row + 3] == ["fixed"] * 3), None)
+        if still is not None:
+            remedy = "Write q1, q2, ... where a joint turns, and one row for what is fixed"
+            self._refuse(still, self.column["theta"], "three rows without a variable may be joints", remedy)
         return found
 
     def _of(self, quantity: str) -> list[CellAmount | None]:

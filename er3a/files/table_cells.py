@@ -147,6 +147,7 @@ def line_grids(text: str) -> Iterator[tuple[str, Grid]]:
 
 
 def _edged(line: str, mark: str) -> list[str]:
+    line = line.replace("||", "|") if line.startswith("||") else line
     cells = [without_latex(cell).strip() for cell in re.sub(r"<sub>|</sub>|\*\*|`", "", line).split(mark)]
     framed = not cells[0]  # otherwise an empty cell at the end is one of the table's
     return cells[framed : len(cells) - (framed and not cells[-1])]

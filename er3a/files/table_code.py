@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from er3a.errors import InputError
 from er3a.files.code_brackets import CodeGroup, groups_of, parts
-from er3a.files.straight_code import StraightCode
 from er3a.files.table_cells import Grid
 from er3a.files.table_headings import heading_of, quantities_of
 
@@ -18,7 +16,14 @@ _COMMENT = re.compile(
 )
 _BLOCK = re.compile(
     r"(?ms)^[ \t]*%\{[ \t]*$.{0,5000}?^[ \t]*%\}|\"\"\".{0,5000}?\"\"\"|\'\'\'.{0,5000}?\'\'\'|/\*.{0,5000}?\*/"
+    r"|\(\*\s.{0,5000}?\s\*\)"
 )
+_AS_RECORDS = (
+    (r"(?<=[\w\"'])[ \t]+(?=\w+=[\"'][^\"'\n]*[\"'][^<>\n]*/>)", ", "),
+    (r"<\w+,([^<>\n]*)/>", r"{\1}"),  # attributes in XML
+    (r"(?m)^[^=,;(\[{\n]*:[ \t]*((?:\w+[ \t]*=[ \t]*[^,=(\[{\n]+,[ \t]*){2,8}\w+[ \t]*=[^,=(\[{\n]+)$", r"{\1}"),
+)
+"""Rows of one line each, as records."""
 _STREAMED = re.compile(r"<<([^;<>]{0,5000});")  # into a matrix of Eigen
 _TOOLBOX = re.compile(r"(?:link|(revolute|prismatic)(?:m?dh)?|dhlink)", re.I)
 _FIELD = r"(?:(?:double|float|\w+_t)\s+)?(\w+)\s*(?:;|:\s*(?:float|f32|f64|double)\b)"
@@ -49,8 +54,8 @@ _UNPACKED = re.compile(
 """Names that the parts of a row get, of a name or of each of a list; what a call makes is no row."""
 _ADDED = r"(?m)\.extend\(|\)\s*\]\s*\*\s*\d|^\s*(\w+)[\[({]\d+[\])}]\s*=\s*\1[\[({]\d+[\])}]\s*(?:;|$)"
 """Links that no call makes: of another list, ``[...] * 2``, ``L(2) = L(1)``."""
+_LISTED = re.compile(r"[\[{(]((?:\s*[\"']\w+[\"']\s*,?){3,9})[\])}]")
 _ENUM = re.compile(r"\benum\b[^{;]*\{([^{}=]*)\}")
-_INDEXED = re.compile(r"(?:[\w.]+\[[\"'])?(\w+)(?:[\"']\])?\s*[\[({]\s*([a-z]\w*)\s*[\])},]")
 
 
 class Code:
@@ -71,12 +76,9 @@ class Code:
                 self.comments[text.count("\n", 0, found.start()) + 1] = found[2].strip()
             return found[1] or ""
 
-        self._take(_COMMENT.sub(kept, text))
-        if (written := StraightCode(self.text, _arrays(self)).written_out()) != self.text:
-            self._take(written)
-
-    def _take(self, text: str) -> None:
-        self.text = text
+        self.text = _COMMENT.sub(kept, text)
+        for pattern, plainly in _AS_RECORDS:
+            self.text = re.sub(pattern, plainly, self.text)
         self.fields = {each[1] or each[3]: re.findall(_FIELD, each[0]) for each in _TYPE.finditer(self.text)}
         self.groups = sorted(groups_of(self.text), key=lambda each: each.start)
         self.orders = _signatures(self)
@@ -119,29 +121,6 @@ def _rows(code: Code, group: CodeGroup) -> Grid:
     return grid
 
 
-def _arrays(code: Code) -> dict[str, list[dict[str, str]]]:
-    """The rows of matrices and lists by their names, with the names of cells in records and typed rows; none of what is
-    assigned twice, or in part."""
-    found: dict[str, list[list[dict[str, str]]]] = {}
-    for group in code.groups:
-        name = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)?$", group.before)
-        rows = [cells for _, cells in _rows(code, group)] if name else []
-        if name and len(rows) > 1:
-            fields = next((names for each, names in code.fields.items() if each and each in group.before), [])
-            made = [
-                dict(zip(map(str, range(9)), cells)) | (_pairs(cells) or dict(zip(fields, cells))) for cells in rows
-            ]
-            found.setdefault(name[1], []).append(made)
-    for each, cells, *_ in _named_lists(code):
-        found.setdefault(each, []).append([{"0": cell} for cell in cells or ("",)])
-    flat = code.text
-    while flat != (flat := re.sub(r"\([^()]*\)", "", flat)):
-        pass
-    again = r"(?<![\w.\"'])(?:self\.)?([^\W\d]\w*)[\"']?\s*(?:\[[^\]=]*\]\s*)*(?:[-+*/]?=(?!=)|:(?=\s*[\[{]))"
-    times = Counter(re.findall(again, flat))
-    return {each: same[0] for each, same in found.items() if same.count(same[0]) == len(same) >= times[each]}
-
-
 def _pairs(texts: Iterable[str]) -> dict[str, str]:
     """Values by their keys, of texts such as ``"a": 0`` and ``.a = 0``."""
     pairs = [re.split("[:=]", part, maxsplit=1) for part in texts if re.search("[:=]", part)]
@@ -163,24 +142,18 @@ def code_grids(text: str, *, headed: bool = True) -> list[Grid]:
     matrices = [grid for grid in (*(_matrix(code, each) for each in code.groups), _listed(code)) if grid]
     if not headed:
         return [[(line, row) for line, row in grid if line] for grid in matrices]
-    if links := _calls(code) or _records(code):
+    links, runs = _calls(code)
+    if links := links or _records(code):
+        _check_runs(code, runs, links)
         return links
     named = [grid for grid in matrices if grid[0][1]]
     written = named or _vectors(code)
+    _check_runs(code, runs, written)
     for group in code.groups if written else ():
         _check_kept(code, group, bool(named))
     return written
 
 
-_CHANGED = (
-    r"(?m)(?:^|;)[ \t]*(?:del\s+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop)\(|"
-    r"(?:[\[({][^\n=\])}]*[\])}])+\s*[-+]?=(?!=)(?!\s*(?:\w+\.)*NAME\b[^\n;*/]*[*/])[ \t]*"
-    r"(?:[\[{]|-\s*NAME\b|(?:[^\n;(\[]|\([\w:,+ -]*\)|\[[\w:,+ -]*\])*?(?<![\w.])\d)|"
-    r"[ \t]*=[ \t]*(?:-[ \t]*NAME\b|NAME\.T\b|[^\n]*(?:[\[;,]|append\(|insert\(|delete\()[ \t]*NAME\b|"
-    r"[^\n]*(?:transpose|flip\w*|roll|cumsum)\([ \t]*(?:NAME\b|[\[(]))))"
-)
-"""Statements that change what NAME was written as; joints' values, which have no numbers, and factors of units may be
-put into it."""
 _CONSTANT = {"a", "alpha", "d", "offset"}
 
 
@@ -188,25 +161,63 @@ def _check_kept(code: Code, group: CodeGroup, is_matrix: bool) -> None:
     """Refuse a matrix, or the list of a column, that its program changes."""
     found = re.search(r"([^\W\d]\w*)(?:\[\w*\])*\s*=\s*(?:[\w.]+\(\s*)*$", group.before)
     name = found[1] if found else ""
-    in_table = _matrix(code, group) if is_matrix else _CONSTANT.intersection(quantities_of(name.split("_")))
-    if name and in_table and (changed := re.search(_CHANGED.replace("NAME", name), code.text)):
-        problem = f"'{changed[0].strip(' ;')[:60]}' changes '{name}'"
-        raise InputError(None, f"line {code.line(changed.end())}", problem, "Write what the program makes of it")
+    in_table = (
+        name and _matrix(code, group)
+        if is_matrix
+        else _CONSTANT.intersection(quantities_of([name, name.rpartition("_")[2]]))
+    )
+    if not in_table or not group.inside.strip():
+        return
+    changes = [found for found in re.finditer(_SET.replace("NAME", name), code.text) if _puts_in(found, name)]
+    for change in [*_MOVED.finditer(group.before), *changes]:
+        problem = f"'{change[0].strip(' ;')[:60]}' changes '{name}'"
+        line = code.line(change.end() if change in changes else group.start)
+        raise InputError(None, f"line {line}", problem, "Write what the program makes of it")
+
+
+def _puts_in(found: re.Match[str], name: str) -> bool:
+    """Whether a statement changes a list: values of joints, which have no numbers, may be put into it, and it may be
+    converted as a whole, ``DH = np.radians(DH)``."""
+    place, given = found.groups()
+    value = re.sub(r"[\[(][\w:, +-]*[\])]", "", given or "")  # without indices
+    if place:
+        return bool(re.search(r"[-\d\[{]", value))
+    own = re.search(rf"(?<![\w.])(?:self\.)?{name}\b", value)
+    return given is None or bool(own and not _CONVERTED.match(given))
+
+
+_SET = (
+    r"(?m)(?:^|;)[ \t]*(?:del[ \t]+NAME\b|(?:self\.)?NAME(?:\.(?:append|insert|extend|pop|reverse)\(|"
+    r"[ \t]*((?:[\[({][^\n=\])}]*[\])}])*)[ \t]*[-+*/]?=(?!=)([^\n;]*)))"
+)
+"""A statement that puts something into a list, or gives its name to something else."""
+_CONVERTED = re.compile(r"\s*(?:\w+\.)*(?:deg2rad|radians|\w*array|matrix|float|sym|double)\(", re.I)
+_MOVED = re.compile(r"\S*(?:transpose|flip\w*|roll|cumsum)\(\s*$", re.I)
 
 
 # Calls and records ----------------------------------------------------------------------------------------------------
 
 
-def _calls(code: Code) -> list[Grid]:
-    """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row."""
-    rows, unread = list[_Link](), list[CodeGroup]()
+def _calls(code: Code) -> tuple[list[Grid], list[CodeGroup]]:
+    """Links made by a function of a toolbox, or by any whose arguments have the names of a D-H row, and records
+    ``{"a": 0, "alpha": 90, ...}``; then the calls of a toolbox that take a link from lists."""
+    rows, unread, runs = list[_Link](), list[CodeGroup](), list[CodeGroup]()
+    records = 0
     for each in code.groups:
+        if each.bracket == "{" and _is_row(cells := _record(each)):
+            rows.append(_Link(code.line(each.start), "", each.start, cells))
+            records += 1
+            continue
         named = re.search(r"(?:([\w.()\[\]{}]+)\s*=\s*)?(?:[\w.]*\.)?([A-Za-z_]\w*)\s*$", each.before)
         if each.bracket != "(" or named is None:
             continue
         order, toolbox = code.orders.get(named[2], []), _TOOLBOX.fullmatch(named[2])
         cells = _arguments(named[2], each.inside) or _of_signature(order, each.inside)
-        if cells and (toolbox or _says_numbers(code, cells)):
+        plainly = not {"direction", "prismatic"} & {*cells, *cells.values()}
+        if cells and plainly and (toolbox or named[2] == "DH") and _from_lists(code, cells):
+            _check_taken(code, each, cells)
+            runs.append(each)
+        elif cells and (toolbox or _says_numbers(code, cells)):
             target = re.sub(r"\s", "", named[1] or "")
             if target.isidentifier() and "type" not in cells:
                 target = ""
@@ -219,15 +230,15 @@ def _calls(code: Code) -> list[Grid]:
         elif not cells and toolbox and not (order or re.fullmatch(r"\s*\w*\s*", each.inside)):  # no list of links
             unread.append(each)
     if "Frame::DH(" in code.text:
-        _segments(code, rows)
+        _segments(code, rows, runs)
     if unread and (rows or re.search(r"(?i)\blink\(\[", code.text)):
         problem = f"'{' '.join(unread[0].inside.split())[:60]}' can't be read as a link"
         remedy = "Write its numbers there, or the matrix that they come from above it"
         raise InputError(None, f"line {code.line(unread[0].start)}", problem, remedy)
     _assigned(code, rows)
     texts = [cell for row in rows for cell in _constants(row.cells)]
-    looped = re.search(r"\bfor\b", code.text) and (len(rows) == 1 or any(map(_INDEXED.search, texts)))
-    if rows and (re.search(_ADDED, code.text) or looped):
+    looped = re.search(r"\bfor\b", code.text) and len(rows) == 1
+    if len(rows) > records and (re.search(_ADDED, code.text) or looped or runs):
         problem = f"'{', '.join(texts)[:60]}': links of another program, or of a loop, are added"
         raise InputError(None, f"line {rows[0].line}", problem, "Write a row for each joint")
     names = {row.name: row for row in rows}
@@ -236,10 +247,89 @@ def _calls(code: Code) -> list[Grid]:
     held = [[row for row in rows if each.start < row.place < each.end] for each in code.groups if each.bracket in "[{"]
     held = [each for each in held if len(each) > 1]
     held = arms or [each for one in held or [rows] for each in _begun_again(one)]
-    return [_grid([(row.line, row.cells) for row in each]) for each in held]
+    return [_grid([(row.line, row.cells) for row in each]) for each in held if each], runs
 
 
-def _segments(code: Code, rows: list[_Link]) -> None:
+def _record(group: CodeGroup) -> dict[str, str]:
+    """A record's cells, with the number that its own key has; none of a type."""
+    if re.search(r"\b(?:struct|class|interface|type)\s+\w[^;={}]*$", group.before):
+        return {}
+    label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", group.before)
+    pairs = _pairs(parts(group.inside)).items()
+    cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
+    return ({"joint": label[1]} if label else {}) | cells
+
+
+_BOUND = re.compile(r"\bfor\b\s*\(?\s*(?:\w+\s+)*?([\w, ()]+?)\s*(?:\bin\b|=|:)")
+_ELEMENT = re.compile(
+    r"(?:[\w.]+\[[\"']|(?:\w+\.)*)(\w+)(?:[\"']\])?\s*[\[(]\s*(\w+)\s*(?:,[\s\d:]+|\]\s*\[\s*\d+\s*)?[\])]"
+)
+
+
+def _from_lists(code: Code, cells: dict[str, str]) -> bool:
+    """Whether a link takes its numbers from lists: by the variable of a loop, or all by one number."""
+    bound = " ".join([*_BOUND.findall(code.text), *_UNPACKED.findall(code.text)])
+    texts = [cell for cell in _constants(cells) if not re.fullmatch(r"[-+.\d]*", cell)]
+    used = {*re.findall(r"[^\W\d]\w*", " ".join(texts))} & {*re.findall(r"[^\W\d]\w*", bound)}
+    found = [_ELEMENT.fullmatch(text) for text in texts]
+    numbers = {each[2] for each in found if each}
+    return bool(used) or (len(numbers) == 1 and all(found) and ("row" in cells or len(found) > 1))
+
+
+_TAKEN = re.compile(r"(?:(?:\w+\.)*(?:deg2rad|radians)\()?([^\W\d][\w.]*(?:\s*[\[(][\w:,\"' ]*[\])])*(?:\.\w+)?)\)?")
+
+
+def _check_taken(code: Code, call: CodeGroup, cells: dict[str, str]) -> None:
+    """Refuse a link that works out its numbers, or takes one for another: ``d=-p["a"]``."""
+    lists = _zipped(code)
+    for name, cell in cells.items():
+        if name in ("row", "type", "convention", "theta") or cell.strip("0.") == "":
+            continue
+        taken = _TAKEN.fullmatch(cell)
+        words = re.findall(r"[^\W\d]\w*", taken[1]) if taken else [""]
+        own = taken and (_ELEMENT.fullmatch(taken[1]) or words[-1] in lists)
+        if not own and [_place(each) for each in words[-1:] if heading_of(each)] != [_place(name)]:
+            problem = f"'{cell}' is worked out for each link"
+            raise InputError(None, f"line {code.line(call.start)}", problem, "Write a row for each joint")
+
+
+def _check_runs(code: Code, runs: list[CodeGroup], grids: list[Grid]) -> None:
+    """Refuse links from lists unless a loop, or one call after the other, goes through all rows of the one table."""
+    if not runs or len(grids) > 1:
+        return
+    rows = len(grids[0]) - 1 if grids else 0
+    used = [int(found[2]) for each in runs for found in list(_ELEMENT.finditer(each.inside))[-1:] if found[2].isdigit()]
+    one_by_one = used in (list(range(rows)), list(range(1, rows + 1))) and len(runs) == rows
+    given = {name for name, part in _given_to(code, toolbox=True) if part != "0"}
+    left_out = not given & {"offset", "theta", "row"} and any(map(_turns, grids))  # offsets that no link takes
+    if grids and not left_out and (one_by_one or (len(runs) == 1 and _goes_through(code, runs[0], rows))):
+        return
+    problem = f"'{' '.join(runs[0].inside.split())[:60]}': links of another program, or of a loop, are added"
+    raise InputError(None, f"line {code.line(runs[0].start)}", problem, "Write a row for each joint")
+
+
+def _turns(grid: Grid) -> bool:
+    """Whether a table has angles theta, or offsets, that are not 0."""
+    columns = zip(grid[0][1], zip(*(cells for _, cells in grid[1:])))
+    cells = [cell for name, column in columns if heading_of(name) and _place(name) == "theta" for cell in column]
+    return bool(re.search(r"[1-9]|pi|π", " ".join(cells), re.I))
+
+
+def _goes_through(code: Code, call: CodeGroup, rows: int) -> bool:
+    """Whether the loop of a call goes through all rows, as far as it says, without a branch."""
+    around = [each for each in code.groups if each.bracket == "[" and each.start < call.start < call.end < each.end]
+    built = [re.search(r"\bfor\b.*", code.text[call.end : each.end], re.S) for each in around]
+    loop = next((each[0] for each in built if each), "") or re.split(r"\bfor\b", code.text[: call.start])[-1]
+    over = re.split(r"\bin\b|=|:", loop.split("\n")[0], maxsplit=1)[-1]
+    counts = dict(re.findall(r"(?m)^(?:[ \t]*\w+)?[ \t]*\b(\w+)[ \t]*=[ \t]*(\d+)[ \t]*;?[ \t]*$", code.text))
+    over = re.sub(r"[^\W\d]\w*", lambda found: counts.get(found[0], found[0]), over)
+    numbers = {*re.findall(r"\b\d+\b", re.sub(r"^\s*[01]\s*[:;]|\(0,|,\s*1\)", "", over))}
+    return (
+        numbers <= {str(rows)} and not re.search(r"reversed|sorted|[-+]\s*\d", over) and not re.search(r"\bif\b", loop)
+    )
+
+
+def _segments(code: Code, rows: list[_Link], runs: list[CodeGroup]) -> None:
     """Say what moves in KDL's ``Segment(Joint(Joint::RotZ), Frame::DH(a, alpha, d, theta))``: its joint comes first."""
     joints = dict(re.findall(r"\bJoint\s+(\w+)\s*[({=]([^;\n]*)", code.text))
     for each in code.groups:
@@ -247,6 +337,8 @@ def _segments(code: Code, rows: list[_Link]) -> None:
             said = " ".join(joints.get(part, part) for part in parts(each.inside))
             row = next((row for row in rows if each.start < row.place < each.end), None)
             kinds = [kind for kind in _KDL if re.search(rf"\b{kind}\b", said)]
+            if kinds == ["RotZ"] and any(each.start < run.start < each.end for run in runs):
+                continue
             if row is None or len(kinds) != 1:
                 problem = f"the segment '{' '.join(each.inside.split())[:60]}' is no row of a table"
                 remedy = "Write its joint, RotZ, TransZ or None, and Frame::DH into its call, or leave it out"
@@ -265,7 +357,7 @@ def _signatures(code: Code) -> dict[str, list[str]]:
     for each in code.groups:
         named, names = re.search(r"(\w+)(?:[\"'],)?\s*$", each.before), _parameters(each.inside)
         found = quantities_of(names)
-        if each.bracket != "{" and named and {"theta", "d", "a", "alpha"} == {*found[:4]} and len(found) == 4:
+        if each.bracket != "{" and named and len(found) == 4 and {"theta", "d", "a", "alpha"} == {*map(_place, found)}:
             made = re.findall(r"class\s+(\w+)", code.text[: each.start]) if named[1] == "__init__" else [named[1]]
             orders.setdefault(made[-1] if made else "", names)
     return {name: names for name, names in code.fields.items() if _names_columns(names)} | orders
@@ -286,7 +378,7 @@ def _of_signature(order: list[str], text: str) -> dict[str, str]:
 def _says_numbers(code: Code, cells: dict[str, str]) -> bool:
     """Whether a row holds numbers or names of numbers, and no elements of lists."""
     texts = _constants(cells)
-    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)", cell) for cell in texts):
+    if any(re.search(r"\[|\w\(\w+\s*,\s*\d+\)|\bc\(", cell) for cell in texts):
         return False
     given = r"(?m)^\s*{}\s*=[^\[{{\n]+$"
     return any(
@@ -334,13 +426,13 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         key, is_named, value = part.partition("=")
         quoted = re.fullmatch(r"""["'](\w*)["']""", part)
         if is_named and re.fullmatch(r"\w+\s*", key):
-            cells[key.strip().lower()] = value.strip(" \"'")
+            cells[_argument(key)] = value.strip(" \"'")
         elif pending:
             cells[pending], pending = part, ""
         elif quoted and _FLAGS.fullmatch(quoted[1]):
             words.append(quoted[1].lower())
         elif quoted and toolbox:
-            pending = quoted[1].lower()
+            pending = _argument(quoted[1])
         elif part:
             given.append(part)
     if toolbox is None:
@@ -349,13 +441,21 @@ def _arguments(function: str, text: str) -> dict[str, str] | None:
         order = ("alpha", "a", "theta", "d", "sigma") if function == "link" else _OF_LINK
         given = row_cells(given[0][1:-1])
         if len(given) < 4:
-            return None
+            whole = given and _ELEMENT.fullmatch(given[0]) and not "".join(given[1:]).strip("0.")
+            return {"row": given[0]} if whole else None
         cells |= dict(zip(order, given))
     elif low in _ORDERS and len(given) <= len(_ORDERS[low]):
         cells |= dict(zip(_ORDERS[low], given))
     elif given or (low == "link" and not cells):
         return None
     return _of_toolbox(low, words, cells)
+
+
+def _argument(key: str) -> str:
+    """The name of an argument, ``α`` and ``link_length`` as that of their quantity; letters mean what they are."""
+    own = heading_of(key)
+    named = own and own.quantity in _OF_LINK and (len(key.strip()) > 1 or not key.isascii())
+    return own.quantity if own and named else key.strip().lower()
 
 
 _FLAGS = re.compile("modified|mod|mdh|standard|std|stddh|moddh|revolute|prismatic|flip|sym", re.I)
@@ -397,29 +497,24 @@ def _is_row(cells: Iterable[str]) -> bool:
 
 
 def _records(code: Code) -> list[Grid]:
-    """Rows as ``{"a": 0, "alpha": 90, ...}``, or as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a
-    name or a key that is repeated; if such keys hold lists, these are columns (:func:`_vectors`)."""
-    rows = list[tuple[int, dict[str, str]]]()
-    for each in code.groups:
-        if each.bracket == "{":
-            label = re.search(r"""["']?([\w ]*\d[\w ]*)["']?\s*:\s*$""", each.before)
-            pairs = _pairs(parts(each.inside)).items()
-            cells = {key: value for key, value in pairs if not re.match(r"[(\[].*,", value)}  # no colour, no column
-            rows.append((code.line(each.start), ({"joint": label[1]} if label else {}) | cells))
-    if full := [row for row in rows if _is_row(row[1])]:
-        return [_grid(full)]
-    rows = [(0, {})]
+    """Rows as lines ``a: 0``, ``alpha: 90``, ... of YAML, each begun by a dash, a name or a key that is repeated; if
+    such keys hold lists, these are columns (:func:`_vectors`)."""
+    tables = [[(0, dict[str, str]())]]
+    level = 0
     for number, line in enumerate(code.text.split("\n"), 1):
-        found = re.fullmatch(r"\s*(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
+        found = re.fullmatch(r"(\s*)(-\s+)?[\"']?([\w ]+?)[\"']?\s*(?::|=(?=\s*[-+.\d]))\s*([^\[{;]*)", line)
         if found is None:
             continue
-        key = found[2].lower()
-        if found[1] or key in rows[-1][1] or not found[3]:
-            rows.append((number, {"joint": key} if not found[3] and re.search(r"\d", key) else {}))
-        if found[3]:
-            rows[-1][1][key] = found[3].strip(" \"'")
-    full = [row for row in rows if _is_row(row[1])]
-    return [_grid(full)] if len(full) > 1 else []
+        key, rows = found[3].lower(), tables[-1]
+        if len(found[1]) < level and not found[4] and not re.search(r"\d", key):  # the name of another list
+            tables.append([(number, {})])
+        elif found[2] or key in rows[-1][1] or not found[4]:
+            rows.append((number, {"joint": key} if not found[4] and re.search(r"\d", key) else {}))
+            level = len(found[1])
+        if found[4]:
+            rows[-1][1][key] = found[4].strip(" \"'")
+    full = [[row for row in rows if _is_row(row[1])] for rows in tables]
+    return [_grid(rows) for rows in full if len(rows) > 1]
 
 
 def _grid(rows: list[tuple[int, dict[str, str]]]) -> Grid:
@@ -490,7 +585,14 @@ def _order(code: Code, rows: Grid, before: str) -> list[str]:
         (names for k in lines if (names := _columns_in([code.comments.get(k) or code.docs.get(k, "")], width))), []
     )
     used = _columns_in(
-        [*map(",".join, typed), *_UNPACKED.findall(code.text), *_ENUM.findall(code.text), *_indexed(code)], width
+        [
+            *map(",".join, typed),
+            *_UNPACKED.findall(code.text),
+            *_ENUM.findall(code.text),
+            *_LISTED.findall(code.text),
+            *_indexed(code),
+        ],
+        width,
     )
     if near and used and [*map(_place, near)] != [*map(_place, used)]:
         problem = f"a comment says {', '.join(near)}, and the program {', '.join(used)}"
@@ -524,12 +626,31 @@ def _columns_in(texts: Iterable[str], width: int) -> list[str]:
     return next(iter(found.values())) if len(found) == 1 else []
 
 
+def _zipped(code: Code) -> dict[str, str]:
+    """The list that each variable of a loop over ``zip`` goes through, as its element."""
+    loops = re.findall(r"\bfor\s+([\w, ()]+?)\s+in\s+(?:enumerate\()?zip\(([\w., ]+)\)", code.text)
+    pairs = [zip(re.findall(r"\w+", names)[::-1], re.findall(r"[\w.]+", lists)[::-1]) for names, lists in loops]
+    return {name: f"{one}[i]" for each in pairs for name, one in each}
+
+
+def _given_to(code: Code, *, toolbox: bool = False) -> Iterator[tuple[str, str]]:
+    """The names of a row's parts and what calls give for them, of a variable of ``zip`` its list."""
+    lists = _zipped(code)
+    for each in code.groups:
+        call = re.search(r"(\w+)\s*$", each.before)
+        if each.bracket != "(" or call is None:
+            continue
+        order = [] if toolbox and call[1] != "DH" else code.orders.get(call[1], [])
+        link = (_arguments(call[1], each.inside) or {}) if _TOOLBOX.fullmatch(call[1]) else {}
+        for name, part in (*link.items(), *zip(order, parts(each.inside))):
+            yield name, lists.get(part, part)
+
+
 def _indexed(code: Code) -> Iterator[str]:
     """Names of a row's parts in the order of their numbers: ``a = row[0]``, ``T = dh(row[0], row[1], ...)``."""
-    calls = [(re.search(r"(\w+)\s*$", each.before), parts(each.inside)) for each in code.groups if each.bracket == "("]
-    made = [
-        f"{name}={part}" for call, given in calls if call for name, part in zip(code.orders.get(call[1], ()), given)
-    ]
+    made = [f"{name}={part}" for name, part in _given_to(code)]
+    if any(name == "row" for name, _ in _given_to(code)):
+        yield from (",".join(_OF_LINK[:width]) for width in (4, 5, 6))
     found: dict[str, dict[int, str]] = {}
     pattern = r"(\w+)\s*=\s*(?:[\w\[\]().]+\s*\+\s*)?([\w.]+)[\[(](?:[\w:]+\s*(?:,|\]\s*\[)\s*)?(\d+)[\])](?!\s*-)"
     for name, row, number in re.findall(pattern, "\n".join([code.text, *made])):
@@ -553,13 +674,14 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """The name and the cells of each list, multiplied by what is written after it, its line, and ``:`` or ``=``."""
     for group in code.groups:
         name = re.search(
-            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*)?[\"']?$", group.before
+            r"([A-Za-zα-ωΑ-Ω]\w*)[\"']?(?:\[\d*\])?\s*(?::[^=:\n\"'\d]*(?==))?([=:])\s*(?:[\w.]+\(\s*|np\.r_\s*|c)?[\"']?$",
+            group.before,
         )
         inside = re.sub(r"(?<!\w)\[([^,;\n]+?)\](?=\s*(?:[,\n]|$))", r"\1", group.inside)  # a column [[0], [1]]
         rows = re.search(
             r"[\[{:%]|[^\s;,][, ]+[^\s;,][^;]*;|\bfor\b|(?<!a)(?:cos|sin)\(", re.sub(r"\w\[[^\[\]]*\]", "q", inside)
         )
-        if group.bracket == "(" or name is None or rows:
+        if name is None or rows or (group.bracket == "(" and not re.search(r"=\s*c?$", group.before)):
             continue
         after = re.match(r"[)\s]*'?\s*([*/][^;,\n]+)?", code.text[group.end + 1 :])
         cells = row_cells(inside.replace(";", ",").replace("\n", " "))
@@ -569,15 +691,19 @@ def _named_lists(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
 
 def _vectors(code: Code) -> list[Grid]:
     """Columns as lists: ``a = [0, 0.27, ...]``, or ``"a": [0, 0.27, ...]``, whose theta is the table's and no pose."""
-    return _of_lists(_named_lists(code)) or _of_lists(_numbered(code))
+    found = ((name, _ELEMENT.fullmatch(part)) for name, part in _given_to(code, toolbox=True) if name in _OF_LINK[1:])
+    taken = {element[1]: name for name, element in found if element}
+    return _of_lists(_named_lists(code), taken) or _of_lists(_numbered(code), {})
 
 
-def _of_lists(lists: Iterable[tuple[str, list[str], int, str]]) -> list[Grid]:
+def _of_lists(lists: Iterable[tuple[str, list[str], int, str]], taken: dict[str, str]) -> list[Grid]:
+    """The columns of a table by the names of their lists, or as links take them."""
     named: dict[str, list[str]] = {}
     header, line, places = dict[str, str](), 0, dict[str, tuple[int, str]]()
     for name, cells, line, mark in sorted(lists, key=lambda each: each[0] in "Ll"):
         bare = re.sub(r"^t\d?$", "theta", re.sub(r"(?<=.)(?:_?[Ll]ist|_?[Vv]ec(?:tor)?|s)$", "", name))
-        heading = next(filter(None, map(heading_of, (name, bare, *reversed(name.split("_"))))), None)
+        names = (taken.get(name, "-"),) if taken else (name, bare, name.rpartition("_")[2])
+        heading = next(filter(None, map(heading_of, names)), None)
         if heading and heading.quantity == "theta" and re.match(r"[qQ]_?[a-zA-Z]", name):
             continue  # values of joints, or their limits
         quantity = heading.quantity if heading else name
@@ -614,10 +740,12 @@ _OF_VECTORS = "a", "alpha", "d", "theta", "offset", "type", "direction", "pose"
 def _numbered(code: Code) -> Iterator[tuple[str, list[str], int, str]]:
     """Lists of entries by name and number: ``alpha0: 0, a0: 0, d1: 0.75, q1: q1``, as in SymPy's substitutions,
     or ``DH_0_ALPHA = 90``, whose theta is the table's."""
-    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:theta|q)_offset)_?(\d{1,2})\s*([:=])"
+    name = r"(?<![\"'\w])(?:DH_)?(alpha|theta|th|a|r|d|q|(?:(?:theta|q)_)?offset)_?(\d{1,2})\s*([:=])"
     pattern = rf"{name}(?!=)\s*(?!(?:\w+\.)?symbols?\()([^,}}\n;:=!\s][^,}}\n;:=!]*)"
     found: dict[str, dict[int, re.Match[str]]] = {}
-    for each in re.finditer(pattern, re.sub(r"\bDH_?(\d+)_([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I):
+    for each in re.finditer(
+        pattern, re.sub(r"(?i)\bDH[_(\[]*(\d+)(?:_|[)\]]\.)([A-Za-z]+)\s*=", r"\2\1:", code.text), re.I
+    ):
         found.setdefault(each[1].lower(), {}).setdefault(int(each[2]), each)
     if not {*quantities_of(found)} >= {"alpha", "a", "d"} or (len(found) == 3 and "DH_A" not in code.text):
         return  # they may be in a matrix of these symbols

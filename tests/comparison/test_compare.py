@@ -100,6 +100,17 @@ def test_wrong_entries_beside_axes_that_are_or_nearly_are_parallel_are_named(kin
     assert er3a.compare(found.corrected, other).verdict == "equal"
 
 
+@pytest.mark.long
+def test_a_twist_of_a_half_turn_has_no_sign():
+    random = np.random.default_rng([20261123, KINDS.index("parallel"), 26])
+    arm = random_arm(random, "parallel")
+    defined_elsewhere(random, arm)
+    other, wrong = with_wrong_entries(random, arm)
+    found = er3a.compare(robot(arm), robot(other))
+    assert sorted(each.entry for each in found.geometry.differences) == sorted(map(name, wrong.entries))
+    assert er3a.compare(found.corrected, robot(other)).verdict == "equal"
+
+
 def article() -> er3a.Robot:
     return er3a.load_robot("er3a_c60_article")
 

@@ -566,6 +566,62 @@ def test_programs_say_the_order_of_columns_and_the_convention(tmp_path, text, co
     assert content.dh.convention == convention
 
 
+MATLAB_FIELDS = "dh(1).a = 0; dh(1).alpha = -pi/2; dh(1).d = 0.29; dh(1).offset = 0;\n"
+MATLAB_FIELDS += "dh(2).a = 0.27; dh(2).alpha = 0; dh(2).d = 0; dh(2).offset = -pi/2;\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        MATLAB_FIELDS,
+        "L = [DHLink(α=-π/2, d=0.29, link_length=0, offset=0),\nDHLink(a=0.27, α=0, d=0, theta_offset=-π/2)]\n",
+        '<arm><joint id="1" a="0" alpha="-90" d="290" offset="0"/>\n'
+        '<joint id="2" a="270" alpha="0" d="0" offset="-90"/></arm>\n',
+        "Joint 1: a=0, alpha=-90, d=290, offset=0\nJoint 2: a=270, alpha=0, d=0, offset=-90\n",
+        "dh <- data.frame(\n a = c(0, 270),\n alpha = c(-90, 0),\n d = c(290, 0),\n offset = c(0, -90))\n",
+        '{"columns": ["a", "alpha", "d", "offset"], "dh": [[0, -90, 290, 0], [270, 0, 0, -90]]}',
+        "A_D: tuple[float, ...] = (0.29, 0)\nA_A: tuple[float, ...] = (0, 0.27)\n"
+        "A_ALPHA: tuple[float, ...] = (-math.pi / 2, 0)\nA_OFFSET = (0, -math.pi / 2)\n",
+        "||Joint||a [mm]||α [°]||d [mm]||θ offset [°]||\n|1|0|-90|290|0|\n|2|270|0|0|-90|\n",
+        "| Link | Frame | a (mm) | α (°) | d (mm) | θ (°) |\n|---|---|---|---|---|---|\n"
+        "| 1 | base to J1 | 0 | -90 | 290 | q1 |\n| 2 | J1 to J2 | 270 | 0 | 0 | q2-90 |\n",
+        "struct Row { a: f64, alpha: f64, d: f64, offset: f64 }\nconst ARM: [Row; 2] = [\n"
+        " Row { a: 0.0, alpha: -FRAC_PI_2, d: 0.29, offset: 0.0 },\n"
+        " Row { a: 0.27, alpha: 0.0, d: 0.0, offset: -FRAC_PI_2 },\n];\n",
+        "(* {a, alpha, d, theta} *)\ndh = {{0, -Pi/2, 290, q1}, {270, 0, 0, q2 - Pi/2}};\n",
+    ],
+)
+def test_rows_are_read_in_further_languages(tmp_path, text):
+    content, _ = read(tmp_path, text)
+    np.testing.assert_allclose(numbers(content), IRB120[:2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (
+            "arms = {'one': [{'a': 0, 'alpha': 0, 'd': 1}, {'a': 1, 'alpha': 0, 'd': 0}],\n"
+            "'two': [{'a': 0, 'alpha': 0, 'd': 2}, {'a': 1, 'alpha': 0, 'd': 0}]}",
+            "one of them",
+        ),
+        (
+            "def mdh(a):\n  return [[ct, -st*ca, st*sa, a*ct]]\n# a alpha d theta\n"
+            "M = [[0, 0, 0.3, 0], [0.2, 0, 0, 0]]",
+            "standard and modified",
+        ),
+        (
+            "one:\n - a: 0\n   alpha: 0\n   d: 1\n - a: 1\n   alpha: 0\n   d: 0\ntwo:\n - a: 0\n   alpha: 0\n   d: 2\n"
+            " - a: 1\n   alpha: 0\n   d: 0\n",
+            "one of them",
+        ),
+        ("i,a (m),α,d (m),θ\n1,0,0,0.7,q1\n2,0.3,0,0,0\n3,1,0,0,0\n4,0,0,1,0\n", "may be joints"),
+    ],
+)
+def test_two_arms_two_conventions_and_joints_left_at_zero_are_asked_back(tmp_path, text, names):
+    with pytest.raises(InputError, match=names):
+        read(tmp_path, text)
+
+
 def test_links_are_in_the_order_of_their_arm(tmp_path):
     made = [f"K{j} = Link('d', 0, 'a', {j / 10}, 'alpha', 0);" for j in (3, 1, 9, 2)]
     content, _ = read(tmp_path, "\n".join([*made, "r = SerialLink([K1 K2 K3], 'name', 'x');"]))
@@ -623,8 +679,8 @@ IN_MATLAB = "DH = [0 0.29 0 -pi/2 0 0;\n 0 0 0.27 0 0 -pi/2];\n"
         f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3], offset=r[0]) for i, r in enumerate(DH)]\n",
         f"{IN_MATLAB}for i = 1:size(DH, 1)\n  L(end+1) = Link([DH(i,:)], 'standard');\nend\n",
         f"{IN_MATLAB}L(1) = Link([DH(1,:)]);\nL(2) = Link([DH(2,:)]);\n",
-        f"{IN_MATLAB}N = 2;\nfor k = 1:N\n  L(k) = Link('d', DH(k,2), 'a', DH(k,3), 'alpha', DH(k,4), 'offset', "
-        "DH(k,6));\nend\n",
+        f"{IN_MATLAB}N = 2;\nfor k = 1:N\n  L(k) = Link([DH(k,:)]);\nend\n",
+        f"{LISTS}L = [RevoluteDH(d=x, a=y, alpha=alpha[i], offset=off[i]) for i, (x, y) in enumerate(zip(d, a))]\n",
         "double a[2] = {0, 0.27}, b = 1;\ndouble al[2] = {-M_PI_2, 0};\ndouble d[2] = {0.29, 0};\n"
         "double th[2] = {0, -M_PI_2};\nfor (int i = 0; i < 2; i++) {\n"
         "  c.addSegment(Segment(Joint(Joint::RotZ), Frame::DH(a[i], al[i], d[i], th[i])));\n}\n",
@@ -646,14 +702,13 @@ def test_loops_over_the_rows_of_a_table_are_written_out(tmp_path, text):
     "put_in",
     [
         "DH(:,1) = DH(:,1) + q_deg(:);",
-        "DH(:,4) = DH(:,4)*180/pi;",
         "DH(i,1) = q(i);",
         "DH(:,1) = theta';",
         "H(1,4) = 1;",
         "x_d = [0 1]; x_d(1) = 0.5;",
     ],
 )
-def test_values_of_joints_and_factors_of_units_may_be_put_into_a_matrix(tmp_path, put_in):
+def test_values_of_joints_may_be_put_into_a_matrix(tmp_path, put_in):
     content, _ = read(tmp_path, f"% theta d a alpha sigma offset\n{IN_MATLAB}{put_in}\n")
     assert len(content.dh.rows) == 2
 
@@ -687,6 +742,10 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
         (f"{LINES}L = [{LINK} for i in reversed(range(2))]\n", "of a loop"),
         (f"{LINES}L = []\nfor i in range(2):\n    if i:\n        L.append({LINK})\n", "of a loop"),
         (f"{LINES}L = []\n{2 * f'for i in range(2):{chr(10)}    L.append({LINK}){chr(10)}'}", "of a loop"),
+        (f"{LISTS}L = [RevoluteDH(d=d[i], a=a[i], alpha=alpha[i], offset=-off[i]) for i in range(2)]\n", "worked out"),
+        (f"{RECORDS}L = [RevoluteDH(d=p['a'], a=p['d'], alpha=p['alpha']) for p in dh]\n", "worked out"),
+        (f"{LINES}L = [RevoluteDH(d=d[i], a=a[i], alpha=pi / 2) for i in range(2)]\n", "worked out"),
+        (f"{RECORDS}L = [RevoluteDH(d=p['d'], a=p['a'], alpha=p['alpha']) for p in dh]\n", "of a loop"),
         (f"{MATRIX}DH[1][2] = 0.5\nL = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH]\n", "of a loop"),
         (f"{MATRIX}L = [RevoluteDH(d=r[1], a=r[2], alpha=r[3]) for r in DH[:1]]\n", "of a loop"),
         (
@@ -694,7 +753,7 @@ LINK = "RevoluteDH(d=d[i], a=a[i], alpha=alpha[i])"
             "L.append(RevoluteDH(d=DH[1][1], a=DH[1][2], alpha=DH[1][3]))\n",
             "of a loop",
         ),
-        (f"{IN_MATLAB}DH(:,4) = DH(:,4)*pi/180;\nfor i=1:2\nL(i) = Link([DH(i,:)]);\nend\n", "line 5: .*can't be read"),
+        (f"{IN_MATLAB}DH(:,4) = DH(:,4)*pi/180;\nfor i=1:2\nL(i) = Link([DH(i,:)]);\nend\n", "changes 'DH'"),
         (
             "N = 1;\nd=[0.29 0];\na=[0 0.27];\nal=[0 1];\nfor j=1:N\n L(j)=Link('d', d(j), 'a', a(j),"
             " 'alpha', al(j));\nend",
