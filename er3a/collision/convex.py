@@ -323,7 +323,7 @@ def distances_from_hull(points: Reals, hull: Reals) -> Reals:
     return found
 
 
-RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
+TOO_WIDE = 5e-5  # m, by which a prism may be wider than the cylinder in it: two of them are then 0.1 mm too near
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
 MAX_POINTS = 1000  # that a hull may grow by before all sums are taken
@@ -373,19 +373,19 @@ def _depth_of_all(first: Reals, second: Reals) -> float:
     return max(0.0, float(-offsets.max()))
 
 
-def cylinder_points(ends: Reals, disc: float, rim: int = RIM) -> Reals:
-    """Corners of a prism that holds a cylinder.
+def cylinder_points(ends: Reals, disc: float) -> Reals:
+    """Corners of a prism that holds a cylinder and is nowhere wider by more than ``TOO_WIDE``.
 
     Parameters
     ----------
     ends : (2, 3), m, of the axis
     disc : m, radius
-    rim : corners on either end; the prism is wider by a factor of ``1 / cos(pi / rim)``, 0.05 % for 96
 
     Returns
     -------
-    points : (2 * rim, 3), m
+    points : (2 rim, 3), m; corners on a circle whose radius is ``disc / cos(pi / rim)``
     """
+    rim = max(int(np.ceil(np.pi / np.arccos(disc / (disc + TOO_WIDE)))), 3)
     axis = ends[1] - ends[0]
     across = np.linalg.svd(axis[None])[2][1:]
     angle = 2 * np.pi * np.arange(rim) / rim

@@ -338,9 +338,7 @@ def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals
 
 ON_AXIS = 1e-9  # m
 LOOKED_AT = 200  # corners of a surface
-ROUND = 72  # corners by which a circle is drawn
-BALL = 200  # and a ball
-SIDES = 24  # of the prism around a carried cylinder
+BALL = 200  # corners by which a ball is drawn
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
@@ -407,7 +405,7 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
 
     Returns
     -------
-    bodies : in the last link's frame, m; a cylinder as a prism around it, under 1 % too wide
+    bodies : in the last link's frame, m; a cylinder as a prism around it, at most 0.05 mm too wide
     """
     if scene is None or not scene.carried:
         return ()
@@ -418,7 +416,7 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
         assert not isinstance(solid, Plane), "nothing carries a half-space"
         body = solid_body(replace(solid, T=T @ solid.T))
         if body.kind == CYLINDER:
-            body = replace(body, kind=HULL, disc=0.0, points=cylinder_points(body.points, body.disc, SIDES))
+            body = replace(body, kind=HULL, disc=0.0, points=cylinder_points(body.points, body.disc))
         found.append(replace(body, link=robot.rows))
     return tuple(found)
 
@@ -532,7 +530,7 @@ def solid_corners(solid: Box | Cylinder | Sphere) -> Reals:
     """
     body = solid_body(solid)
     if body.kind == CYLINDER:
-        return cylinder_points(body.points, body.disc * np.cos(np.pi / ROUND), ROUND)
+        return cylinder_points(body.points, body.disc)
     if body.radius:
         return np.asarray(body.points + body.radius * fibonacci_sphere(BALL))
     return body.points
