@@ -207,7 +207,7 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
 
 @inner_kernel
 def cores_distance(  # noqa: C901, PLR0912
-    w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
+    w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals, far: float
 ) -> float:
     """Distance of two convex cores by the iteration of Gilbert, Johnson and Keerthi [2]_.
 
@@ -218,6 +218,8 @@ def cores_distance(  # noqa: C901, PLR0912
     disc_a, disc_b : m, radii of cylinders' discs; 0 for hulls of points
     room : (ROOM, 3), scratch memory
     near : (2, 3), gets the closest points, m; meaningless where the cores overlap
+    far : m; of cores farther away any number from ``far`` to the distance may be returned, and ``near`` gets points
+        between which a direction leads that shows it
 
     Returns
     -------
@@ -240,6 +242,8 @@ def cores_distance(  # noqa: C901, PLR0912
             along += room[AXIS, r] * room[count, r]
         if count and size - along / size <= EXACT:
             break
+        if count and along > far * size:
+            return float(along / size)
         count += 1
         if _nearest_of_simplex(room, count):
             return 0.0
@@ -319,7 +323,7 @@ def distances_from_hull(points: Reals, hull: Reals) -> Reals:
         copy_values(hull[i], w[1 + i])
     for n in range(len(points)):
         copy_values(points[n], w[0])
-        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near)
+        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near, np.inf)
     return found
 
 
