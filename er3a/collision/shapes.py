@@ -62,7 +62,7 @@ class ArmShapes:
     bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
         only links without length
     uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
-        links whose visual meshes reach out of all shapes
+        links whose visual meshes reach out of all shapes; each with how far, m, infinite where there are no such shapes
     partial : links with given shapes that reach along less than ``COVERED`` of the link's lengths in the table, and
         leave more than ``GAP`` of them, each with that share
     """
@@ -73,7 +73,7 @@ class ArmShapes:
     given: bool
     grade: Grade
     bare: tuple[int, ...]
-    uncovered: tuple[int, ...] = ()
+    uncovered: tuple[tuple[int, float], ...] = ()
     partial: tuple[tuple[int, float], ...] = ()
 
     @property
@@ -108,9 +108,10 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shapes.links)
     shapes = replace(shapes, bare=bare)
     lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links) if given)
+    beyond = ((link, _uncovered(robot, shapes, link)) for link in range(robot.rows + 1))
     return replace(
         shapes,
-        uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)),
+        uncovered=tuple((link, most) for link, most in beyond if most > 0),
         partial=tuple(
             (link, covered / whole)
             for link, covered, whole in lengths
@@ -160,14 +161,18 @@ def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> float:
     return float(covered.mean())
 
 
-def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
-    """Whether points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
-    where it has no shape, along its lengths in the table."""
+def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> float:
+    """How far (m) points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
+    where it has no shape, along its lengths in the table; 0 for what may be a cover."""
     beside, none = {link - 1, link, link + 1}, np.empty((0, 3))
     seen = np.concatenate([none, *(visual.points for visual in robot.visuals if visual.link == link)])
     lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
     along = np.concatenate([none, *(lines if link in shapes.bare else [])])
-    return _outside(robot, shapes, along, link, beside) or _outside(robot, shapes, seen, link, beside, VISIBLE)
+    most = 0.0
+    for points, by in ((along, TOUCH), (seen, VISIBLE)):
+        beyond = _beyond(robot, shapes, points, link, beside)
+        most = max(most, beyond[beyond > by].max(initial=0.0))
+    return most
 
 
 def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
@@ -191,7 +196,7 @@ def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
         return False
     last, carried = robot.rows, carried_bodies(robot, scene)
     start, point = _end(robot.replace(tool=np.eye(4), flange=np.eye(4))), _end(robot)
-    if not carried and _outside(robot, shapes, point[None], last, {last}):
+    if not carried and _beyond(robot, shapes, point[None], last, {last})[0] > TOUCH:
         return True
     bodies = [*carried, *(body for body in arm_bodies(robot) if body.link == last)]
     return _length_without(bodies, start, point) > UNSHAPED
@@ -217,16 +222,11 @@ def _length_without(bodies: Sequence[Body], start: Reals, end: Reals) -> float:
     return bare + length - reach
 
 
-def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int], by: float = TOUCH) -> bool:
-    """Whether points (n, 3) of a link, m, lie outside the shapes of some links, by more than a distance (m).
+def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int]) -> Reals:
+    """How far points (n, 3) of a link, m, are outside the shapes of some links, (n,), m.
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
-    return bool((_beyond(robot, shapes, points, link, beside) > by).any())
-
-
-def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int]) -> Reals:
-    """How far points (n, 3) of a link, m, are outside the shapes of some links, (n,), m; as :func:`_outside`."""
     T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
