@@ -207,7 +207,7 @@ def _nearest_of_simplex(room: Reals, count: int) -> bool:
 
 @inner_kernel
 def cores_distance(  # noqa: C901, PLR0912
-    w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals
+    w: Reals, bounds: tuple[int, int, int, int], disc_a: float, disc_b: float, room: Reals, near: Reals, far: float
 ) -> float:
     """Distance of two convex cores by the iteration of Gilbert, Johnson and Keerthi [2]_.
 
@@ -218,6 +218,8 @@ def cores_distance(  # noqa: C901, PLR0912
     disc_a, disc_b : m, radii of cylinders' discs; 0 for hulls of points
     room : (ROOM, 3), scratch memory
     near : (2, 3), gets the closest points, m; meaningless where the cores overlap
+    far : m; of cores farther away any number from ``far`` to the distance may be returned, and ``near`` gets points
+        between which a direction leads that shows it
 
     Returns
     -------
@@ -240,6 +242,8 @@ def cores_distance(  # noqa: C901, PLR0912
             along += room[AXIS, r] * room[count, r]
         if count and size - along / size <= EXACT:
             break
+        if count and along > far * size:
+            return float(along / size)
         count += 1
         if _nearest_of_simplex(room, count):
             return 0.0
@@ -319,11 +323,11 @@ def distances_from_hull(points: Reals, hull: Reals) -> Reals:
         copy_values(hull[i], w[1 + i])
     for n in range(len(points)):
         copy_values(points[n], w[0])
-        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near)
+        found[n] = cores_distance(w, (first, second, second, len(w)), 0.0, 0.0, room, near, np.inf)
     return found
 
 
-RIM = 96  # points that represent a cylinder's rim, on a circle that lies around it
+TOO_WIDE = 5e-5  # m, by which a prism may be wider than the cylinder in it: two of them are then 0.1 mm too near
 STARTS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
 EXACT_SHARE = 1e-12  # parts of the cores' size
 MAX_POINTS = 1000  # that a hull may grow by before all sums are taken
@@ -373,19 +377,19 @@ def _depth_of_all(first: Reals, second: Reals) -> float:
     return max(0.0, float(-offsets.max()))
 
 
-def cylinder_points(ends: Reals, disc: float, rim: int = RIM) -> Reals:
-    """Corners of a prism that holds a cylinder.
+def cylinder_points(ends: Reals, disc: float) -> Reals:
+    """Corners of a prism that holds a cylinder and is nowhere wider by more than ``TOO_WIDE``.
 
     Parameters
     ----------
     ends : (2, 3), m, of the axis
     disc : m, radius
-    rim : corners on either end; the prism is wider by a factor of ``1 / cos(pi / rim)``, 0.05 % for 96
 
     Returns
     -------
-    points : (2 * rim, 3), m
+    points : (2 rim, 3), m; corners on a circle whose radius is ``disc / cos(pi / rim)``
     """
+    rim = max(int(np.ceil(np.pi / np.arccos(disc / (disc + TOO_WIDE)))), 3)
     axis = ends[1] - ends[0]
     across = np.linalg.svd(axis[None])[2][1:]
     angle = 2 * np.pi * np.arange(rim) / rim

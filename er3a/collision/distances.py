@@ -110,7 +110,7 @@ def pair_distance(
         return surface_above_plane(trees, T[link[a]], trees.root[a], normal, w[j + 1, 0], near), False
     if i_end - i <= 2 and j_end - j <= 2 and kind[a] == HULL and kind[b] == HULL:
         return lines_distance(w, i, i_end - 1, j, j_end - 1, near) - sizes, False
-    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near)
+    core = cores_distance(w, (i, i_end, j, j_end), disc[a], disc[b], room, near, np.inf)
     if convex or core - sizes > max(far, 0.0):
         return core - sizes, core == 0.0
     if trees.root[a] < 0:

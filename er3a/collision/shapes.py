@@ -62,7 +62,7 @@ class ArmShapes:
     bare : numbers of links from 0 on that a file which gives shapes gives none; () for guessed shapes, which leave out
         only links without length
     uncovered : of these, those that reach out of the shapes of the links beside them, along the table's lengths; and
-        links whose visual meshes reach out of all shapes
+        links whose visual meshes reach out of all shapes; each with how far, m, infinite where there are no such shapes
     partial : links with given shapes that reach along less than ``COVERED`` of the link's lengths in the table, and
         leave more than ``GAP`` of them, each with that share
     """
@@ -73,7 +73,7 @@ class ArmShapes:
     given: bool
     grade: Grade
     bare: tuple[int, ...]
-    uncovered: tuple[int, ...] = ()
+    uncovered: tuple[tuple[int, float], ...] = ()
     partial: tuple[tuple[int, float], ...] = ()
 
     @property
@@ -108,9 +108,10 @@ def arm_shapes(robot: Robot) -> ArmShapes:
     bare = tuple(link for link in range(robot.rows + 1) if given and link not in shapes.links)
     shapes = replace(shapes, bare=bare)
     lengths = ((link, *covered_lengths(robot, shapes, link)) for link in sorted(shapes.links) if given)
+    beyond = ((link, _uncovered(robot, shapes, link)) for link in range(robot.rows + 1))
     return replace(
         shapes,
-        uncovered=tuple(k for k in range(robot.rows + 1) if _uncovered(robot, shapes, k)),
+        uncovered=tuple((link, most) for link, most in beyond if most > 0),
         partial=tuple(
             (link, covered / whole)
             for link, covered, whole in lengths
@@ -160,14 +161,18 @@ def _covered(robot: Robot, shapes: ArmShapes, line: Reals, link: int) -> float:
     return float(covered.mean())
 
 
-def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> bool:
-    """Whether points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
-    where it has no shape, along its lengths in the table."""
+def _uncovered(robot: Robot, shapes: ArmShapes, link: int) -> float:
+    """How far (m) points of a link lie outside its shapes and those of its two neighbours: of what it looks like, and,
+    where it has no shape, along its lengths in the table; 0 for what may be a cover."""
     beside, none = {link - 1, link, link + 1}, np.empty((0, 3))
     seen = np.concatenate([none, *(visual.points for visual in robot.visuals if visual.link == link)])
     lines = [np.linspace(c.start, c.end, LINE_POINTS) for c in default_envelopes(robot) if c.link == link]
     along = np.concatenate([none, *(lines if link in shapes.bare else [])])
-    return _outside(robot, shapes, along, link, beside) or _outside(robot, shapes, seen, link, beside, VISIBLE)
+    most = 0.0
+    for points, by in ((along, TOUCH), (seen, VISIBLE)):
+        beyond = _beyond(robot, shapes, points, link, beside)
+        most = max(most, beyond[beyond > by].max(initial=0.0))
+    return most
 
 
 def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
@@ -191,7 +196,7 @@ def has_bare_tool(robot: Robot, scene: Scene | None = None) -> bool:
         return False
     last, carried = robot.rows, carried_bodies(robot, scene)
     start, point = _end(robot.replace(tool=np.eye(4), flange=np.eye(4))), _end(robot)
-    if not carried and _outside(robot, shapes, point[None], last, {last}):
+    if not carried and _beyond(robot, shapes, point[None], last, {last})[0] > TOUCH:
         return True
     bodies = [*carried, *(body for body in arm_bodies(robot) if body.link == last)]
     return _length_without(bodies, start, point) > UNSHAPED
@@ -217,16 +222,11 @@ def _length_without(bodies: Sequence[Body], start: Reals, end: Reals) -> float:
     return bare + length - reach
 
 
-def _outside(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int], by: float = TOUCH) -> bool:
-    """Whether points (n, 3) of a link, m, lie outside the shapes of some links, by more than a distance (m).
+def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int]) -> Reals:
+    """How far points (n, 3) of a link, m, are outside the shapes of some links, (n,), m.
 
     They are looked at in one pose: a joint between two links turns about the line on which they meet.
     """
-    return bool((_beyond(robot, shapes, points, link, beside) > by).any())
-
-
-def _beyond(robot: Robot, shapes: ArmShapes, points: Reals, link: int, beside: set[int]) -> Reals:
-    """How far points (n, 3) of a link, m, are outside the shapes of some links, (n,), m; as :func:`_outside`."""
     T = link_frames(robot, np.clip(np.zeros(robot.joints), robot.lower, robot.upper))
 
     def placed(points: Reals, k: int) -> Reals:
@@ -338,9 +338,7 @@ def _pieces(robot: Robot, link: int, size: float, lines: list[tuple[Reals, Reals
 
 ON_AXIS = 1e-9  # m
 LOOKED_AT = 200  # corners of a surface
-ROUND = 72  # corners by which a circle is drawn
-BALL = 200  # and a ball
-SIDES = 24  # of the prism around a carried cylinder
+BALL = 200  # corners by which a ball is drawn
 CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 
 
@@ -407,7 +405,7 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
 
     Returns
     -------
-    bodies : in the last link's frame, m; a cylinder as a prism around it, under 1 % too wide
+    bodies : in the last link's frame, m; a cylinder as a prism around it, at most 0.05 mm too wide
     """
     if scene is None or not scene.carried:
         return ()
@@ -418,7 +416,7 @@ def carried_bodies(robot: Robot, scene: Scene | None) -> tuple[Body, ...]:
         assert not isinstance(solid, Plane), "nothing carries a half-space"
         body = solid_body(replace(solid, T=T @ solid.T))
         if body.kind == CYLINDER:
-            body = replace(body, kind=HULL, disc=0.0, points=cylinder_points(body.points, body.disc, SIDES))
+            body = replace(body, kind=HULL, disc=0.0, points=cylinder_points(body.points, body.disc))
         found.append(replace(body, link=robot.rows))
     return tuple(found)
 
@@ -532,7 +530,7 @@ def solid_corners(solid: Box | Cylinder | Sphere) -> Reals:
     """
     body = solid_body(solid)
     if body.kind == CYLINDER:
-        return cylinder_points(body.points, body.disc * np.cos(np.pi / ROUND), ROUND)
+        return cylinder_points(body.points, body.disc)
     if body.radius:
         return np.asarray(body.points + body.radius * fibonacci_sphere(BALL))
     return body.points

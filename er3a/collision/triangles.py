@@ -30,6 +30,7 @@ from er3a.numerics.arrays import Integers, Reals
 from er3a.numerics.jit import inlined_kernel, inner_kernel, kernel
 
 WAITING = 128  # pairs of boxes that wait at one time; two trees of a million triangles are 40 levels deep
+PROBES = 32  # points of a surface, besides one of each shell, that are looked for inside others
 FIRST = 14  # corners, with which the choice of few of a hull begins
 SLANT_Y, SLANT_Z = 0.01374529, 0.02913857  # of the ray from a point, against x: along no edge that a drawing has
 
@@ -44,7 +45,7 @@ class TriangleTree(ByValue):
     child : (M, 2), the two boxes in a box; of the box of one triangle -1 and the triangle's number
     corner : (F, 3, 3), m
     shell : (F,), a number of the closed shell that a triangle belongs to, 0 for one that is not closed
-    probe : (S, 3), m, a point of each shell
+    probe : (S, 3), m, points of the surface, of each shell at least one
     """
 
     box: Reals
@@ -86,7 +87,8 @@ def tree_of(points: Reals, faces: Integers) -> TriangleTree:
     faces = same.reshape(-1)[faces]
     corner = np.ascontiguousarray(points[faces])
     number, shell = _shells(faces, len(points))
-    probe = corner[np.unique(number, return_index=True)[1], 0]
+    tried = np.r_[np.unique(number, return_index=True)[1], : len(corner) : -(-len(corner) // PROBES)]
+    probe = corner[tried, 0]
     low, high = corner.min(axis=1), corner.max(axis=1)
     order, middle = np.arange(len(faces)), corner.mean(axis=1)
     starts, ends = np.array([0]), np.array([len(faces)])
@@ -397,10 +399,14 @@ def surface_distance(  # noqa: C901, PLR0912
     convex = trees.root[b] < 0
     count, disc = (last - first, disc) if convex else (3, 0.0)
     points, R, t, boxes, nb = np.empty((3 + count, 3)), np.zeros((3, 3)), np.zeros(3), trees.box, trees.root[b]
+    within = False
     if convex:
         boxes, nb = np.empty((1, 2, 3)), 0
         _core_in_frame(T, core, R, points, boxes[0])
     else:
+        within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
+        if within and far <= 0:  # only whether they overlap is asked
+            return 0.0
         _turned(T, S, R, t)
     axis, close = np.empty((2, 3)), np.empty((2, 3))
     start, other = int(0), int(3)  # noqa: RUF046, UP018  (see inner_kernel)
@@ -431,7 +437,7 @@ def surface_distance(  # noqa: C901, PLR0912
             continue
         if not convex and _beyond_plane(points, 3, 0, 3, best):
             continue
-        distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close)
+        distance = cores_distance(points, (start, other, other, other + count), 0.0, disc, room, close, best)
         if distance < best:
             best = distance
             _keep_axis(close, R, axis)
@@ -442,7 +448,6 @@ def surface_distance(  # noqa: C901, PLR0912
             return 0.0
     if convex:
         return -best if holds_point(trees, T, trees.root[a], w[first]) else best
-    within = _holds_probe(trees, T, S, a, b, t) or _holds_probe(trees, S, T, b, a, t)
     return -best if within else best
 
 

@@ -759,7 +759,7 @@ def number_of(element: ElementTree.Element | None, key: str) -> float:
         return math.nan
 
 
-PRISM_SIDES = 24
+DRAWN_SIDES = 24  # of a cylinder that is only seen
 SMALLEST_SPHERE_M = 0.002
 SAME_M = 1e-6  # to which a sphere's centre and radius are those of a cylinder's end
 Shape = Envelope | ConvexPiece | LinkMesh
@@ -798,7 +798,7 @@ def collision_shape(
         case "cylinder":
             radius, length = _sizes(path, where, shape).tolist()
             core = np.array([[0, 0, -length / 2], [0, 0, length / 2]])
-            corners = cylinder_points(core, radius, PRISM_SIDES)
+            corners = cylinder_points(core, radius)
         case "sphere":
             x, y, z = T[:3, 3].tolist()
             return Envelope(link, (x, y, z), (x, y, z), max(float(_sizes(path, where, shape)[0]), SMALLEST_SPHERE_M))
@@ -832,7 +832,7 @@ def visual_surface(path: Path, name: str, visual: ElementTree.Element) -> tuple[
             made = trimesh.creation.box(_sizes(path, where, shape))
         case "cylinder":
             radius, length = _sizes(path, where, shape).tolist()
-            made = trimesh.creation.cylinder(radius, length, PRISM_SIDES)
+            made = trimesh.creation.cylinder(radius, length, DRAWN_SIDES)
         case "sphere":
             made = trimesh.creation.icosphere(2, float(_sizes(path, where, shape)[0]))
         case _:

@@ -16,6 +16,7 @@ import yaml
 
 from er3a.collision.along import clearance
 from er3a.collision.bodies import Bodies
+from er3a.collision.convex import cylinder_points
 from er3a.collision.matrix import collision_matrix
 from er3a.collision.scene import Box, Scene
 from er3a.collision.shapes import depths_in
@@ -241,3 +242,12 @@ def test_faces_that_nearly_touch_are_as_far_apart_as_they_are():
         distance = Bodies(robot, None).min_distance(random.uniform(-np.pi, np.pi, (200, 1)))[0]
         assert (distance <= 2e-6 + 1e-9).all()
         assert (distance > -1e-9).all()
+
+
+@pytest.mark.parametrize("radius", [1e-5, 0.002, 0.03, 0.15, 2.0])
+def test_a_prism_around_a_cylinder_is_nowhere_more_than_a_twentieth_of_a_mm_too_wide(radius):
+    points = cylinder_points(np.array([[0, 0, -0.1], [0, 0, 0.1]]), radius)
+    corners = points[points[:, 2] > 0, :2]
+    middles = (corners + np.roll(corners, 1, axis=0)) / 2
+    assert np.linalg.norm(corners, axis=1).max() <= radius + 5e-5 + 1e-12
+    assert np.linalg.norm(middles, axis=1) == pytest.approx(radius, rel=1e-9)

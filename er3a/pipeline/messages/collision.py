@@ -58,7 +58,7 @@ TEXTS = texts(
         "pair_too_near": "{pair} come within {clearance_mm:.1f} mm; to keep: {margin_mm:g} mm",
         "pairs_unexamined": "Not checked, as the shapes overlap where no arm's can: {pairs:3, }.",
         "shapes_assumed": (
-            "{partial:shapes_missing}: real collisions may differ."
+            "{partial:shapes_missing}, so real collisions may differ: give them under envelopes in the robot's file."
             "[ Within {margin_mm:g} mm of assumed shapes: {near:, }.]"
         ),
         "collision.never_free": "No joint vector within the limits is free of collisions: {pairs:3, } always overlap.",

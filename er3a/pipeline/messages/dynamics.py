@@ -14,7 +14,7 @@ from er3a.finding import Finding
 from er3a.pipeline.language import own_title, tr, with_unit, words
 from er3a.pipeline.messages.numbers import at_least
 from er3a.pipeline.messages.say import WORDS, bracketed, joined, say_as, says, sentence, texts, word
-from er3a.pipeline.messages.scope import names_in_words
+from er3a.pipeline.messages.scope import ASSUMED, names_in_words
 from er3a.pipeline.results import Summary
 from er3a.pipeline.stages.dynamics import model
 from er3a.robots.masses import NoBody
@@ -83,7 +83,8 @@ TEXTS = texts(
         "dynamics.torque": "{torque:.3g} ± {tolerance:.2g} {unit} (J{joint}, {path:dynamics.path})",
         "dynamics.fits": "Within all stated limits; highest utilisation: {tightest}.{rest}",
         "dynamics.marginal": (
-            "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {tightest}.{rest}"
+            "Within the stated limits, but {masses:dynamics.masses}; highest utilisation: {tightest}.[ Not examined: "
+            "{unknown}. The robot's file can state them.]{rest}"
         ),
         "dynamics.overload": "Overload: {beyond} of {compared} comparisons beyond limits; worst: {tightest}.{rest}",
         "dynamics.rest": (
@@ -225,4 +226,5 @@ def use_text(use: model.Use | Finding) -> str:
 def _(found: Finding) -> str:
     rest = sentence("dynamics.rest", **{"not_run": (), **found.params})
     masses = bool(found.params.get("unsettled") or found.doubts or found.grade == "inferred")
-    return say_as(found, masses=masses, rest=f" {rest}" if rest else "")
+    unknown = joined((tr(ASSUMED[each]) for each in found.params.get("unknown", ())), "; ")
+    return say_as(found, masses=masses, unknown=unknown, rest=f" {rest}" if rest else "")

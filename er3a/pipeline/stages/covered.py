@@ -68,8 +68,11 @@ def covered_collisions(
     with_tools = [bodies, *(bodies_of(arm, scene) for _, arm in arms)]
     guessed = tuple(dict.fromkeys(label_of(each) for arm in with_tools for each in arm.guessed))
     shares = tuple(f"{link_label(link)}: {100 * share:.0f} %" for link, share in shapes.partial)
+    uncovered = tuple(
+        link_label(link) + (f": {1000 * by:.0f} mm" if np.isfinite(by) else "") for link, by in shapes.uncovered
+    )
     gaps = (
-        Open("uncovered_links", tuple(link_label(link) for link in shapes.uncovered)),
+        Open("uncovered_links", uncovered),
         Open("partial_links", shares, 100 * COVERED if shares else None),
         Open("bare_tool", tuple(bare)),
         Open("allowed_contacts", (*by_scene.values(), *allowed)),
@@ -81,7 +84,7 @@ def covered_collisions(
         Open("guessed_pairs", guessed),
     )
     count = robot.rows + 2
-    open_links = {link_label(link) for link in (*shapes.uncovered, *(link for link, _ in shapes.partial))}
+    open_links = {link_label(link) for link, _ in (*shapes.uncovered, *shapes.partial)}
     of_itself = count - len(open_links | set(bare))
     no_scene = () if scene and scene.solids else (Open("no_scene"),)
     return Covered(
