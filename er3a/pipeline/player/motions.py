@@ -200,7 +200,7 @@ def fix_of(faults: Iterable[Fault]) -> Fix | None:
         if fault.to_do:
             place = fault.instead[1] if fault.instead else fault.address
             text = re.sub(
-                r"(?<=\d) (?=(mm|s|deg|%))", "\u00a0", first_sentence(fault.to_do)[0]
+                r"(?<=\d) (?=(mm|s|%))", "\u00a0", first_sentence(fault.to_do)[0]
             )  # units stay with values
             return Fix(joined((fault.name, text), ": "), place, fault.status != "caution")
     return None

@@ -28,7 +28,7 @@ from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
 
 from er3a.pipeline import language
-from er3a.pipeline.language import tr
+from er3a.pipeline.language import tr, unit_sign
 from er3a.pipeline.messages.say import bracketed
 from er3a.pipeline.tables import Table
 from er3a.pipeline.viewing.palette import GRID, INK, MUTED, SIX_JOINTS
@@ -271,7 +271,7 @@ def axis_label(table: Table | type[Table], attribute: str, unit: str = "") -> st
     """
     spec = table.columns()[attribute]
     what, unit = tr(spec.heading or spec.meaning), (unit or spec.unit).replace("^2", "²").replace("^3", "³")
-    return bracketed(what, tr(unit))
+    return bracketed(what, unit_sign(unit))
 
 
 def svg_data_uri(figure: Figure) -> Markup:

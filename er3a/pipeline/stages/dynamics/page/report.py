@@ -244,9 +244,9 @@ def _use(use: model.Use) -> list[str]:
 def _units(summary: model.DynamicsSummary) -> dict[str, str]:
     """Units of torques, speeds and inertias in headings, by what the arm's joints do."""
     torque = model.shared_unit(held.unit for held in summary.holding)
-    turning, sliding = (tr("deg/s"), "kg m²"), ("mm/s", "kg")
+    turning, sliding = ("°/s", "kg m²"), ("mm/s", "kg")
     of_others = {model.TORQUE: turning, model.FORCE: sliding}
-    speed, inertia = of_others.get(torque, (tr("deg/s or mm/s"), tr("kg m² or kg")))
+    speed, inertia = of_others.get(torque, (tr("°/s or mm/s"), tr("kg m² or kg")))
     return {"torque": tr(torque), "speed": speed, "inertia": inertia}
 
 

@@ -51,7 +51,7 @@ def report(study: Study, stored: Stored[model.InverseResults], output: Path) -> 
         drawing_head=drawing_head(),
         nearest_rule=tr(NEAREST_RULE),
         sections=[_section(robot, target, of_target(target)) for target in chosen],
-        units=_units(robot),
+        sliding=_sliding(robot),
         colours=SOLUTIONS,
     )
 
@@ -233,10 +233,10 @@ def _on_one_line(label: str, branch: int) -> str:
     return branch_word(label, branch).replace("elbow ", "").replace(" ", NO_BREAK_SPACE)
 
 
-def _units(robot: Robot) -> str:
-    """The unit of joint values, or of most of them and of those that slide."""
-    sliding = [f"J{j + 1}" for j in np.flatnonzero(robot.slides)]
-    return tr("deg, {joints} in mm", joints=", ".join(sliding)) if sliding else tr("deg")
+def _sliding(robot: Robot) -> str:
+    """That some joints' values are in mm; empty where all turn."""
+    names = ", ".join(f"J{j + 1}" for j in np.flatnonzero(robot.slides))
+    return tr(", {joints} in mm", joints=names) if names else ""
 
 
 def _joints(q_deg: Iterable[float]) -> str:

@@ -227,10 +227,10 @@ def _interval(each: EntryEvidence) -> str:
 
 def _off(mm: float, deg: float) -> str:
     if fixed(mm, 1) == "0.0":  # of a turn in place, which "0.0 mm" would make look harmless
-        return tr("turned by {deg} deg", deg=fixed(deg, 0 if deg >= 10 else 1))
+        return tr("turned by {deg}°", deg=fixed(deg, 0 if deg >= 10 else 1))
     if fixed(deg, 1) == "0.0":
         return with_unit(fixed(mm, 0 if mm >= 10 else 1), "mm")
-    return tr("{mm} mm, {deg} deg", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
+    return tr("{mm} mm, {deg}°", mm=fixed(mm, 0 if mm >= 10 else 1), deg=fixed(deg, 0 if deg >= 10 else 1))
 
 
 def _fits(each: EntryEvidence) -> str:

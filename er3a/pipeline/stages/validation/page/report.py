@@ -18,7 +18,7 @@ from er3a.finding import is_one
 from er3a.identifiability.entries import column_of
 from er3a.kinematics.forward import frames
 from er3a.numerics.arrays import Reals
-from er3a.pipeline.language import N_, own_title, tr, with_unit
+from er3a.pipeline.language import N_, own_title, tr, unit_sign, with_unit
 from er3a.pipeline.messages.diagnosis import CONVENTIONS
 from er3a.pipeline.messages.numbers import fixed, measured
 from er3a.pipeline.messages.pages import GRADE_NAMES
@@ -110,7 +110,7 @@ def check_row(check: Judged) -> list[str]:
         source = bracketed(own_title(check.source), grade)
     else:
         source = tr("the model itself")
-    return [say(check.subject), *values, f"{check.tolerance:g}", tr(check.unit), source]
+    return [say(check.subject), *values, f"{check.tolerance:g}", unit_sign(check.unit), source]
 
 
 def _value(value: float, check: model.Check) -> str:

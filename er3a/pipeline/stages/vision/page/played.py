@@ -49,7 +49,7 @@ def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Real
         return at_rest(robot, each.name, refusal_text(each), "fail", home, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
-    text = tr("{grasp}, turned by {turn} deg", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
+    text = tr("{grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))
     ghost = meant(robot, np.array(each.grasp.q_before_deg))
     marks = [_ghost_name(robot, ghost, meant(robot, np.array(each.grasp.q_deg)), float(rows.t_s[-1]))]
     return PlayedMotion(each.name, text, rows.t_s, meant(robot, rows.q_deg), events, marks, ghosts=[ghost])

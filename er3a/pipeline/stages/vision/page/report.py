@@ -245,7 +245,7 @@ def _grasp(each: model.ObjectResult) -> list[str]:
     name = Markup("{}<br><small>{}</small>").format(each.name, own_title(each.note)) if each.note else each.name
     return [
         name,
-        tr("{grasp}, turned by {turn} deg", grasp=grasp.grasp, turn=fixed(grasp.turn_deg, 0)),
+        tr("{grasp}, turned by {turn}°", grasp=grasp.grasp, turn=fixed(grasp.turn_deg, 0)),
         f"{100 * grasp.probability:.1f} ± {196 * grasp.deviation:.1f} %",
         _listed(grasp.tool_xyz_mm),
         panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
