@@ -89,8 +89,8 @@ TEXTS = texts(
             "{residual_before:residual}{unit:unit}, corrected {residual_after:residual}{unit:unit}."
         ),
         "unexplained": (
-            "None of {tried} hypotheses of one fault or two explains the data: of {residual_before:residual}{unit:unit} at "
-            "least {least:residual}{unit:unit} stay. It is another arm, has more faults, or a reference is wrong."
+            "None of {tried} hypotheses of one fault or two explains the data: of {residual_before:residual}{unit:unit}"
+            " at least {least:residual}{unit:unit} stay. It is another arm, has more faults, or a reference is wrong."
         ),
         "one_of": "one of {count} that fit alike ({candidates:24; })",
         "moves_nothing": "{entry} has no effect on the measured points",

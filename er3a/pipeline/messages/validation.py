@@ -77,9 +77,7 @@ TEXTS = texts(
             "If {entry} is wrong, the tool is off by {bound} {mm:.0f} mm and {deg:.0f}°.[ A tool's tip is then "
             "off by up to {factor:.2g} times its distance from the flange. Run no Cartesian target with a tool before.]"
         ),
-        "validation.parts": (
-            "Confirmed by independent documents (to {mm:g} mm and {deg:g}° at the tool): {parts:, }."
-        ),
+        "validation.parts": ("Confirmed by independent documents (to {mm:g} mm and {deg:g}° at the tool): {parts:, }."),
         "validation.open": "Not confirmed: {names}.",
         "validation.unbounded": (
             "Only the table's own source gives {names}: nothing bounds the tool's error if they are wrong."

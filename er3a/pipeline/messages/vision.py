@@ -13,7 +13,7 @@ import er3a.pipeline.messages.planning  # noqa: F401
 from er3a.finding import Finding
 from er3a.geometry.transforms import quaternion_of, rpy_of
 from er3a.pipeline.language import as_text, words
-from er3a.pipeline.messages.say import WORDS, same_text, say, texts, word
+from er3a.pipeline.messages.say import WORDS, say, says, sentence, texts, word
 from er3a.vision.hand_eye import HandEye, spread_of
 
 PARTS = words({"move": "move to the approach", "approach": "approach", "retreat": "retreat"})
@@ -90,9 +90,9 @@ TEXTS = texts(
         "grasp_unlikely": "within the gripper's tolerance with probability {probability:.3g}; {needed:.3g} required",
         "line_leaves": "{part:vision.part} exceeds limits or becomes singular {after_mm:.0f} mm from the grasp",
         "line_unproven": "{part:vision.part}: limits, joint speeds and distance from singularities not proven",
-        "too_near_there": (
-            "[{part:vision.part}][at the grasp{part:!}], {pair}: distance {clearance_mm:.1f} mm; {needed_mm:g} mm "
-            "required"
+        "grasp_collides": (
+            "[{part:vision.part}: ]{pair} [overlap by {depth_mm:.0f} mm][come within {clearance_mm:.1f} mm; "
+            "{needed_mm:g} mm required]"
         ),
         "far_from_fit": (
             "{sample}: {off_mm:.3g} mm, {off_deg:.2g}° from the other samples' prediction (probability "
@@ -172,7 +172,13 @@ WORDS.update(
         "vision.convention": CONVENTIONS,
     }
 )
-same_text("too_near_there", "grasp_collides", "way_collides")
+
+
+@says("grasp_collides", "way_collides")
+def _(found: Finding) -> str:
+    hit = found.clearance_mm < 0
+    depth, clearance = (-found.clearance_mm, None) if hit else (None, found.clearance_mm)
+    return sentence("grasp_collides", **{**found.params, "depth_mm": depth, "clearance_mm": clearance})
 
 
 def pose_words(setup: str) -> tuple[str, str]:

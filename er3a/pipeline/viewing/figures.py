@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from matplotlib.lines import Line2D
 from matplotlib.rcsetup import cycler
 from matplotlib.ticker import FixedLocator
 
+from er3a.numerics.arrays import Reals
 from er3a.pipeline import language
 from er3a.pipeline.language import tr, unit_sign
 from er3a.pipeline.messages.say import bracketed
@@ -239,6 +240,29 @@ def new_figure(rows: int = 1, columns: int = 1, width: float = 9.0, height: floa
     """
     figure = Figure(figsize=(width, height))
     return figure, figure.subplots(rows, columns, **subplots)
+
+
+def bars(names: Sequence[str], sizes: Reals, texts: Sequence[str], colours: Sequence[str]) -> tuple[Figure, Axes]:
+    """Level bars under each other, the first on top, each with a text at its end.
+
+    Parameters
+    ----------
+    names : of the bars
+    sizes : (n,), not below 0
+
+    Returns
+    -------
+    figure, axes : the latter still without a label
+    """
+    figure, ax = new_figure(width=5.2, height=3.5)
+    places = np.arange(len(names))
+    ax.barh(places, sizes, 0.6, color=colours)
+    for place, size, text in zip(places, sizes, texts):
+        ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center")
+    ax.set_yticks(places, names)
+    ax.invert_yaxis()
+    ax.margins(x=0.35)
+    return figure, ax
 
 
 def equal_scale(axes: Axes, x_label: str, y_label: str, fill: bool = True) -> None:

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from er3a.collision.pairs import names_of
 from er3a.files.vision_file import VisionFile
+from er3a.finding import is_one
 from er3a.geometry.transforms import inverted, posed
 from er3a.numerics.arrays import Reals
 from er3a.pipeline.language import N_, tr
@@ -44,9 +46,12 @@ def motions(robot: Robot, results: VisionResults, task: VisionFile) -> list[Play
 def _motion(robot: Robot, results: VisionResults, each: ObjectResult, home: Reals) -> PlayedMotion:
     rows = results.ways.take(results.ways.target == each.name)
     if each.grasp is None or not len(rows):
-        place = _metres(each.xyz_mm)
+        hit = each.refusal.params if is_one(each.refusal, "grasp_collides") else {}
+        place = hit.get("near_m", _metres(each.xyz_mm))
+        bodies = names_of(hit["pair"]) if hit else ()
         mark = Mark(0.0, 1.0, place, place, "")
-        return at_rest(robot, each.name, refusal_text(each), "fail", home, marks=[mark])
+        q = np.array(hit.get("q", home))
+        return at_rest(robot, each.name, refusal_text(each), "fail", q, bodies, marks=[mark])
     parts = [(part, rows.t_s[rows.part == part]) for part in dict.fromkeys(rows.part.tolist())]
     events = [PlayedEvent(float(own[0]), float(own[-1]), tr(WAYS[part]), "plain") for part, own in parts]
     text = tr("{grasp}, turned by {turn}°", grasp=each.grasp.grasp, turn=fixed(each.grasp.turn_deg, 0))

@@ -10,25 +10,26 @@ from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
 from er3a.files.hand_eye_file import HandEyeFile, grey_image
-from er3a.files.vision_file import load_vision
+from er3a.files.vision_file import VisionFile, load_vision
 from er3a.files.yaml_file import load
+from er3a.finding import Finding
 from er3a.pipeline.language import N_, own_title, tr, with_unit
 from er3a.pipeline.messages.numbers import decimals_of_spreads, fixed, number
 from er3a.pipeline.messages.say import bracketed, joined, listed, say, word
-from er3a.pipeline.messages.vision import pose_words
+from er3a.pipeline.messages.vision import MENDING, pose_words
 from er3a.pipeline.player.player import drawing_head, player
 from er3a.pipeline.results import Stored
 from er3a.pipeline.stages.vision import model
 from er3a.pipeline.stages.vision.page.played import grasp_moment, motions, refusal_text, seen_shapes
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Group, ListRow, Part, all_caught
-from er3a.pipeline.viewing.figures import new_figure
+from er3a.pipeline.viewing.figures import bars, new_figure
 from er3a.pipeline.viewing.page import (
     Picture,
     panel_link,
     render_stage,
 )
-from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL
+from er3a.pipeline.viewing.palette import HIGHLIGHT, INK, MODEL, MUTED
 from er3a.robots.robot import Robot
 
 MAX_IMAGES = 9
@@ -116,6 +117,18 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
 
+def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
+    """By how much the tool misses an object, by cause, and what the gripper tolerates."""
+    allowed = min(task.gripper.tolerance_mm), min(task.gripper.tolerance_deg)
+    sizes = [*((getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS), allowed]
+    names = [*(word("vision.part_of_error", PARTS, part) for part in PARTS), tr("gripper's tolerance")]
+    texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
+    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * (len(PARTS) - 1) + [HIGHLIGHT, MUTED])
+    ax.set_xlabel(tr("error (mm)"))
+    caption = tr("What 95 % of errors stay below, by cause.")
+    return Picture(figure, caption, caption)
+
+
 AXES = ("x", "y", "z")
 PARTS = {
     "camera": N_("camera's noise in one reading"),
@@ -139,15 +152,13 @@ def report(study: Study, stored: Stored[model.VisionResults], output: Path) -> N
         _answer(robot, results),
         found=found,
         poses=_poses(found) if found else [],
-        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless)) if found else [],
-        warnings=listed(found.warnings) if found else [],
+        suspects=listed((*found.suspects, *found.open_tilts, *found.boardless, *found.warnings)) if found else [],
         touched=_touched(found.touch) if found and found.touch else [],
         residuals=residual_picture(results.samples, found) if found else None,
         images=image_picture(results.corners, _image_folder(study, name)) if len(results.corners) else None,
         slides=bool(robot.slides.any()),
         grasps=[_grasp(each) for each in summary.objects if each.grasp],
-        errors=[_errors(each) for each in summary.objects if each.error_mm],
-        error_columns=[tr("Object"), *(f"{word('vision.part_of_error', PARTS, part)}>" for part in PARTS)],
+        errors=[(each, error_picture(each, task)) for each in summary.objects if each.error_mm],
         player=player(
             robot,
             motions(robot, results, task),
@@ -172,16 +183,18 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
     if summary.verdict.status == "caution":  # what was not checked comes before both
         headline, rest = joined([headline, rest], " "), ""
     keys = []
-    if found:
+    if off := [each.error_mm.together for each in grasped if each.error_mm]:
+        keys = [(with_unit(fixed(max(off), 1), "mm"), tr("error at the grasp, 95 %"))]
+    elif found:
         half = max(found.hand_eye.half_width_mm)
         keys = [(with_unit(f"± {fixed(half, 2)}", "mm"), tr("camera's place, 95 %"))]
     shown = [_row(each, grasp_moment(results, each)) for each in summary.objects]
     groups = [
-        Group(tr("Not graspable"), [row for row in shown if row.mark == "fail"]),
-        Group(tr("Within reach"), [row for row in shown if row.mark == "pass"]),
+        Group(tr("Not reachable"), [row for row in shown if row.mark == "fail"]),
+        Group(tr("Reachable"), [row for row in shown if row.mark == "pass"]),
     ]
     if found and (found.suspects or found.warnings):
-        rows = [ListRow("caution", each.sample, tr("left out"), "#samples") for each in found.suspects]
+        rows = [ListRow("caution", each.sample, _why_left_out(each), "#samples") for each in found.suspects]
         rows += [ListRow("caution", tr("camera"), say(each), "#samples") for each in found.warnings]
         groups.append(Group(tr("Doubts"), rows))
     wrist = robot.masses.wrist
@@ -194,10 +207,16 @@ def _answer(robot: Robot, results: model.VisionResults) -> Answer:
 def _row(each: model.ObjectResult, moment: tuple[str, float]) -> ListRow:
     """An object: how surely it is grasped, or why it is not."""
     if each.grasp is None:
-        return ListRow("fail", each.name, refusal_text(each), "#objects", moment)
+        return ListRow("fail", each.name, refusal_text(each), f"#{each.name}", moment)
     sure = each.grasp.probability
-    note = tr("within tolerance: {percent} %", percent=fixed(100 * sure, 1))
-    return ListRow("pass", each.name, note, "#objects", moment, 1.0, [Part(sure, 1.0, "rest")])
+    note = tr("success: {percent} %", percent=fixed(100 * sure, 1))
+    return ListRow("pass", each.name, note, f"#{each.name}", moment, 1.0, [Part(sure, 1.0, "rest")])
+
+
+def _why_left_out(found: Finding) -> str:
+    """Why the calibration does not use a sample, in few words."""
+    kind = found.params.get("kind")
+    return joined([tr("left out"), word("vision.mending", MENDING, kind) if kind else ""], ": ")
 
 
 def _image_folder(study: Study, name: str) -> Path:
@@ -256,10 +275,3 @@ def _grasp(each: model.ObjectResult) -> list[str]:
         fixed(grasp.limit_margin_deg, 0),
         fixed(grasp.singular_value, 2),
     ]
-
-
-def _errors(each: model.ObjectResult) -> list[str]:
-    mm, deg = each.error_mm, each.error_deg
-    assert mm is not None
-    assert deg is not None
-    return [each.name, *(f"{fixed(getattr(mm, part), 2)} mm, {fixed(getattr(deg, part), 2)}°" for part in PARTS)]
