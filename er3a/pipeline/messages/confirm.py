@@ -251,14 +251,18 @@ PLAN_SAFE = {
 }
 
 
+def on_pendant(T: Reals) -> tuple[float, ...]:
+    """X, Y, Z (mm) and A, B, C (deg) of a transform (4, 4), m, as a pendant shows them."""
+    return (*(1000 * T[:3, 3]), *np.degrees(rpy_of(T))[::-1])
+
+
 def plan_lines(found: Plan, robot: Robot) -> list[str]:
     """A plan as a sheet to print and fill in: joint values, and what the pendant should show."""
     names = [f"J{k + 1}" for k in range(robot.joints)]
     pose = ("X", "Y", "Z", "A", "B", "C")
     lines = [PLAN.format(poses=len(found.q)), "  ".join(f"{name:>8}" for name in (*names, *pose))]
     for q, T in zip(shown(robot, found.q), found.T):
-        pose_values = (*(1000 * T[:3, 3]), *np.degrees(rpy_of(T))[::-1])
-        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in pose_values)]
+        values = [*(f"{value:8.0f}" for value in q), *(f"{value:8.2f}" for value in on_pendant(T))]
         lines += ["  ".join(values), f"the pendant shows: {'  '.join(['________'] * len(pose))}"]
     return [*lines, PLAN_SAFE[bool(found.shapes)]]
 

@@ -206,7 +206,7 @@ def _seen(study: Study, name: str, use: str, stored: Results) -> SeenArm:
 
 
 def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
-    """What to confirm before the real arm moves, each with the row of the validation's page that says how."""
+    """What to confirm before the real arm moves, each with the place on the validation's page that says how."""
     results = stored["validation"].results if "validation" in stored else None
     address = f"{chosen.name}/validation.html"
     if not isinstance(results, ValidationResults):
@@ -218,12 +218,11 @@ def _steps(chosen: RobotRow, stored: Results) -> list[tuple[str, str]]:
     limits = [entry for entry in unsettled if column_of(entry) in LIMITS]
     named = joined(left[:3], ", ") + (" …" if len(left) > 3 else "") or tr("the table")
     asked = (
-        (tr("Jog each joint: does it turn as drawn?"), directions),
-        (tr("Read five poses: they settle {names}.", names=named), left),
-        (tr("Enter limits and speeds from the controller."), limits),
+        (tr("Jog each joint: does it turn as drawn?"), directions, "cell-direction1"),
+        (tr("Read five poses: they settle {names}.", names=named), left, "poses"),
+        (tr("Enter limits and speeds from the controller."), limits, f"entry-{limits[0]}" if limits else ""),
     )
-    rows = ((text, f"{address}#entry-{entries[0]}" if entries else address) for text, entries in asked)
-    return [row for row, (_, entries) in zip(rows, asked) if entries or not evidence]
+    return [(text, f"{address}#{place}") for text, entries, place in asked if entries or not evidence]
 
 
 def _tiles(study: Study, entries: Sequence[RobotRow], doubtful: str, stored: Mapping[str, Results]) -> list[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -33,6 +32,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     known_alone,
     other_robot,
     plain_table,
+    poses_to_read,
 )
 from er3a.pipeline.study import Study
 from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
@@ -140,7 +140,8 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
     judged = [check for check in checks if not isinstance(check, model.Unjudged)]
     failed = sorted((each for each in judged if each.status == "fail"), key=lambda each: -each.tolerances_off)
     source = robot.sources.get("dh")
-    corrected, _ = diagnosis_section.corrected_robot(robot_of(study.table(name)).replace(name=name), summary.diagnoses)
+    table = robot_of(study.table(name)).replace(name=name)
+    corrected, _ = diagnosis_section.corrected_robot(table, summary.diagnoses)
     file = robot_file(corrected) if corrected and not summary.is_beyond_correction else None
     text = robot_text(file) if file else ""
     instead = (
@@ -165,6 +166,7 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         diagnoses=diagnosis_section.diagnosis_stories(summary),
         corrected=text,
         corrected_address=text_address(text),
+        poses=poses_to_read(table) if summary.verdict.status != "fail" else ([], []),
         groups=group_rows(judged),
         by_kind=[_by_kind(judged)],
         failed=[*map(check_row, failed)],
@@ -224,8 +226,7 @@ def _dimensions(disputed: Iterable[model.Conflict]) -> tuple[list[Label], list[t
         labels.append(Label(say(each.subject), np.array([0.0, -step]), "open", SEEN, written_there=True))
         for row, stated in enumerate(each.statements, 2):
             kind: LabelKind = "right" if stated.met else "open"
-            source = re.split("[,，]", own_title(stated.source))[0]
-            text = joined([with_unit(fixed(stated.expected, 1), each.unit), source], ": ")
+            text = joined([with_unit(fixed(stated.expected, 1), each.unit), own_title(stated.document)], ": ")
             labels.append(Label(text, np.array([0.0, -step * row]), kind, written_there=True))
             lines += dimension(stated.expected, -step * (row + 0.5), -1.5 * step, kind)
     return labels, lines
