@@ -30,7 +30,7 @@ STATUS_WORDS = words(
         "settled_up_to_signs": "settled but for signs",
         "weak": "weak",
         "contradicted": "contradicted",
-        "consistent": "one source",
+        "consistent": "its own source only",
         "open": "open",
         "gauge": "free choice",
         "given": "given",

@@ -23,7 +23,6 @@ from er3a.pipeline.results import THE_CODE, THE_SETTINGS, Provenance, Stored, is
 from er3a.pipeline.stages.registry import STAGES
 from er3a.pipeline.stages.validation.model import ValidationResults
 from er3a.pipeline.stages.workspace.model import WorkspaceResults, WorkspaceSummary
-from er3a.pipeline.stages.workspace.page.workspace_figures import void_label
 from er3a.pipeline.study import Study
 from er3a.pipeline.verdicts import StageVerdict, read_verdicts, write_junit
 from er3a.pipeline.viewing import page
@@ -178,10 +177,10 @@ def _cell(stage: str, heads: Mapping[str, Head], stored: Results) -> StageCell:
 def _picture(study: Study, drawn: Sequence[RobotRow], stored: Mapping[str, Results]) -> str:
     """The arm that may be relied on, with its voids, and over it the wrong one."""
     name = drawn[0].name
-    floor, known = floor_of(study.scene(name, "trajectory")), _reach(stored[name])
+    floor = floor_of(study.scene(name, "trajectory"))
     floor_mm = None if floor is None else 1000 * floor
     seen = [_seen(study, entry.name, entry.use, stored[entry.name]) for entry in drawn]
-    labels = [void_label(number, void) for number, void in enumerate(known.enclosed_voids, 1)] if known else []
+    labels = []
     for arm in seen:
         lowest = arm.points_mm[arm.points_mm[:, 1].argmin()]
         if floor_mm is not None and lowest[1] < floor_mm:

@@ -261,7 +261,7 @@ def bars(names: Sequence[str], sizes: Reals, texts: Sequence[str], colours: Sequ
         ax.annotate(text, (max(size, 0.0), place), (7, 0), textcoords="offset points", va="center")
     ax.set_yticks(places, names)
     ax.invert_yaxis()
-    ax.margins(x=0.35)
+    ax.margins(x=0.45)
     return figure, ax
 
 

@@ -166,13 +166,22 @@ def _answer(robot: Robot, results: model.DynamicsResults) -> Answer:
     moving, holding = (with_unit(number(value, 2), worst.unit) for value in (worst.peak, worst.holding))
     order = sorted(summary.motors, key=lambda motor: -motor.peak)
     longest = max(worst.peak, worst.holding)  # one scale for all bars without a limit of their own
-    rows = [_row(motor, longest, _moment_of(results, motor)) for motor in order if limited or motor.peak >= LEAST]
+    rows = []
+    for motor in order:
+        if limited or motor.peak >= LEAST:
+            moment = _moment_of(results, motor)
+            name = joined([f"J{motor.joint}", moment[0]], ", ")
+            rows.append(_row(motor, motor.peak, name, moment, longest, motor.peak_limit))
     if idle := [motor.joint for motor in order[len(rows) :]]:
         loads = [load for path in summary.paths if path.counts for load in path.joints if load.joint in idle]
         most = at_most(max(load.peak + load.tolerance for load in loads), 1)
         names = joined((f"J{joint}" for joint in idle), ", ")
         rows.append(ListRow("none", names, with_unit(f"≤ {most}", order[-1].unit), "#motors"))
-    still = [_held_row(each, longest) for each in order if each.holding >= LEAST]
+    still = [
+        _row(motor, motor.holding, name, (name, 0.0), longest)
+        for motor in order
+        if motor.holding >= LEAST and (name := holding_name(motor.joint))
+    ]
     left = [tr(WITHOUT[each.reason]) for each in summary.assumed if each.reason in WITHOUT]
     return Answer(
         headline,
@@ -200,24 +209,15 @@ def _mark(motor: model.MotorNeed) -> Mark:
     return "pass" if motor.peak <= motor.peak_limit else "fail"
 
 
-def _row(motor: model.MotorNeed, most: float, moment: tuple[str, float]) -> ListRow:
-    """A joint with its greatest torque as a bar, of the greatest of all joints or of its limit."""
-    note = _sized(motor.peak, motor.unit)
-    if motor.peak_limit:
-        note = tr("{value} of {limit}", value=number(motor.peak, 2), limit=_sized(motor.peak_limit, motor.unit))
-    name, full = joined([f"J{motor.joint}", moment[0]], ", "), motor.peak_limit or most or 1.0
-    share = motor.peak / full
-    return ListRow(_mark(motor), name, note, f"#{moment[0]}", moment, float(share > SEEN), _filled(share))
-
-
-def _held_row(motor: model.MotorNeed, most: float) -> ListRow:
-    """A joint with what it holds in its worst pose, as a bar of the greatest of all joints."""
-    name, note = holding_name(motor.joint), _sized(motor.holding, motor.unit)
-    return ListRow("none", name, note, f"#{name}", (name, 0.0), 1.0, _filled(motor.holding / most))
-
-
-def _filled(share: float) -> list[Part]:
-    return [Part(min(1.0, share), 1.0, "rest")]
+def _row(
+    motor: model.MotorNeed, value: float, name: str, moment: tuple[str, float], most: float, limit: float | None = None
+) -> ListRow:
+    """What a joint needs at a moment, as a bar of its limit, or else of the most that any joint needs."""
+    note, share = _sized(value, motor.unit), value / (limit or most or 1.0)
+    if limit:
+        note = tr("{value} of {limit}", value=number(value, 2), limit=_sized(limit, motor.unit))
+    parts, mark = [Part(min(1.0, share), 1.0, "rest")], _mark(motor) if limit else "none"
+    return ListRow(mark, name, note, f"#{moment[0]}", moment, float(share > SEEN), parts)
 
 
 def _sized(value: float, unit: model.Unit) -> str:

@@ -34,7 +34,7 @@ MARKS: Mapping[Status, str] = {
     "gauge": "↔",
     "given": "·",
 }
-FIRST = 4  # entries to settle, named at the table's side
+FIRST = 8  # entries to settle, named at the table's side
 SETTLED = ("settled", "settled_up_to_signs", "gauge")
 COLUMNS = {
     "a": "a (mm)",

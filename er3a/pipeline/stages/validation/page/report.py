@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -35,7 +35,7 @@ from er3a.pipeline.stages.validation.page.evidence_section import (
     poses_to_read,
 )
 from er3a.pipeline.study import Study
-from er3a.pipeline.viewing.answer import Answer, Fix, Group, ListRow, Part
+from er3a.pipeline.viewing.answer import Answer, Fix
 from er3a.pipeline.viewing.page import (
     alternative_table,
     render_stage,
@@ -93,15 +93,6 @@ def group_rows(checks: Iterable[Judged]) -> list[list[Any]]:
     return rows
 
 
-KINDS = {
-    "independent": N_("independent documents"),
-    "consistency": N_("documents it is made from"),
-    "claim": N_("claims of a source"),
-    None: N_("the model itself"),
-}
-"""What a check rests on, as the page names it."""
-
-
 def check_row(check: Judged) -> list[str]:
     """A check in the columns of ``COLUMNS``."""
     values = [_value(value, check) for value in (check.measured, check.expected, check.difference)]
@@ -118,19 +109,6 @@ def _value(value: float, check: model.Check) -> str:
     if check.group == "round_trips" and 0 < abs(value) < 1e-3:
         return measured(value, None, check.unit)
     return fixed(value, DECIMALS[check.unit])
-
-
-def _by_kind(checks: Sequence[Judged]) -> Group:
-    """How many checks of each kind pass, each with its bar."""
-    rows = []
-    for kind, title in KINDS.items():
-        own = [check.status for check in checks if check.kind == kind]
-        passed, total = own.count("pass"), len(own)
-        mark: Literal["pass", "fail", "caution"] = "pass" if passed == total else "fail" if "fail" in own else "caution"
-        parts = [Part(passed / total, 1.0, mark)] if passed < total else ()
-        if own:
-            rows.append(ListRow(mark, tr(title), f"{passed}/{total}", "#checks", None, 1.0, parts))
-    return Group(tr("Checks"), rows)
 
 
 def report(study: Study, stored: Stored[model.ValidationResults], output: Path) -> None:
@@ -168,7 +146,6 @@ def report(study: Study, stored: Stored[model.ValidationResults], output: Path) 
         corrected_address=text_address(text),
         poses=poses_to_read(table) if summary.verdict.status != "fail" else ([], []),
         groups=group_rows(judged),
-        by_kind=[_by_kind(judged)],
         failed=[*map(check_row, failed)],
         columns=COLUMNS,
         conflicts=[(say(conflict.subject), conflict) for conflict in summary.conflicts],

@@ -59,13 +59,8 @@ def residual_picture(rows: model.SampleRows, found: model.CalibrationResult) -> 
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes[1].set_xlabel(tr("sample"))
     axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
-    worst = int(np.argmax(np.where(rows.used, sizes[0], 0.0)))
-    caption = tr(
-        "Worst residual used: {name}, {mm} mm.",
-        name=rows.sample[worst],
-        mm=fixed(sizes[0][worst], 2),
-    )
-    return Picture(figure, tr("Bars of the residual of each sample, in mm and in degrees"), caption)
+    caption = tr("Residual of each sample.")
+    return Picture(figure, caption, caption)
 
 
 def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
@@ -100,19 +95,13 @@ def image_picture(rows: model.CornerRows, folder: Path) -> Picture:
     for ax in axes.ravel()[len(shown) :]:
         ax.set_axis_off()
     axes[0, 0].legend(loc="lower left", fontsize=6)
-    by_board = float(np.sqrt(((rows.by_board_px - rows.seen_px)[rows.used] ** 2).sum(axis=1).mean()))
-    by_arm = float(np.sqrt((off[rows.used] ** 2).sum(axis=1).mean()))
     caption = tr(
         "Detected corners with lines towards their position by arm and calibration, magnified {scale:g} times; "
-        "the {shown} of {count} images with the greatest residuals. In the images used, detected corners are "
-        "{board} px (root mean square) from the board's own pose in the image (the camera's noise) and {arm} px"
-        " from the pose by the arm. Lines all in one direction: wrong pose of arm or board. Lines circling a "
-        "point: board detected the wrong way round. Short lines in all directions: noise.",
+        "the {shown} of {count} images with the greatest residuals. Lines all in one direction: wrong pose of arm or "
+        "board. Lines circling a point: board detected the wrong way round. Short lines in all directions: noise.",
         scale=scale,
         shown=len(shown),
         count=len(size),
-        board=fixed(by_board, 2),
-        arm=fixed(by_arm, 2),
     )
     return Picture(figure, tr("Images of the board with detected and reprojected corners"), caption)
 
@@ -123,7 +112,7 @@ def error_picture(each: model.ObjectResult, task: VisionFile) -> Picture:
     sizes = [*((getattr(each.error_mm, part), getattr(each.error_deg, part)) for part in PARTS), allowed]
     names = [*(word("vision.part_of_error", PARTS, part) for part in PARTS), tr("gripper's tolerance")]
     texts = [f"{fixed(mm, 2)} mm, {fixed(deg, 2)}°" for mm, deg in sizes]
-    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [MODEL] * (len(PARTS) - 1) + [HIGHLIGHT, MUTED])
+    figure, ax = bars(names, np.array(sizes)[:, 0], texts, [*[MODEL] * len(PARTS), MUTED])
     ax.set_xlabel(tr("error (mm)"))
     caption = tr("What 95 % of errors stay below, by cause.")
     return Picture(figure, caption, caption)
@@ -270,7 +259,6 @@ def _grasp(each: model.ObjectResult) -> list[str]:
         panel_link(grasp.q_before_deg, _listed(grasp.q_before_deg)),
         panel_link(grasp.q_deg, _listed(grasp.q_deg)),
         bracketed(near, say(grasp.nearest)) if grasp.nearest else near,
-        tr("straight") if not grasp.corners else tr("planned, {corners} corners", corners=grasp.corners),
         fixed(grasp.duration_s, 1),
         fixed(grasp.limit_margin_deg, 0),
         fixed(grasp.singular_value, 2),
