@@ -70,11 +70,9 @@ def _labelled(robot: Robot, results: model.WorkspaceResults, scene: Scene | None
 def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: tuple[str, str]) -> Answer:
     """How far the arm reaches, its voids, where the tray goes, and the ``payload``."""
     reach, volume = summary.reach_m, summary.volume_m3
-    enclosed = summary.enclosed_voids
-    litres = with_unit(at_least(1000 * sum(void.volume_m3.lower for void in enclosed), "L"), "L")
-    rest = tr("Void ≥ {size}.", size=litres) if enclosed else tr("No enclosed void.")
-    if placing and not sum(map(len, placing.hindered(placing.tried[0]).values())):
-        rest = whole_sentence(tr("{tray} fits", tray=placing.tried[0].tray.name))
+    rest, best = "", placing.tried[0] if placing else None
+    if placing and best and not sum(map(len, placing.hindered(best).values())):
+        rest = whole_sentence(tr("{tray} fits", tray=best.tray.name))
     keys = [
         (
             tr("{low} to {high} mm", low=millimetres([reach.lowest]), high=millimetres([reach.highest])),
@@ -86,7 +84,7 @@ def _answer(summary: model.WorkspaceSummary, placing: Placing | None, payload: t
         ),
         payload,
     ]
-    # The void that the headline names and the picture shows comes first.
+    # The void that the picture shows comes first.
     voids = sorted(enumerate(summary.voids, start=1), key=lambda each: each[1].kind != "enclosed")
     groups = (
         Group(tr("Voids"), [_void_as_row(*each, bool(placing)) for each in voids]),
