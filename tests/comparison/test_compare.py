@@ -413,7 +413,7 @@ def test_what_both_arms_give_and_no_layer_compares_is_named_and_only_that():
     heavier = weighed.replace(masses=Masses((LinkMass(1, MassBody(9.0)),), weight=90.0))
     found = er3a.compare(weighed, heavier)
     assert found.not_examined == ("speeds", "tool", "envelopes", "inertia", "weight")
-    assert headline(found).endswith("deg); not compared: speeds, tool, shapes of links, masses, weight")
+    assert headline(found).endswith("°); not compared: speeds, tool, shapes of links, masses, weight")
     assert layer_rows(found)[-4:] == [
         (name, "not compared", "") for name in ("tool", "shapes of links", "masses", "weight")
     ]

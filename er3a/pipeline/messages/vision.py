@@ -176,9 +176,9 @@ WORDS.update(
 
 @says("grasp_collides", "way_collides")
 def _(found: Finding) -> str:
-    hit = found.clearance_mm < 0
-    depth, clearance = (-found.clearance_mm, None) if hit else (None, found.clearance_mm)
-    return sentence("grasp_collides", **{**found.params, "depth_mm": depth, "clearance_mm": clearance})
+    depth = -found.clearance_mm
+    clearance = {"clearance_mm": None} if depth > 0 else {}
+    return sentence("grasp_collides", **{**found.params, "depth_mm": depth if clearance else None, **clearance})
 
 
 def pose_words(setup: str) -> tuple[str, str]:
